@@ -1,0 +1,241 @@
+//! Recipes to start from: what a slide looks like.
+
+use std::collections::BTreeMap;
+
+use super::{
+    Acceptance, Background, Camera, CellMix, Chromatin, Cytoplasm, Debris, Field, Focus, Folds, Illumination, Layout,
+    Nucleus, NucleusForm, Number, Optics, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, Stain, RECIPE_VERSION,
+};
+
+/// A named recipe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// A liquid-based preparation: free cells and small groups, the default.
+    Lbc,
+    /// The paper's simulator with the values of its released code.
+    Paper2015,
+    /// Few cells, hardly any debris.
+    Sparse,
+    /// A field that is covered with cells several layers deep.
+    Dense,
+    /// A field with cells of a high-grade lesion (HSIL), as in the paper's Fig. 13.
+    HighGrade,
+    /// Many leukocytes and bacteria.
+    Inflamed,
+}
+
+impl Preset {
+    /// All presets.
+    pub const ALL: [Self; 6] = [Self::Lbc, Self::Paper2015, Self::Sparse, Self::Dense, Self::HighGrade, Self::Inflamed];
+
+    /// The name of the preset, as the command line knows it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lbc => "lbc",
+            Self::Paper2015 => "paper-2015",
+            Self::Sparse => "sparse",
+            Self::Dense => "dense",
+            Self::HighGrade => "high-grade",
+            Self::Inflamed => "inflamed",
+        }
+    }
+
+    /// What the preset shows, in a line.
+    #[must_use]
+    pub fn summary(self) -> &'static str {
+        match self {
+            Self::Lbc => "liquid-based cytology: free cells and small groups (default)",
+            Self::Paper2015 => "the simulator of the 2015 paper, with the values of its released code",
+            Self::Sparse => "few cells, hardly any debris",
+            Self::Dense => "covered with cells, several layers deep",
+            Self::HighGrade => "cells of a high-grade lesion among normal ones",
+            Self::Inflamed => "many leukocytes and bacteria",
+        }
+    }
+
+    /// The preset of a name.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name)
+    }
+
+    /// The recipe.
+    #[must_use]
+    pub fn recipe(self) -> Recipe {
+        match self {
+            Self::Lbc => lbc(),
+            Self::Paper2015 => paper(),
+            Self::Sparse => sparse(),
+            Self::Dense => dense(),
+            Self::HighGrade => high_grade(),
+            Self::Inflamed => inflamed(),
+        }
+    }
+}
+
+fn mix<const N: usize>(counts: [(&str, Number); N]) -> BTreeMap<String, CellMix> {
+    counts.into_iter().map(|(class, count)| (class.to_owned(), CellMix { count, ..CellMix::default() })).collect()
+}
+
+fn lbc() -> Recipe {
+    Recipe {
+        version: RECIPE_VERSION,
+        field: Field::default(),
+        focus: Focus::default(),
+        slide: Slide::default(),
+        layout: Layout::Clusters {
+            count: Number::uniform(5.0, 11.0),
+            radius_um: Number::uniform(18.0, 45.0),
+            outside: Number::uniform(0.03, 0.15),
+        },
+        cells: mix([("intermediate", Number::uniform(10.0, 26.0)), ("superficial", Number::uniform(2.0, 10.0))]),
+        cytoplasm: Cytoplasm::default(),
+        nucleus: Nucleus::default(),
+        stain: Stain::default(),
+        debris: Debris::default(),
+        background: Background::default(),
+        optics: Optics::default(),
+        camera: Camera::default(),
+    }
+}
+
+fn sparse() -> Recipe {
+    let mut recipe = lbc();
+    recipe.layout = Layout::Uniform {};
+    recipe.cells = mix([("intermediate", Number::uniform(3.0, 8.0)), ("superficial", Number::uniform(1.0, 4.0))]);
+    recipe.debris.leukocytes.clusters = Number::uniform(0.0, 2.0);
+    recipe.debris.bacilli.clusters = Number::uniform(0.0, 3.0);
+    recipe.debris.speckles.count = Number::uniform(10.0, 50.0);
+    recipe.debris.out_of_focus.count = Number::uniform(0.0, 1.0);
+    recipe
+}
+
+fn dense() -> Recipe {
+    let mut recipe = lbc();
+    recipe.layout = Layout::Clusters { count: Number::uniform(2.0, 4.0), radius_um: Number::uniform(70.0, 130.0), outside: 0.2.into() };
+    recipe.cells = mix([("intermediate", Number::uniform(45.0, 75.0)), ("superficial", Number::uniform(15.0, 30.0))]);
+    recipe.slide.depth_um = Number::uniform(5.0, 10.0);
+    recipe.slide.stacking_um = 1.5.into();
+    recipe.stain.field_cytoplasm = Number::log_normal(0.85, 0.2);
+    recipe
+}
+
+fn high_grade() -> Recipe {
+    let mut recipe = lbc();
+    recipe.cells = mix([
+        ("intermediate", Number::uniform(8.0, 18.0)),
+        ("superficial", Number::uniform(2.0, 8.0)),
+        ("high-grade", Number::uniform(5.0, 14.0)),
+    ]);
+    recipe
+}
+
+fn inflamed() -> Recipe {
+    let mut recipe = lbc();
+    recipe.debris.leukocytes.clusters = Number::uniform(20.0, 60.0);
+    recipe.debris.leukocytes.per_cluster = Number::log_normal(5.0, 0.9).at_least(1.0);
+    recipe.debris.leukocytes.cluster_um = Number::uniform(4.0, 14.0);
+    recipe.debris.bacilli.clusters = Number::uniform(20.0, 50.0);
+    recipe.debris.bacilli.per_cluster = Number::log_normal(25.0, 0.7).at_least(1.0);
+    recipe
+}
+
+/// The values of the paper where it states them, else those of the authors' released code.
+fn paper() -> Recipe {
+    let mut recipe = lbc();
+    recipe.slide = Slide { depth_um: 0.4.into(), relief_um: 60.0.into(), median_um: 8.0.into(), stacking_um: 0.0.into() };
+    recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
+    recipe.cells = mix([("intermediate", 30.0.into())]);
+    recipe.cytoplasm = Cytoplasm {
+        shape: ShapeSpread::Independent,
+        sheet: Sheet::Verlet,
+        excess: 1.0.into(),
+        folds: Folds { flap: 0.0.into(), roll: 0.0.into(), cigar: 0.0.into(), ..Folds::default() },
+        clouds: 0.2.into(),
+        clouds_um: 1.75.into(),
+        flecks: 0.7.into(),
+        flecks_threshold: 0.5.into(),
+        cytoskeleton: 0.3.into(),
+        grain: 0.0.into(),
+        granular: 0.0.into(),
+        granules: 0.0.into(),
+        fray_um: 0.0.into(),
+    };
+    recipe.nucleus = Nucleus {
+        shape: ShapeSpread::Independent,
+        chromatin: Chromatin::Quilt,
+        acceptance: Acceptance::Threshold,
+        d_max: 0.06.into(),
+        seam: Seam::Feather,
+        restore: Restore::AfterDetection,
+        pyknotic: 0.0.into(),
+        wrinkled: 0.0.into(),
+        rim: 0.0.into(),
+        ..Nucleus::default()
+    };
+    let even = Number::Fixed(1.0);
+    recipe.stain = Stain {
+        field_cytoplasm: even.clone(),
+        field_nucleus: even.clone(),
+        field_texture: even.clone(),
+        overlap: even,
+    };
+    recipe.debris.leukocytes.form = NucleusForm::Round;
+    recipe.debris.leukocytes.absorbance = 0.70.into();
+    recipe.debris.leukocytes.halo = 0.0.into();
+    recipe.debris.leukocytes.clusters = 8.0.into();
+    recipe.debris.leukocytes.per_cluster = Number::uniform(3.0, 6.0);
+    recipe.debris.bacilli.absorbance = 0.15.into();
+    recipe.debris.bacilli.bend_deg = 0.0.into();
+    recipe.debris.bacilli.clusters = 8.0.into();
+    recipe.debris.bacilli.per_cluster = Number::uniform(8.0, 20.0);
+    recipe.debris.speckles.absorbance = 0.25.into();
+    recipe.debris.speckles.count = 120.0.into();
+    recipe.debris.speckles.dilations = Number::Drawn {
+        law: super::Law::Choice(vec![0.0, 0.0, 1.0]),
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+    };
+    recipe.debris.out_of_focus.absorbance = 0.35.into();
+    recipe.debris.out_of_focus.count = 5.0.into();
+    recipe.background = Background {
+        level: (235.0 / 255.0).into(),
+        illumination: Illumination::Border { exponent: 0.02.into() },
+        scatter: (10.0 / 255.0).into(),
+        scatter_um: 55.0.into(),
+    };
+    // 70 photo-electrons a grey level of 8 bits; the released read noise is one grey level.
+    recipe.camera = Camera { full_well_e: (255.0 * 70.0).into(), read_noise_e: 70.0.into(), ..Camera::default() };
+    recipe.optics = Optics::default();
+    recipe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_sound_and_reads_back_as_written() {
+        for preset in Preset::ALL {
+            let recipe = preset.recipe();
+            assert!(recipe.problems().is_empty(), "{}: {:?}", preset.name(), recipe.problems());
+            for text in [recipe.to_toml(), recipe.to_commented_toml()] {
+                let again: Recipe = toml::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}\n{text}", preset.name()));
+                assert_eq!(again, recipe, "{}", preset.name());
+            }
+            assert_eq!(Preset::by_name(preset.name()), Some(preset));
+        }
+    }
+
+    #[test]
+    fn the_paper_preset_holds_the_published_values() {
+        let paper = Preset::Paper2015.recipe();
+        assert_eq!(paper.field.pixel_um, 0.25.into());
+        assert_eq!(paper.optics.sigma_xy_um, 0.225.into(), "0.9 px");
+        assert_eq!(paper.camera.full_well_e, 17_850.0.into());
+        assert_eq!(paper.nucleus.donors, 3.0.into());
+        assert_eq!(paper.cytoplasm.sheet, Sheet::Verlet);
+        assert_eq!(paper.nucleus.seam, Seam::Feather);
+    }
+}

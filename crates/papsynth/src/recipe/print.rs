@@ -1,0 +1,138 @@
+//! Recipes as text: TOML whose comments are the documentation of the fields, taken from the schema.
+
+use serde_json::Value;
+
+use super::Recipe;
+
+/// How long a comment's line may get.
+const COMMENT_WIDTH: usize = 110;
+
+pub(super) fn plain_toml(recipe: &Recipe) -> String {
+    toml::to_string(recipe).unwrap_or_default()
+}
+
+/// Every field with its meaning above it.
+pub(super) fn commented_toml(recipe: &Recipe) -> String {
+    let schema = Recipe::schema();
+    let value = serde_json::to_value(recipe).unwrap_or_default();
+    let mut out = String::from(
+        "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
+         # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
+         # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with `min` and `max` if wished.\n\n",
+    );
+    table(&mut out, "", &value, &schema, &schema);
+    out
+}
+
+/// Prints the fields of a table, plain ones first, tables after them.
+fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Value) {
+    let Some(fields) = value.as_object() else { return };
+    let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(name, value)| is_table(name, value));
+    for (name, value) in plain {
+        comment(out, &describe(schema, name, value, fields, root));
+        out.push_str(&format!("{name} = {}\n", inline(value)));
+    }
+    for (name, value) in tables {
+        let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        out.push('\n');
+        comment(out, &describe(schema, name, value, fields, root));
+        out.push_str(&format!("[{inner}]\n"));
+        let inner_schema = resolve(&property(schema, name, fields), root);
+        table(out, &inner, value, &inner_schema, root);
+    }
+}
+
+/// Distributions are tables in JSON but are written on one line.
+fn is_table(_name: &str, value: &Value) -> bool {
+    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
+    value.as_object().is_some_and(|map| !LAWS.iter().any(|law| map.contains_key(*law)))
+}
+
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect();
+            format!("{{ {} }}", inner.join(", "))
+        }
+        Value::Array(items) => format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        Value::String(text) => toml::Value::String(text.clone()).to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// The schema of a field: of a struct, of a map's values, or of the variant that the table's `kind` chooses.
+fn property(schema: &Value, name: &str, fields: &serde_json::Map<String, Value>) -> Value {
+    let direct = |schema: &Value| schema.pointer(&format!("/properties/{name}")).cloned();
+    if let Some(found) = direct(schema) {
+        return found;
+    }
+    for variant in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
+        if variant.pointer("/properties/kind/const") == fields.get("kind") {
+            if let Some(found) = direct(variant) {
+                return found;
+            }
+        }
+    }
+    schema.get("additionalProperties").cloned().unwrap_or_default()
+}
+
+fn resolve(schema: &Value, root: &Value) -> Value {
+    let name = schema.get("$ref").and_then(Value::as_str).map(|r| r.trim_start_matches('#'));
+    name.and_then(|pointer| root.pointer(pointer)).cloned().unwrap_or_else(|| schema.clone())
+}
+
+/// The documentation of a field and, where it is one of a few words, those words.
+fn describe(schema: &Value, name: &str, value: &Value, fields: &serde_json::Map<String, Value>, root: &Value) -> String {
+    let text = |schema: &Value| schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
+    let found = property(schema, name, fields);
+    let mut words = if name == "kind" { String::new() } else { text(&found) };
+    let target = resolve(&found, root);
+    if value.is_string() {
+        let variants = if name == "kind" { schema } else { &target };
+        for variant in variants.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
+            let tag = variant.get("const").or_else(|| variant.pointer("/properties/kind/const"));
+            if let Some(tag) = tag.and_then(Value::as_str) {
+                words.push_str(&format!("\n  {tag}: {}", text(variant)));
+            }
+        }
+    } else if words.is_empty() {
+        words = text(&target);
+    }
+    words
+}
+
+fn comment(out: &mut String, text: &str) {
+    for paragraph in text.lines() {
+        let indent = if paragraph.starts_with("  ") { "#   " } else { "# " };
+        let mut line = String::from(indent);
+        for word in paragraph.split_whitespace() {
+            if line.chars().count() + word.chars().count() > COMMENT_WIDTH {
+                out.push_str(line.trim_end());
+                out.push('\n');
+                line = String::from(if indent.len() > 2 { "#     " } else { "# " });
+            }
+            line.push_str(word);
+            line.push(' ');
+        }
+        if line.trim_end() != "#" {
+            out.push_str(line.trim_end());
+            out.push('\n');
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_field_has_its_meaning_above_it() {
+        let text = Recipe::default().to_commented_toml();
+        let mut commented = false;
+        for line in text.lines() {
+            let is_field = line.contains(" = ") && !line.starts_with('#');
+            assert!(!is_field || commented, "no comment above `{line}`\n{text}");
+            commented = line.starts_with('#');
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! Sections of a recipe about the cells: slide, layout, cells, cytoplasm, nucleus, stain.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Number;
+
+/// How deep the cells lie ("Final Image Formation": depth from a median-filtered Perlin image).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Slide {
+    /// Depth over which the cells of a field lie, µm, 0 to 1000.
+    pub depth_um: Number,
+    /// Size of the cells of the Perlin noise that says how depth varies over the field, µm, 1 to 10000.
+    pub relief_um: Number,
+    /// Width of the median filter on that noise, µm, 0 to 1000.
+    pub median_um: Number,
+    /// Standard deviation of a cell's own depth about the relief, µm, 0 to 100: cells that lie on each other.
+    pub stacking_um: Number,
+}
+
+impl Default for Slide {
+    fn default() -> Self {
+        Self { depth_um: Number::uniform(2.0, 6.0), relief_um: 90.0.into(), median_um: 20.0.into(), stacking_um: 0.6.into() }
+    }
+}
+
+/// Where the cells lie: the weight map of "Population Distribution Generation".
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Layout {
+    /// Anywhere, all places equally likely (Eq. 5).
+    Uniform {},
+    /// Round clusters at random places, and some cells outside them.
+    Clusters {
+        /// Number of clusters, 1 to 10000; drawn once a field.
+        count: Number,
+        /// Radius (standard deviation) of a cluster, µm, 1 to 10000; drawn for each cluster.
+        radius_um: Number,
+        /// Weight of the places outside all clusters, relative to a cluster's centre, 0 to 1.
+        outside: Number,
+    },
+    /// A band of material across the image.
+    Swath {
+        /// Width (standard deviation) of the band, µm, 1 to 10000.
+        width_um: Number,
+        /// Weight of the places outside the band, relative to its middle, 0 to 1.
+        outside: Number,
+    },
+    /// A grey image that is stretched over the field: white is likely, black never happens.
+    Map {
+        /// File of the image, relative to the recipe.
+        path: String,
+    },
+    /// The layout of a given label image: as likely as the place is covered by a label there.
+    Labels {
+        /// File of the label image, relative to the recipe.
+        path: String,
+        /// Standard deviation of the smoothing of its coverage, µm, 0 to 1000.
+        smooth_um: Number,
+    },
+}
+
+/// How many cells of a class there are, and how they differ from the model's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CellMix {
+    /// Number of cells of this class, 0 to 100000; drawn once a field.
+    pub count: Number,
+    /// Factor on the size of the whole cell, 0.1 to 10; drawn for each cell.
+    pub size: Number,
+    /// Factor on the absorbance of its cytoplasm, 0 to 20; drawn for each cell.
+    pub cytoplasm_stain: Number,
+    /// Factor on the absorbance of its nucleus, 0 to 20; drawn for each cell.
+    pub nucleus_stain: Number,
+}
+
+impl Default for CellMix {
+    fn default() -> Self {
+        Self { count: 10.0.into(), size: 1.0.into(), cytoplasm_stain: 1.0.into(), nucleus_stain: 1.0.into() }
+    }
+}
+
+/// How shapes vary about their mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShapeSpread {
+    /// Aligned descriptors with a shrinkage covariance; self-intersecting draws are drawn again.
+    Correlated,
+    /// The paper's: every descriptor an independent normal.
+    Independent,
+}
+
+/// How the cytoplasm becomes a sheet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sheet {
+    /// Extended position-based dynamics with bending, under a cover glass.
+    Xpbd,
+    /// The paper's: Verlet steps for every vertex (Eq. 4).
+    Verlet,
+    /// No folds at all.
+    Flat,
+}
+
+/// Parts of a cell that lie doubled back on it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Folds {
+    /// Probability that a flap of the cell lies folded back on it, 0 to 1.
+    pub flap: Number,
+    /// Probability that a rim is rolled up, 0 to 1.
+    pub roll: Number,
+    /// Probability that the cell is folded over completely, like a cigar, 0 to 1.
+    pub cigar: Number,
+    /// How far in from the rim a flap begins, as a fraction of the cell's radius, 0.02 to 0.9.
+    pub depth: Number,
+    /// Radius of the bend, µm, 0.1 to 5.
+    pub radius_um: Number,
+}
+
+impl Default for Folds {
+    fn default() -> Self {
+        Self {
+            flap: 0.32.into(),
+            roll: 0.18.into(),
+            cigar: 0.03.into(),
+            depth: Number::uniform(0.10, 0.45),
+            radius_um: Number::uniform(0.35, 0.8),
+        }
+    }
+}
+
+/// The cytoplasm of every cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Cytoplasm {
+    /// How outlines vary about their mean.
+    pub shape: ShapeSpread,
+    /// How the cytoplasm becomes a sheet.
+    pub sheet: Sheet,
+    /// Area of the flat sheet relative to the cell's, 1 to 2: more makes more wrinkles.
+    pub excess: Number,
+    /// Parts that lie doubled back.
+    pub folds: Folds,
+    /// First level of detail: strength of low-frequency Gaussian noise, relative to the cytoplasm's absorbance, 0 to 2.
+    pub clouds: Number,
+    /// Standard deviation of its smoothing, µm, 0.1 to 100.
+    pub clouds_um: Number,
+    /// Second level of detail: strength of thresholded Brownian flecks, relative to the cytoplasm's absorbance, 0 to 5.
+    pub flecks: Number,
+    /// Share of the cell that the flecks leave free, 0 to 0.999.
+    pub flecks_threshold: Number,
+    /// Third level of detail: strength of the cytoskeleton, relative to the cytoplasm's absorbance, 0 to 2.
+    pub cytoskeleton: Number,
+    /// Fine grain of the cytoplasm, relative to its absorbance, 0 to 2.
+    pub grain: Number,
+    /// Probability that a cell is peppered with granules, 0 to 1.
+    pub granular: Number,
+    /// Granules of such a cell per 100 µm², 0 to 1000.
+    pub granules: Number,
+    /// Roughness of the rim, µm, 0 to 5: the edge is frayed over about this distance.
+    pub fray_um: Number,
+}
+
+impl Default for Cytoplasm {
+    fn default() -> Self {
+        Self {
+            shape: ShapeSpread::Correlated,
+            sheet: Sheet::Xpbd,
+            excess: Number::uniform(1.04, 1.16),
+            folds: Folds::default(),
+            clouds: Number::uniform(0.06, 0.16),
+            clouds_um: 3.0.into(),
+            flecks: Number::log_normal(0.25, 0.5),
+            flecks_threshold: Number::uniform(0.55, 0.85),
+            cytoskeleton: Number::uniform(0.05, 0.18),
+            grain: Number::uniform(0.08, 0.2),
+            granular: 0.2.into(),
+            granules: Number::log_normal(12.0, 0.6),
+            fray_um: Number::uniform(0.2, 0.9),
+        }
+    }
+}
+
+/// Where the texture of nuclei comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Chromatin {
+    /// Quilted from patches of donors: real ones where the model has learned some, else made from its spectrum.
+    Quilt,
+    /// A random field of the model's spectrum, a new one for every nucleus.
+    Field,
+}
+
+/// Which patches of the donors are candidates ("Texture synthesis").
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Acceptance {
+    /// All whose overlap differs by at most a tenth more than that of the best one.
+    Near,
+    /// The paper's: the first random one whose overlap differs by less than d_max.
+    Threshold,
+}
+
+/// How patches are joined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Seam {
+    /// Along the path of least difference.
+    MinCut,
+    /// The paper's: weighted by the distance to the patches' edges.
+    Feather,
+}
+
+/// What happens to nuclei whose donors were images already (Eqs. 15, 16).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Restore {
+    /// Transmitted light is restored before detection: such nuclei are not blurred twice, and carry their donors' noise
+    /// and the camera's.
+    BeforeDetection,
+    /// The paper's: restored in the finished image; such nuclei carry their donors' noise alone.
+    AfterDetection,
+    /// They are imaged like everything else.
+    Off,
+}
+
+/// The nucleus of every cell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Nucleus {
+    /// How outlines vary about their mean.
+    pub shape: ShapeSpread,
+    /// Where the texture comes from.
+    pub chromatin: Chromatin,
+    /// Donors of one nucleus, 1 to 64 (the paper's: 3).
+    pub donors: Number,
+    /// Size of a patch, µm, 0.5 to 20 (the released value: 7 px of 0.25 µm).
+    pub patch_um: Number,
+    /// Overlap of patches, µm, 0.25 to 10 (the released value: 2 px of 0.25 µm).
+    pub overlap_um: Number,
+    /// Which patches are candidates.
+    pub acceptance: Acceptance,
+    /// d_max of the paper: root-mean-square difference of absorbance over the overlap, 0 to 10.
+    pub d_max: Number,
+    /// How patches are joined.
+    pub seam: Seam,
+    /// What happens to nuclei whose donors were images already.
+    pub restore: Restore,
+    /// Spread of the feathered mask of that, µm, 0 to 5.
+    pub restore_feather_um: Number,
+    /// Probability that a nucleus is pyknotic (small, dark, without structure), 0 to 1.
+    pub pyknotic: Number,
+    /// Probability that a nucleus is wrinkled or angular, 0 to 1.
+    pub wrinkled: Number,
+    /// Absorbance of the rim (the nuclear membrane) relative to the nucleus, 0 to 2.
+    pub rim: Number,
+}
+
+impl Default for Nucleus {
+    fn default() -> Self {
+        Self {
+            shape: ShapeSpread::Correlated,
+            chromatin: Chromatin::Quilt,
+            donors: 3.0.into(),
+            patch_um: 1.75.into(),
+            overlap_um: 0.5.into(),
+            acceptance: Acceptance::Near,
+            d_max: 0.1.into(),
+            seam: Seam::MinCut,
+            restore: Restore::BeforeDetection,
+            restore_feather_um: 0.3.into(),
+            pyknotic: 0.05.into(),
+            wrinkled: 0.15.into(),
+            rim: Number::uniform(0.1, 0.4),
+        }
+    }
+}
+
+/// How evenly the stain was taken up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Stain {
+    /// Factor on the absorbance of all cytoplasm of a field, 0 to 20; drawn once a field.
+    pub field_cytoplasm: Number,
+    /// Factor on the absorbance of all nuclei of a field, 0 to 20; drawn once a field.
+    pub field_nucleus: Number,
+    /// Factor on the contrast of the texture inside all nuclei of a field, 0 to 20; drawn once a field.
+    pub field_texture: Number,
+    /// Absorbances add along the light's path (Beer–Lambert); this is the share of the sum that a camera shows where
+    /// cytoplasms overlap, 0.3 to 1. Stray light and bandwidth make it 0.75 on real fields.
+    pub overlap: Number,
+}
+
+impl Default for Stain {
+    fn default() -> Self {
+        Self {
+            field_cytoplasm: Number::log_normal(1.0, 0.25),
+            field_nucleus: Number::log_normal(1.0, 0.12),
+            field_texture: Number::log_normal(1.0, 0.25),
+            overlap: 1.0.into(),
+        }
+    }
+}

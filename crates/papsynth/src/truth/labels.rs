@@ -1,0 +1,121 @@
+//! Views of the masks: label maps, front-most masks, layers.
+
+use super::mask::{Mask, Run};
+
+/// The id of an object at each pixel, 0 where there is none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelMap {
+    /// Columns.
+    pub width: usize,
+    /// Ids, row by row.
+    pub ids: Vec<u32>,
+}
+
+impl LabelMap {
+    /// Whether every id fits into 16 bits.
+    #[must_use]
+    pub fn fits_16_bits(&self) -> bool {
+        self.ids.iter().all(|&id| id <= u32::from(u16::MAX))
+    }
+}
+
+/// Paints masks from the deepest to the nearest, and cuts from each what stays visible of it.
+///
+/// `objects` are `(id, depth, mask)`; the nearer to the objective, the larger the depth. Of two at the same depth the
+/// one with the larger id lies in front.
+#[must_use]
+pub fn front_masks(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> (LabelMap, Vec<Mask>) {
+    let mut order: Vec<usize> = (0..objects.len()).collect();
+    order.sort_by(|&a, &b| objects[a].1.total_cmp(&objects[b].1).then(objects[a].0.cmp(&objects[b].0)));
+    let mut ids = vec![0_u32; width * height];
+    for &index in &order {
+        let (id, _, mask) = objects[index];
+        for run in mask.runs() {
+            let row = run.y as usize * width;
+            ids[row + run.x0 as usize..row + run.x1 as usize].fill(id);
+        }
+    }
+    let masks = objects.iter().map(|(id, _, mask)| visible(*id, mask, &ids, width)).collect();
+    (LabelMap { width, ids }, masks)
+}
+
+/// The pixels of a mask that show its own id.
+fn visible(id: u32, mask: &Mask, ids: &[u32], width: usize) -> Mask {
+    let mut runs: Vec<Run> = Vec::new();
+    for run in mask.runs() {
+        let row = run.y as usize * width;
+        let mut open = false;
+        for x in run.x0..run.x1 {
+            let shown = ids[row + x as usize] == id;
+            match (shown, open) {
+                (true, false) => runs.push(Run { y: run.y, x0: x, x1: x + 1 }),
+                (true, true) => {
+                    if let Some(last) = runs.last_mut() {
+                        last.x1 = x + 1;
+                    }
+                }
+                _ => {}
+            }
+            open = shown;
+        }
+    }
+    Mask::from_runs(runs)
+}
+
+/// How many of the masks cover each pixel.
+#[must_use]
+pub fn layers<'a>(masks: impl Iterator<Item = &'a Mask>, width: usize, height: usize) -> Vec<u16> {
+    let mut layers = vec![0_u16; width * height];
+    for mask in masks {
+        for run in mask.runs() {
+            let row = run.y as usize * width;
+            for layer in &mut layers[row + run.x0 as usize..row + run.x1 as usize] {
+                *layer = layer.saturating_add(1);
+            }
+        }
+    }
+    layers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Key;
+    use crate::random;
+
+    /// Ten lines that are obviously right: at each pixel the nearest object that covers it.
+    fn slow(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> Vec<u32> {
+        (0..width * height)
+            .map(|pixel| {
+                objects
+                    .iter()
+                    .filter(|(_, _, mask)| mask.pixels(width).any(|p| p == pixel))
+                    .max_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
+                    .map_or(0, |o| o.0)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_nearest_object_shows_and_fronts_partition_what_is_covered() {
+        let (width, height) = (24, 18);
+        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "labels");
+        let masks: Vec<Mask> = (0..7)
+            .map(|_| {
+                let tile: Vec<f32> = (0..100).map(|_| random::uniform(&mut rng) as f32).collect();
+                let x = random::below(24, &mut rng) as i64 - 5;
+                let y = random::below(18, &mut rng) as i64 - 5;
+                Mask::from_tile(&tile, 10, [x, y], width, height, |v| v > 0.3)
+            })
+            .collect();
+        let objects: Vec<(u32, f64, &Mask)> =
+            masks.iter().enumerate().map(|(i, m)| (i as u32 + 1, f64::from(i as u32 % 3), m)).collect();
+        let (labels, fronts) = front_masks(&objects, width, height);
+        assert_eq!(labels.ids, slow(&objects, width, height));
+        let covered = labels.ids.iter().filter(|&&id| id > 0).count() as u64;
+        assert_eq!(fronts.iter().map(Mask::area).sum::<u64>(), covered);
+        let counts = layers(masks.iter(), width, height);
+        assert_eq!(counts.iter().map(|&c| u64::from(c)).sum::<u64>(), masks.iter().map(Mask::area).sum::<u64>());
+        assert_eq!(counts.iter().filter(|&&c| c > 0).count() as u64, covered);
+    }
+}

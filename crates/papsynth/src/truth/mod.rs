@@ -1,0 +1,125 @@
+//! What is known of an image because it was made: masks, labels, layers, and a row for every object.
+//!
+//! Truth comes from the scene and from exact coverage, never from the image.
+
+mod labels;
+mod mask;
+
+use crate::scene::Kind;
+
+pub use labels::{LabelMap, front_masks, layers};
+pub use mask::{Bounds, Mask, Run};
+
+/// Which part of an object a mask belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Part {
+    /// The whole cell: its cytoplasm, and the nucleus within it.
+    Cytoplasm,
+    /// The nucleus of a cell. It carries the id of its cell.
+    Nucleus,
+    /// An object that has no parts.
+    Whole,
+}
+
+/// The groups within which an object is nearer to the objective than another, each with a label map of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Group {
+    /// The cytoplasm of cells.
+    Cytoplasm,
+    /// The nuclei of cells.
+    Nucleus,
+    /// Everything that is no epithelial cell.
+    Debris,
+}
+
+impl Group {
+    /// All groups, in the order of their label maps.
+    pub const ALL: [Self; 3] = [Self::Cytoplasm, Self::Nucleus, Self::Debris];
+
+    /// The name of the group, as it stands in file names.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cytoplasm => "cytoplasm",
+            Self::Nucleus => "nucleus",
+            Self::Debris => "debris",
+        }
+    }
+}
+
+/// What is known of one object, or of one part of a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectTruth {
+    /// Id within the image, from 1; nucleus and cytoplasm of a cell share it.
+    pub id: u32,
+    /// Which part of the object this row is about.
+    pub part: Part,
+    /// What kind of object it is.
+    pub kind: Kind,
+    /// Class: of cells the class in the model, of all others the name of their kind.
+    pub class: String,
+    /// Bethesda category of that class, where it has one ("NILM", "HSIL", …).
+    pub bethesda: String,
+    /// Variants drawn for this object, such as "pyknotic" or "flap", separated by semicolons.
+    pub traits: String,
+    /// The cluster it was placed with (from 1), or 0 if it was placed alone.
+    pub cluster: u32,
+    /// Place of its middle, µm from the image's upper left corner.
+    pub centre_um: [f64; 2],
+    /// Depth, µm; positive towards the objective, 0 in the middle of the slide.
+    pub depth_um: f64,
+    /// Mean absorbance it was given (its stain), decadic.
+    pub stain: f64,
+    /// Direction it was turned to, degrees.
+    pub rotation_deg: f64,
+    /// Area of the whole object, also of what lies outside the image, µm².
+    pub area_um2: f64,
+    /// Whether part of it lies outside the image.
+    pub truncated: bool,
+    /// Its complete mask: coverage of its in-focus outline of at least one half, whatever lies over it.
+    pub amodal: Mask,
+    /// Its front-most mask: the pixels where it is nearest to the objective within its group.
+    pub front: Mask,
+    /// Distance from each focal plane, µm (`plane − depth`).
+    pub defocus_um: Vec<f64>,
+    /// How detectable it is in each plane: mean contrast over its mask, in units of the noise of one pixel there.
+    pub detectability: Vec<f64>,
+}
+
+impl ObjectTruth {
+    /// The group within which its front-most mask counts.
+    #[must_use]
+    pub fn group(&self) -> Group {
+        match self.part {
+            Part::Cytoplasm => Group::Cytoplasm,
+            Part::Nucleus => Group::Nucleus,
+            Part::Whole => Group::Debris,
+        }
+    }
+}
+
+/// What is known of one image.
+#[derive(Debug, Clone)]
+pub struct Truth {
+    /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out.
+    pub objects: Vec<ObjectTruth>,
+    /// The id of the front-most object of each group at each pixel, in the order of [`Group::ALL`].
+    pub labels: [LabelMap; 3],
+    /// Number of cytoplasms that lie over each other at each pixel.
+    pub layers: Vec<u16>,
+}
+
+impl Truth {
+    /// The label map of a group.
+    #[must_use]
+    pub fn labels_of(&self, group: Group) -> &LabelMap {
+        let [cytoplasm, nucleus, debris] = &self.labels;
+        match group {
+            Group::Cytoplasm => cytoplasm,
+            Group::Nucleus => nucleus,
+            Group::Debris => debris,
+        }
+    }
+}
