@@ -4,30 +4,39 @@ use crate::error::Error;
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
+use crate::phantom::Studio;
 use crate::recipe::Recipe;
-use crate::scene::{Scene, WeightMap};
+use crate::render::Rendering;
+use crate::scene::{self, Scene, WeightMap};
+use crate::threads::Threads;
 
-/// What a recipe names but does not hold.
+/// What a recipe names but does not hold, and how numbers are computed.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
     /// The image that `layout.path` names, for [`Layout::Map`](crate::recipe::Layout::Map): brightness 0 to 1;
     /// for [`Layout::Labels`](crate::recipe::Layout::Labels): 1 where a label lies, else 0.
     pub weight_map: Option<WeightMap>,
+    /// On which machines the bytes are the same.
+    pub arithmetic: Arithmetic,
 }
 
-/// How many threads work on one frame. The bytes are the same.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Threads {
-    /// The calling thread alone: for callers who make several frames side by side.
-    One,
-    /// All of the current rayon pool; the calling thread alone without the feature `threads`.
-    All,
+/// On which machines the same recipe gives the same bytes. This is the one place that decides it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// On every machine of one instruction set, such as x86-64 with AVX2.
+    #[default]
+    Fastest,
+    /// On every machine: Fourier transforms, the only thing that differs, run in scalar code.
+    Portable,
 }
 
 /// Makes images of one recipe and one model.
 #[derive(Debug)]
 pub struct Engine {
     recipe: Recipe,
+    model: Model,
+    weight_map: Option<WeightMap>,
+    studio: Studio,
 }
 
 impl Engine {
@@ -36,8 +45,18 @@ impl Engine {
     /// # Errors
     /// If the recipe or the model cannot be used: which field, which value, what would be accepted.
     pub fn new(recipe: &Recipe, model: &Model, inputs: &Inputs) -> Result<Self, Error> {
-        let _ = (model, inputs);
-        Ok(Self { recipe: recipe.clone() })
+        let problems = recipe.problems();
+        if !problems.is_empty() {
+            return Err(Error::Recipe(problems));
+        }
+        model.check().map_err(Error::Model)?;
+        let fft = match inputs.arithmetic {
+            Arithmetic::Fastest => spectral_field::Fft::Fastest,
+            Arithmetic::Portable => spectral_field::Fft::Portable,
+        };
+        scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
+        let studio = Studio::new(recipe, model, fft).map_err(Error::Model)?;
+        Ok(Self { recipe: recipe.clone(), model: model.clone(), weight_map: inputs.weight_map.clone(), studio })
     }
 
     /// The recipe of this engine.
@@ -51,8 +70,7 @@ impl Engine {
     /// # Errors
     /// If the layout has no room for what is asked.
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
-        let _ = key;
-        Err(Error::Model("not yet".to_owned()))
+        scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key)
     }
 
     /// Makes an image and its truth, handing over each plane as soon as it is done.
@@ -63,10 +81,29 @@ impl Engine {
         &self,
         key: Key,
         threads: Threads,
+        sink: impl FnMut(Plane) -> Result<(), E>,
+    ) -> Result<Finished, E> {
+        let scene = self.scene(key)?;
+        self.image(scene, threads, sink)
+    }
+
+    /// Images a scene, which may have been drawn for another microscope or changed by hand.
+    ///
+    /// # Errors
+    /// What `sink` returned, or why the scene cannot be imaged.
+    pub fn image<E: From<Error>>(
+        &self,
+        scene: Scene,
+        threads: Threads,
         mut sink: impl FnMut(Plane) -> Result<(), E>,
     ) -> Result<Finished, E> {
-        let _ = (threads, &mut sink);
-        Err(self.scene(key).err().map_or_else(|| Error::Model("not yet".to_owned()), |e| e).into())
+        let index = scene.key.index;
+        let fail = |message| E::from(Error::Image { index, message });
+        let mut rendering = Rendering::new(&self.studio, scene, threads).map_err(fail)?;
+        for plane in 0..rendering.planes() {
+            sink(rendering.plane(plane).map_err(fail)?)?;
+        }
+        rendering.finish().map_err(fail)
     }
 
     /// Makes an image and its truth, whole.

@@ -12,6 +12,14 @@ pub enum Error {
     /// The model cannot be used.
     #[error("the model: {0}")]
     Model(String),
+    /// A class cannot be learned from the material given.
+    #[error("class `{class}` cannot be learned: {message}")]
+    Learn {
+        /// The class.
+        class: String,
+        /// Why, and what would help.
+        message: String,
+    },
     /// The weight map or label image that the layout names was not given, or cannot be used.
     #[error("layout: {0}")]
     Layout(String),

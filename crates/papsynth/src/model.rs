@@ -1,36 +1,284 @@
 //! What was learned from real cells.
 //!
 //! A model holds what cells of each class are like: shapes, sizes, absorbances, chromatin. It is one JSON file,
-//! readable and versioned. The model that ships holds numbers alone (means, covariances, spectra).
+//! readable and versioned, with the counts and the provenance of what it was learned from. The model that ships
+//! holds numbers alone (means, covariances, spectra); one that you learn may hold donors, which are pixels.
 
+use std::collections::BTreeMap;
+
+use fsd_shape::ShapeStatistics;
 use serde::{Deserialize, Serialize};
 
-/// A model.
+use crate::error::Error;
+
+/// The version of models that this crate reads and writes.
+pub const MODEL_VERSION: u32 = 1;
+
+/// The text of the model that ships.
+const BUILTIN: &str = include_str!("../model/default.json");
+
+/// A model: what cells of each class are like.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
     /// Version of this file's format.
     pub version: u32,
+    /// What the model was learned from, newest last.
+    pub provenance: Vec<Provenance>,
+    /// The classes of cells by name.
+    pub classes: BTreeMap<String, CellClass>,
 }
 
+/// One thing a model was learned from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The class that was learned.
+    pub class: String,
+    /// What was learned: "cytoplasm outlines", "nucleus images", …
+    pub what: String,
+    /// How many of them.
+    pub count: usize,
+    /// Size of their pixels, µm.
+    pub pixel_um: f64,
+    /// Where they came from.
+    pub source: String,
+}
+
+/// A quantity with a log-normal distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogNormal {
+    /// Median.
+    pub median: f64,
+    /// Standard deviation of the natural logarithm.
+    pub log_sd: f64,
+}
+
+/// A quantity with a normal distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Normal {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub sd: f64,
+}
+
+/// What cells of one class are like.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CellClass {
+    /// Category of the Bethesda system: "NILM", "LSIL", "HSIL", …
+    pub bethesda: String,
+    /// The cytoplasm.
+    pub cytoplasm: CytoplasmStatistics,
+    /// The nucleus.
+    pub nucleus: NucleusStatistics,
+}
+
+/// What the cytoplasm of a class is like.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CytoplasmStatistics {
+    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
+    pub radius_um: LogNormal,
+    /// Absorbance, the median over a cell.
+    pub absorbance: LogNormal,
+    /// Thickness from the rim to the middle in even steps of the distance from the rim, relative to its median.
+    pub rim_to_centre: Vec<f64>,
+    /// Outlines.
+    pub shapes: Shapes,
+}
+
+/// What the nucleus of a class is like.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NucleusStatistics {
+    /// Radius of the circle of the first Fourier descriptor, |u₁|, µm.
+    pub radius_um: LogNormal,
+    /// Correlation of the logarithms of the radii of nucleus and cell, −1 to 1.
+    pub size_correlation: f64,
+    /// Distance of its middle from the cell's, as a fraction of the cell's radius.
+    pub off_centre: Normal,
+    /// Absorbance above the cytoplasm, mean over a nucleus.
+    pub absorbance: Normal,
+    /// Chromatin.
+    pub chromatin: ChromatinStatistics,
+    /// Outlines.
+    pub shapes: Shapes,
+    /// Textures to take patches from; empty in a model of numbers, which makes its donors from the spectrum.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub donors: Vec<Donor>,
+}
+
+/// The texture inside nuclei: a Matérn field in the object plane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChromatinStatistics {
+    /// Smoothness ν of the Matérn covariance.
+    pub nu: f64,
+    /// Length of the Matérn covariance, µm.
+    pub length_um: f64,
+    /// Standard deviation of the absorbance inside a nucleus, as imaged.
+    pub sd: Normal,
+    /// Skewness of the absorbance.
+    pub skewness: f64,
+    /// Absorbance from the rim to the middle in even steps of the distance from the rim, relative to its mean.
+    pub rim_to_centre: Vec<f64>,
+}
+
+/// The statistics of a population of outlines, for either way of drawing from them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shapes {
+    /// Aligned, with what varies together.
+    pub correlated: ShapeStatistics,
+    /// The paper's: every descriptor on its own.
+    pub independent: ShapeStatistics,
+}
+
+/// A texture to take patches from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Donor {
+    /// Size of its pixels, µm.
+    pub pixel_um: f64,
+    /// Columns.
+    pub width: usize,
+    /// Absorbance above the surroundings in thousandths, row by row; −32768 outside the nucleus.
+    pub absorbance_milli: Vec<i16>,
+}
+
+/// What stands for "outside the nucleus" in a donor.
+pub const OUTSIDE: i16 = i16::MIN;
+
 impl Model {
-    /// The model that ships.
+    /// The model that ships: numbers alone, measured on real cells.
+    ///
+    /// # Panics
+    /// Never: the file is part of the crate and its tests read it.
     #[must_use]
     pub fn builtin() -> Self {
-        Self { version: 1 }
+        Self::from_json(BUILTIN).expect("the model that ships is sound")
     }
 
     /// Reads a model from its text.
     ///
     /// # Errors
-    /// If the text is no model, or one of another version.
-    pub fn from_json(text: &str) -> Result<Self, crate::error::Error> {
-        serde_json::from_str(text).map_err(|e| crate::error::Error::Model(e.to_string()))
+    /// If the text is no model, one of another version, or one with numbers that cannot be: it says which.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        #[derive(Deserialize)]
+        struct Version {
+            version: u32,
+        }
+        let found = serde_json::from_str::<Version>(text)
+            .map_err(|e| Error::Model(format!("this is no model of papsynth: {e}")))?;
+        if found.version != MODEL_VERSION {
+            return Err(Error::Model(format!(
+                "its version is {}; this program reads version {MODEL_VERSION}",
+                found.version
+            )));
+        }
+        let model: Self = serde_json::from_str(text).map_err(|e| Error::Model(e.to_string()))?;
+        model.check().map_err(Error::Model)?;
+        Ok(model)
     }
 
     /// The text of the model.
     #[must_use]
     pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).unwrap_or_default()
+        let mut text = serde_json::to_string(self).unwrap_or_default();
+        text.push('\n');
+        text
     }
+
+    /// What is wrong with the model, if anything.
+    ///
+    /// # Errors
+    /// The first number that cannot be, by its path, with what would be accepted.
+    pub fn check(&self) -> Result<(), String> {
+        for (name, class) in &self.classes {
+            class.check().map_err(|problem| format!("classes.{name}.{problem}"))?;
+        }
+        Ok(())
+    }
+}
+
+impl CellClass {
+    fn check(&self) -> Result<(), String> {
+        let (cytoplasm, nucleus) = (&self.cytoplasm, &self.nucleus);
+        cytoplasm.radius_um.check("cytoplasm.radius_um", 0.5, 500.0)?;
+        cytoplasm.absorbance.check("cytoplasm.absorbance", 1e-4, 4.0)?;
+        profile("cytoplasm.rim_to_centre", &cytoplasm.rim_to_centre)?;
+        cytoplasm.shapes.check("cytoplasm.shapes")?;
+        nucleus.radius_um.check("nucleus.radius_um", 0.2, 200.0)?;
+        within("nucleus.size_correlation", nucleus.size_correlation, -1.0, 1.0)?;
+        nucleus.off_centre.check("nucleus.off_centre", 0.0, 1.0)?;
+        nucleus.absorbance.check("nucleus.absorbance", 0.0, 4.0)?;
+        let chromatin = &nucleus.chromatin;
+        within("nucleus.chromatin.nu", chromatin.nu, 0.05, 20.0)?;
+        within("nucleus.chromatin.length_um", chromatin.length_um, 0.01, 50.0)?;
+        chromatin.sd.check("nucleus.chromatin.sd", 0.0, 4.0)?;
+        within("nucleus.chromatin.skewness", chromatin.skewness, -3.0, 3.0)?;
+        profile("nucleus.chromatin.rim_to_centre", &chromatin.rim_to_centre)?;
+        nucleus.shapes.check("nucleus.shapes")?;
+        for (index, donor) in nucleus.donors.iter().enumerate() {
+            donor.check().map_err(|problem| format!("nucleus.donors[{index}].{problem}"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Shapes {
+    fn check(&self, path: &str) -> Result<(), String> {
+        for (name, statistics) in [("correlated", &self.correlated), ("independent", &self.independent)] {
+            fsd_shape::ShapeModel::from_statistics(statistics.clone()).map_err(|e| format!("{path}.{name}: {e}"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Donor {
+    fn check(&self) -> Result<(), String> {
+        /// Widest donor: a nucleus of 100 µm at 0.05 µm a pixel, and then some.
+        const WIDEST: usize = 4096;
+        within("pixel_um", self.pixel_um, 0.05, 4.0)?;
+        if self.width == 0 || self.width > WIDEST || self.absorbance_milli.len() % self.width != 0 {
+            return Err(format!("width: {} does not divide its {} pixels into rows", self.width, self.absorbance_milli.len()));
+        }
+        if self.absorbance_milli.iter().all(|&v| v == OUTSIDE) {
+            return Err("absorbance_milli: no pixel lies inside the nucleus".to_owned());
+        }
+        Ok(())
+    }
+}
+
+impl LogNormal {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), String> {
+        within(&format!("{path}.median"), self.median, low, high)?;
+        within(&format!("{path}.log_sd"), self.log_sd, 0.0, 3.0)
+    }
+}
+
+impl Normal {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), String> {
+        within(&format!("{path}.mean"), self.mean, low, high)?;
+        within(&format!("{path}.sd"), self.sd, 0.0, high)
+    }
+}
+
+fn within(path: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+    if value.is_finite() && (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(format!("{path}: {value} is outside {low} to {high}"))
+    }
+}
+
+fn profile(path: &str, values: &[f64]) -> Result<(), String> {
+    if values.is_empty() {
+        return Err(format!("{path}: it is empty; expected at least one number"));
+    }
+    values.iter().try_for_each(|value| within(path, *value, 0.0, 100.0))
 }

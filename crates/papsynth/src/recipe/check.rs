@@ -123,6 +123,7 @@ fn layout(recipe: &Recipe, check: &mut Check) {
         ("relief_um", &slide.relief_um, 1.0, 10_000.0),
         ("median_um", &slide.median_um, 0.0, 1000.0),
         ("stacking_um", &slide.stacking_um, 0.0, 100.0),
+        ("spacing_um", &slide.spacing_um, 0.0, 1000.0),
     ]);
     match &recipe.layout {
         Layout::Uniform {} | Layout::Map { .. } => {}
@@ -191,7 +192,6 @@ fn cells(recipe: &Recipe, check: &mut Check) {
         ("field_cytoplasm", &stain.field_cytoplasm, 0.0, 20.0),
         ("field_nucleus", &stain.field_nucleus, 0.0, 20.0),
         ("field_texture", &stain.field_texture, 0.0, 20.0),
-        ("overlap", &stain.overlap, 0.3, 1.0),
     ]);
 }
 

@@ -144,7 +144,7 @@ fn inflamed() -> Recipe {
 /// The values of the paper where it states them, else those of the authors' released code.
 fn paper() -> Recipe {
     let mut recipe = lbc();
-    recipe.slide = Slide { depth_um: 0.4.into(), relief_um: 60.0.into(), median_um: 8.0.into(), stacking_um: 0.0.into() };
+    recipe.slide = Slide { depth_um: 0.4.into(), relief_um: 60.0.into(), median_um: 8.0.into(), stacking_um: 0.0.into(), spacing_um: 0.0.into() };
     recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
     recipe.cells = mix([("intermediate", 30.0.into())]);
     recipe.cytoplasm = Cytoplasm {
@@ -174,13 +174,7 @@ fn paper() -> Recipe {
         rim: 0.0.into(),
         ..Nucleus::default()
     };
-    let even = Number::Fixed(1.0);
-    recipe.stain = Stain {
-        field_cytoplasm: even.clone(),
-        field_nucleus: even.clone(),
-        field_texture: even.clone(),
-        overlap: even,
-    };
+    recipe.stain = Stain { field_cytoplasm: 1.0.into(), field_nucleus: 1.0.into(), field_texture: 1.0.into() };
     recipe.debris.leukocytes.form = NucleusForm::Round;
     recipe.debris.leukocytes.absorbance = 0.70.into();
     recipe.debris.leukocytes.halo = 0.0.into();

@@ -17,11 +17,19 @@ pub struct Slide {
     pub median_um: Number,
     /// Standard deviation of a cell's own depth about the relief, µm, 0 to 100: cells that lie on each other.
     pub stacking_um: Number,
+    /// Least distance between the middles of two cells, µm, 0 to 1000; drawn once a field.
+    pub spacing_um: Number,
 }
 
 impl Default for Slide {
     fn default() -> Self {
-        Self { depth_um: Number::uniform(2.0, 6.0), relief_um: 90.0.into(), median_um: 20.0.into(), stacking_um: 0.6.into() }
+        Self {
+            depth_um: Number::uniform(2.0, 6.0),
+            relief_um: 90.0.into(),
+            median_um: 20.0.into(),
+            stacking_um: 0.6.into(),
+            spacing_um: 9.0.into(),
+        }
     }
 }
 
@@ -288,9 +296,6 @@ pub struct Stain {
     pub field_nucleus: Number,
     /// Factor on the contrast of the texture inside all nuclei of a field, 0 to 20; drawn once a field.
     pub field_texture: Number,
-    /// Absorbances add along the light's path (Beer–Lambert); this is the share of the sum that a camera shows where
-    /// cytoplasms overlap, 0.3 to 1. Stray light and bandwidth make it 0.75 on real fields.
-    pub overlap: Number,
 }
 
 impl Default for Stain {
@@ -299,7 +304,6 @@ impl Default for Stain {
             field_cytoplasm: Number::log_normal(1.0, 0.25),
             field_nucleus: Number::log_normal(1.0, 0.12),
             field_texture: Number::log_normal(1.0, 0.25),
-            overlap: 1.0.into(),
         }
     }
 }

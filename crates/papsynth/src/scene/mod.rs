@@ -2,8 +2,11 @@
 //!
 //! The scene is the hinge between recipe and picture: nothing after it decides what exists.
 
-
-
+mod cells;
+mod debris;
+mod depth;
+mod draw;
+mod layout;
 mod weight;
 
 use serde::Serialize;
@@ -11,7 +14,9 @@ use serde::Serialize;
 use crate::key::Key;
 use crate::recipe::{PhotonNoise, Restore};
 
-
+pub(crate) use cells::unknown_class;
+pub use draw::draw;
+pub(crate) use layout::check_layout;
 pub use weight::WeightMap;
 
 /// What kind of thing an object is.
@@ -62,8 +67,6 @@ pub struct Scene {
     pub optics: SceneOptics,
     /// The camera.
     pub camera: SceneCamera,
-    /// What a camera shows of the sum of absorbances where cytoplasms overlap.
-    pub overlap: f64,
     /// Every object, by id.
     pub objects: Vec<Object>,
 }
@@ -169,6 +172,8 @@ pub struct Object {
     pub depth_um: f64,
     /// Direction it is turned to, degrees.
     pub rotation_deg: f64,
+    /// Category of the Bethesda system, of a cell whose class has one; else empty.
+    pub bethesda: String,
     /// What it is.
     pub body: Body,
 }

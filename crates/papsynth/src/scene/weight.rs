@@ -1,10 +1,121 @@
-//! Weight maps: how likely a place is ("Population Distribution Generation").
+//! Weight maps and rejection sampling from them ("Population Distribution Generation").
+
+use rand_core::Rng;
+
+use crate::random;
 
 /// How likely each place of a field is, as an image that is stretched over it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeightMap {
     /// Columns.
     pub width: usize,
-    /// Weights of 0 or more, row by row.
+    /// Weights of 0 or more, row by row; only their ratios count.
     pub weights: Vec<f32>,
+}
+
+/// A weight map prepared for rejection sampling.
+#[derive(Debug, Clone)]
+pub(crate) struct Sampler {
+    width: usize,
+    height: usize,
+    weights: Vec<f32>,
+    largest: f32,
+    /// Pixels that can be drawn at all.
+    possible: Vec<u32>,
+}
+
+impl WeightMap {
+    /// A map of `width` x `height` whose pixels are given by a function of their centre, as fractions of the map.
+    pub(crate) fn from_fn(width: usize, height: usize, weight: impl Fn([f64; 2]) -> f64) -> Self {
+        let mut weights = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let centre = [(x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64];
+                weights.push(weight(centre) as f32);
+            }
+        }
+        Self { width, weights }
+    }
+
+    /// Prepares the map, or says why nothing can be drawn from it.
+    pub(crate) fn sampler(&self) -> Result<Sampler, String> {
+        if self.width == 0 || self.weights.is_empty() || self.weights.len() % self.width != 0 {
+            return Err(format!("a weight map of {} pixels cannot have rows of {}", self.weights.len(), self.width));
+        }
+        if let Some(bad) = self.weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
+            let (x, y) = (bad % self.width, bad / self.width);
+            return Err(format!("the weight at pixel ({x}, {y}) is {}; expected a finite number of 0 or more", self.weights[bad]));
+        }
+        let largest = self.weights.iter().fold(0.0_f32, |a, b| a.max(*b));
+        if largest <= 0.0 {
+            return Err("every weight is zero, so no object can ever be placed; expected at least one place above zero".to_owned());
+        }
+        let possible = (0_u32..).zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(i, _)| i).collect();
+        Ok(Sampler { width: self.width, height: self.weights.len() / self.width, weights: self.weights.clone(), largest, possible })
+    }
+}
+
+impl Sampler {
+    /// Share of the field where something can be placed at all.
+    pub(crate) fn possible_share(&self) -> f64 {
+        self.possible.len() as f64 / self.weights.len() as f64
+    }
+
+    /// Expected number of tries for one accepted place.
+    pub(crate) fn expected_tries(&self) -> f64 {
+        let sum: f64 = self.weights.iter().map(|w| f64::from(*w)).sum();
+        f64::from(self.largest) * self.possible.len() as f64 / sum
+    }
+
+    /// One try: a place as fractions of the field, if it was accepted.
+    ///
+    /// Candidates are uniform over the places that can be drawn at all (Eq. 5) and accepted with probability
+    /// W(x, y) / max W.
+    pub(crate) fn try_place<R: Rng + ?Sized>(&self, rng: &mut R) -> Option<[f64; 2]> {
+        let pixel = *self.possible.get(random::below(self.possible.len(), rng))? as usize;
+        let place = [
+            ((pixel % self.width) as f64 + random::uniform(rng)) / self.width as f64,
+            ((pixel / self.width) as f64 + random::uniform(rng)) / self.height as f64,
+        ];
+        random::chance(f64::from(self.weights[pixel] / self.largest), rng).then_some(place)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Key;
+
+    #[test]
+    fn accepted_places_follow_the_map() {
+        let map = WeightMap { width: 4, weights: vec![0.0, 1.0, 2.0, 0.5, 3.0, 0.0, 0.25, 1.0] };
+        let sampler = map.sampler().unwrap();
+        let mut rng = Key { seed: 11, index: 0 }.stream("test", 0, "weight");
+        let mut counts = [0.0; 8];
+        let mut accepted = 0.0;
+        for _ in 0..60_000 {
+            if let Some([x, y]) = sampler.try_place(&mut rng) {
+                counts[(y * 2.0) as usize * 4 + (x * 4.0) as usize] += 1.0;
+                accepted += 1.0;
+            }
+        }
+        let sum: f32 = map.weights.iter().sum();
+        let chi2: f64 = map.weights.iter().zip(counts).filter(|(w, _)| **w > 0.0).map(|(w, n)| {
+            let expected = accepted * f64::from(w / sum);
+            (n - expected) * (n - expected) / expected
+        }).sum();
+        // Five degrees of freedom: 20.5 is exceeded once in a thousand.
+        assert!(chi2 < 20.5, "{chi2}");
+        assert_eq!(counts[0] + counts[5], 0.0);
+        assert!((60_000.0 / accepted - sampler.expected_tries()).abs() < 0.05);
+    }
+
+    #[test]
+    fn a_map_that_yields_nothing_is_an_error_that_says_so() {
+        assert!(WeightMap { width: 2, weights: vec![0.0; 4] }.sampler().unwrap_err().contains("every weight is zero"));
+        assert!(WeightMap { width: 0, weights: vec![] }.sampler().is_err());
+        assert!(WeightMap { width: 3, weights: vec![1.0; 4] }.sampler().is_err());
+        assert!(WeightMap { width: 2, weights: vec![1.0, f32::NAN] }.sampler().unwrap_err().contains("(1, 0)"));
+        assert!(WeightMap { width: 2, weights: vec![1.0, -1.0] }.sampler().unwrap_err().contains("-1"));
+    }
 }

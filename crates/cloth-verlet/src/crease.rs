@@ -1,0 +1,584 @@
+//! Folding a sheet, or a polygon, along a line.
+
+use crate::outline::{moments, sides};
+use crate::params::range;
+use crate::sheet::edges;
+use crate::{Error, Point, Sheet};
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Strips into which half a turn is divided: the tube's silhouette is then right to 1 part in 100 of its radius.
+const STRIPS: u32 = 12;
+/// Part of the radius within which a vertex counts as lying on a line: a cut there would only leave slivers.
+const ON_LINE: f64 = 1e-6;
+/// Most whole turns of a roll.
+const MOST_TURNS: u32 = 100;
+
+/// A straight fold. What lies beyond the line is bent up round a tube that touches the sheet there, without being stretched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crease {
+    /// A point of the line.
+    pub point: Point,
+    /// Direction of the line as an angle from +x towards +y. What lies a quarter turn further on, towards
+    /// (−sin, cos), is beyond the line.
+    pub direction_rad: f64,
+    /// Radius of the tube in the sheet's unit, above 0.
+    pub radius: f64,
+    /// How far the sheet is bent.
+    pub turn: Turn,
+}
+
+/// How far a sheet is bent at a [`Crease`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turn {
+    /// Half a turn; the rest lies flat on top, mirrored.
+    Flap,
+    /// Wound up: this many whole turns, 1 to 100, and another half, after which what is left lies flat on top.
+    Roll {
+        /// Whole turns.
+        turns: u32,
+    },
+}
+
+impl Crease {
+    fn check(&self) -> Result<(), Error> {
+        let finite = (-f64::MAX, f64::MAX);
+        range("point[0]", self.point[0], finite, "finite")?;
+        range("point[1]", self.point[1], finite, "finite")?;
+        range("direction_rad", self.direction_rad, finite, "finite")?;
+        range(
+            "radius",
+            self.radius,
+            (f64::MIN_POSITIVE, f64::MAX),
+            "above 0 and finite",
+        )?;
+        match self.turn {
+            Turn::Flap => Ok(()),
+            Turn::Roll { turns } => range(
+                "turns",
+                f64::from(turns),
+                (1.0, f64::from(MOST_TURNS)),
+                "1 to 100",
+            ),
+        }
+    }
+
+    /// The direction that leads beyond the line.
+    fn normal(&self) -> Point {
+        [
+            -libm::sin(self.direction_rad),
+            libm::cos(self.direction_rad),
+        ]
+    }
+
+    fn half_turns(&self) -> u32 {
+        match self.turn {
+            Turn::Flap => 1,
+            Turn::Roll { turns } => 2 * turns + 1,
+        }
+    }
+
+    /// Where what was at `s` beyond the line comes to lie: how far beyond, and how high.
+    fn bent(&self, s: f64) -> [f64; 2] {
+        let r = self.radius;
+        let end = PI * r * f64::from(self.half_turns());
+        if s <= 0.0 {
+            [s, 0.0]
+        } else if s < end {
+            // x = r sin(s/r), z = r (1 − cos(s/r))
+            [r * libm::sin(s / r), r * (1.0 - libm::cos(s / r))]
+        } else {
+            [end - s, 2.0 * r]
+        }
+    }
+
+    /// Where the tube is divided into strips, as far as `end`.
+    fn strips(&self, end: f64) -> impl Iterator<Item = f64> {
+        let width = PI * self.radius / f64::from(STRIPS);
+        (0..=STRIPS * self.half_turns())
+            .map(move |k| f64::from(k) * width)
+            .take_while(move |&s| s < end)
+    }
+}
+
+impl Sheet {
+    /// Folds the sheet as it lies: heights are kept on top of the tube's, triangles on the tube are divided, and neither the
+    /// flat sheet nor its volume changes.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if a field of the crease is out of range.
+    pub fn fold(&mut self, crease: &Crease) -> Result<(), Error> {
+        crease.check()?;
+        let normal = crease.normal();
+        let beyond = |v: &[f64; 3]| {
+            (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1]
+        };
+        let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
+        let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
+        for line in crease.strips(end) {
+            self.cut(&mut far, line, ON_LINE * crease.radius);
+        }
+        for (v, &s) in self.vertices.iter_mut().zip(&far) {
+            if s > 0.0 {
+                let [x, z] = crease.bent(s);
+                *v = [
+                    v[0] + (x - s) * normal[0],
+                    v[1] + (x - s) * normal[1],
+                    v[2] + z,
+                ];
+            }
+        }
+        self.edges = edges(&self.triangles, self.vertices.len());
+        Ok(())
+    }
+
+    /// Divides all triangles along the line where `far` is `line`.
+    fn cut(&mut self, far: &mut Vec<f64>, line: f64, tolerance: f64) {
+        let mut made = BTreeMap::new();
+        for t in 0..self.triangles.len() {
+            // −1 this side, 0 on the line, 1 beyond.
+            let place = |v: u32| {
+                let s = far[v as usize] - line;
+                if s.abs() <= tolerance {
+                    0
+                } else if s < 0.0 {
+                    -1
+                } else {
+                    1
+                }
+            };
+            let corners = self.triangles[t];
+            let places = corners.map(place);
+            if !(places.contains(&-1) && places.contains(&1)) {
+                continue;
+            }
+            // Turn the triangle so that its first corner is alone on its side, or on the line.
+            let alone = (0..3)
+                .find(|&k| places[k] == 0)
+                .or_else(|| (0..3).find(|&k| places.iter().sum::<i32>() == -places[k]));
+            let Some(k) = alone else { continue };
+            let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
+            if places[k] == 0 {
+                let m = self.divide(&mut made, far, line, b, c);
+                self.triangles[t] = [a, b, m];
+                self.triangles.push([a, m, c]);
+            } else {
+                let (m, n) = (
+                    self.divide(&mut made, far, line, a, b),
+                    self.divide(&mut made, far, line, c, a),
+                );
+                self.triangles[t] = [a, m, n];
+                self.triangles.push([m, b, c]);
+                self.triangles.push([m, c, n]);
+            }
+        }
+    }
+
+    /// The vertex where edge a–b meets the line.
+    fn divide(
+        &mut self,
+        made: &mut BTreeMap<[u32; 2], u32>,
+        far: &mut Vec<f64>,
+        line: f64,
+        a: u32,
+        b: u32,
+    ) -> u32 {
+        let key = [a.min(b), a.max(b)];
+        *made.entry(key).or_insert_with(|| {
+            let [i, j] = key.map(|v| v as usize);
+            let part = (line - far[i]) / (far[j] - far[i]);
+            let mix = |p: f64, q: f64| p + part * (q - p);
+            let (p, q) = (self.vertices[i], self.vertices[j]);
+            self.vertices
+                .push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
+            let (p, q) = (self.rest[i], self.rest[j]);
+            self.rest.push([mix(p[0], q[0]), mix(p[1], q[1])]);
+            self.radius.push(mix(self.radius[i], self.radius[j]));
+            far.push(line);
+            #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
+            let new = far.len() as u32 - 1;
+            new
+        })
+    }
+}
+
+/// The silhouette of a polygon folded like a sheet: what is kept, then the mirrored flap (for a roll, each half turn), each as
+/// one or more simple polygons with positive area. Pieces overlap; the silhouette is their union. To fold again, fold each piece.
+///
+/// # Errors
+///
+/// As [`Sheet::fold`], and if the outline is not one.
+pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Point>>, Error> {
+    crease.check()?;
+    crate::outline::Outline::new(outline)?;
+    let normal = crease.normal();
+    let along = [normal[1], -normal[0]];
+    // Coordinates along the line and beyond it.
+    let polygon: Vec<Point> = outline
+        .iter()
+        .map(|p| [p[0] - crease.point[0], p[1] - crease.point[1]])
+        .map(|[x, y]| [x * along[0] + y * along[1], x * normal[0] + y * normal[1]])
+        .collect();
+    let end = polygon.iter().fold(0.0_f64, |m, p| m.max(p[1]));
+    let lines: Vec<f64> = crease.strips(end).collect();
+    let back = |[t, x]: Point| {
+        [
+            crease.point[0] + t * along[0] + x * normal[0],
+            crease.point[1] + t * along[1] + x * normal[1],
+        ]
+    };
+    let mut pieces = Vec::new();
+    let mut left = vec![polygon];
+    // The sheet turns back where it has gone up, and down, a quarter: at π/2, 3π/2, …
+    for half in 0..=crease.half_turns() {
+        let turn = if half < crease.half_turns() {
+            crease.radius * (FRAC_PI_2 + PI * f64::from(half))
+        } else {
+            f64::INFINITY
+        };
+        let mut later = Vec::new();
+        for piece in &left {
+            for part in clipped(piece, turn) {
+                let folded: Vec<Point> = divided(&part, &lines)
+                    .iter()
+                    .map(|&[t, s]| back([t, crease.bent(s)[0]]))
+                    .collect();
+                let area = moments(&folded).0;
+                if area > 0.0 {
+                    pieces.push(folded);
+                } else if area < 0.0 {
+                    pieces.push(folded.into_iter().rev().collect());
+                }
+            }
+            let mirrored: Vec<Point> = piece.iter().map(|p| [p[0], -p[1]]).collect();
+            later.extend(
+                clipped(&mirrored, -turn)
+                    .iter()
+                    .map(|part| part.iter().map(|p| [p[0], -p[1]]).collect()),
+            );
+        }
+        left = later;
+    }
+    Ok(pieces)
+}
+
+/// The polygon with a point more wherever a side crosses one of the lines y = `lines`, which ascend.
+fn divided(polygon: &[Point], lines: &[f64]) -> Vec<Point> {
+    let mut points = Vec::with_capacity(polygon.len());
+    for (a, b) in sides(polygon) {
+        points.push(a);
+        let crossing = |line: f64| [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
+        let (low, high) = (a[1].min(b[1]), a[1].max(b[1]));
+        let between = lines
+            .iter()
+            .copied()
+            .filter(|&line| line > low && line < high);
+        if a[1] < b[1] {
+            points.extend(between.map(crossing))
+        } else {
+            points.extend(between.rev().map(crossing))
+        }
+    }
+    points
+}
+
+/// The parts of a simple polygon where y ≤ `line`.
+fn clipped(polygon: &[Point], line: f64) -> Vec<Vec<Point>> {
+    let Some(start) = polygon.iter().position(|p| p[1] > line) else {
+        return vec![polygon.to_vec()];
+    };
+    // Stretches below the line, each from where it comes down to where it goes up.
+    let mut chains: Vec<Vec<Point>> = Vec::new();
+    let mut below = false;
+    let around = (0..polygon.len()).map(|k| {
+        (
+            polygon[(start + k) % polygon.len()],
+            polygon[(start + k + 1) % polygon.len()],
+        )
+    });
+    for (a, b) in around {
+        let crossing = || [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
+        match (below, b[1] <= line) {
+            (false, true) => {
+                chains.push(vec![crossing(), b]);
+                below = true;
+            }
+            (true, true) => chains.extend_last(b),
+            (true, false) => {
+                chains.extend_last(crossing());
+                below = false;
+            }
+            (false, false) => {}
+        }
+    }
+    joined(chains)
+}
+
+/// Adds to the last of several chains.
+trait ExtendLast {
+    fn extend_last(&mut self, point: Point);
+}
+
+impl ExtendLast for Vec<Vec<Point>> {
+    fn extend_last(&mut self, point: Point) {
+        if let Some(last) = self.last_mut() {
+            last.push(point);
+        }
+    }
+}
+
+/// Closes chains along the line on which all of them start and end: of the crossings in order along it, each second gap is inside.
+fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
+    let ends = chains
+        .iter()
+        .enumerate()
+        .flat_map(|(k, c)| [(c[0][0], k, true), (c[c.len() - 1][0], k, false)]);
+    let mut ends: Vec<(f64, usize, bool)> = ends.collect();
+    ends.sort_by(|p, q| p.0.total_cmp(&q.0));
+    let mut next = vec![None; chains.len()];
+    for pair in ends.chunks_exact(2) {
+        match (pair[0], pair[1]) {
+            ((_, to, true), (_, from, false)) | ((_, from, false), (_, to, true)) => {
+                next[from] = Some(to)
+            }
+            // Only where the polygon crosses itself: one closed curve then serves as well.
+            _ => return vec![chains.concat()],
+        }
+    }
+    let mut used = vec![false; chains.len()];
+    let mut loops = Vec::new();
+    for first in 0..chains.len() {
+        let mut curve = Vec::new();
+        let mut at = Some(first);
+        while let Some(k) = at.filter(|&k| !used[k]) {
+            used[k] = true;
+            curve.extend_from_slice(&chains[k]);
+            at = next[k];
+        }
+        if !curve.is_empty() {
+            loops.push(curve);
+        }
+    }
+    loops
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::Parts;
+    use crate::testing::{angular, area, rng, wavy};
+    use crate::{Cloth, ClothParams, View};
+
+    const CREASE: Crease = Crease {
+        point: [40.0, -10.0],
+        direction_rad: 2.0,
+        radius: 3.0,
+        turn: Turn::Flap,
+    };
+
+    fn flat() -> Sheet {
+        let sheet = Cloth::new(&ClothParams::default())
+            .unwrap()
+            .crumple(&wavy(2.0, 0.1), &mut rng(5))
+            .unwrap();
+        let vertices = sheet
+            .rest
+            .iter()
+            .map(|r| [30.0 + r[0], r[1] - 20.0, 0.0])
+            .collect();
+        Sheet::new(Parts {
+            vertices,
+            rest: sheet.rest,
+            radius: sheet.radius,
+            triangles: sheet.triangles,
+        })
+    }
+
+    #[test]
+    fn a_fold_neither_stretches_nor_loses_anything() {
+        for turn in [Turn::Flap, Turn::Roll { turns: 2 }] {
+            let mut sheet = flat();
+            let (volume, count) = (sheet.volume(|r| 2.0 - r), sheet.triangles().len());
+            sheet.fold(&Crease { turn, ..CREASE }).unwrap();
+            assert!((sheet.volume(|r| 2.0 - r) / volume - 1.0).abs() < 1e-9);
+            assert!(sheet.triangles().len() > count + 100);
+            // A chord of 1/24 turn is shorter than its arc by 3 in 1000.
+            assert!(
+                sheet.edge_strain_rms() < 3e-3,
+                "{}",
+                sheet.edge_strain_rms()
+            );
+            let top = sheet.vertices().iter().fold(0.0_f64, |m, v| m.max(v[2]));
+            assert!((top - 6.0).abs() < 1e-9, "{top}");
+        }
+    }
+
+    #[test]
+    fn a_flap_lies_mirrored_on_top() {
+        let mut sheet = flat();
+        let before = sheet.vertices().to_vec();
+        sheet.fold(&CREASE).unwrap();
+        let normal = CREASE.normal();
+        let beyond = |v: &[f64; 3]| (v[0] - 40.0) * normal[0] + (v[1] + 10.0) * normal[1];
+        for (old, new) in before.iter().zip(sheet.vertices()) {
+            let s = beyond(old);
+            if s <= 0.0 {
+                assert_eq!(old, new);
+            } else if s > 3.0 * PI {
+                assert!((beyond(new) + s - 3.0 * PI).abs() < 1e-9 && (new[2] - 6.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn folding_where_nothing_is_changes_nothing() {
+        let mut sheet = flat();
+        let before = sheet.clone();
+        sheet
+            .fold(&Crease {
+                point: [1e4, 0.0],
+                direction_rad: -FRAC_PI_2,
+                ..CREASE
+            })
+            .unwrap();
+        assert_eq!(sheet, before);
+    }
+
+    #[test]
+    fn the_silhouette_covers_the_folded_sheet_and_no_more() {
+        for (direction_rad, turn) in [(2.0, Turn::Flap), (0.3, Turn::Roll { turns: 1 })] {
+            let crease = Crease {
+                direction_rad,
+                turn,
+                ..CREASE
+            };
+            let mut sheet = flat();
+            // The flat sheet's own rim.
+            let rim: Vec<Point> = {
+                let mut next = BTreeMap::new();
+                for e in &sheet.edges {
+                    match e.sides {
+                        [_, crate::sheet::OUTSIDE] => next.insert(e.ends[0], e.ends[1]),
+                        [crate::sheet::OUTSIDE, _] => next.insert(e.ends[1], e.ends[0]),
+                        _ => None,
+                    };
+                }
+                let mut at = 0;
+                (0..next.len())
+                    .map(|_| {
+                        at = next[&at];
+                        [
+                            sheet.vertices[at as usize][0],
+                            sheet.vertices[at as usize][1],
+                        ]
+                    })
+                    .collect()
+            };
+            let pieces = crease_outline(&rim, &crease).unwrap();
+            let areas: f64 = pieces.iter().map(|p| area(p)).sum();
+            sheet.fold(&crease).unwrap();
+            let shadow: f64 = sheet
+                .triangles()
+                .iter()
+                .map(|t| {
+                    t.map(|v| sheet.vertices()[v as usize])
+                        .map(|v| [v[0], v[1]])
+                })
+                .map(|[a, b, c]| crate::mesh::cross(a, b, c).abs() / 2.0)
+                .sum();
+            assert!((areas / shadow - 1.0).abs() < 1e-9, "{areas} {shadow}");
+            // Where the sheet is thick there is a piece, and the other way round.
+            let mut image = vec![0.0_f32; 250 * 250];
+            let view = View {
+                origin: [-100.0, -150.0],
+                pixel: 1.0,
+            };
+            sheet.thickness_into(&mut image, 250, &view, |_| 1.0);
+            let insides: Vec<crate::outline::Inside> = pieces
+                .iter()
+                .map(|p| crate::outline::Inside::new(p))
+                .collect();
+            let mut wrong = 0;
+            for (k, &value) in image.iter().enumerate() {
+                #[expect(clippy::cast_precision_loss, reason = "pixel numbers")]
+                let p = [
+                    view.origin[0] + (k % 250) as f64,
+                    view.origin[1] + (k / 250) as f64,
+                ];
+                let covered = insides.iter().any(|i| i.contains(p));
+                wrong +=
+                    usize::from(covered && value == 0.0) + usize::from(!covered && value > 0.6);
+            }
+            assert_eq!(wrong, 0);
+        }
+    }
+
+    #[test]
+    fn a_concave_outline_falls_into_pieces() {
+        // Both arms of a U lie beyond the line.
+        let u = [
+            [0.0, 0.0],
+            [9.0, 0.0],
+            [9.0, 9.0],
+            [6.0, 9.0],
+            [6.0, 3.0],
+            [3.0, 3.0],
+            [3.0, 9.0],
+            [0.0, 9.0],
+        ];
+        let crease = Crease {
+            point: [0.0, 5.0],
+            direction_rad: 0.0,
+            radius: 1e-6,
+            turn: Turn::Flap,
+        };
+        let pieces = crease_outline(&u, &crease).unwrap();
+        let mut areas: Vec<f64> = pieces.iter().map(|p| area(p)).collect();
+        areas.sort_by(f64::total_cmp);
+        assert_eq!(areas.len(), 3);
+        for (found, wanted) in areas.iter().zip([12.0, 12.0, 39.0]) {
+            assert!((found - wanted).abs() < 1e-3, "{areas:?}");
+        }
+        let whole = crease_outline(
+            &angular(),
+            &Crease {
+                point: [0.0, 100.0],
+                ..crease
+            },
+        )
+        .unwrap();
+        assert!(whole.len() == 1 && (area(&whole[0]) - 54.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_no_crease_is_an_error() {
+        let mut sheet = flat();
+        for crease in [
+            Crease {
+                radius: 0.0,
+                ..CREASE
+            },
+            Crease {
+                radius: f64::NAN,
+                ..CREASE
+            },
+            Crease {
+                direction_rad: f64::INFINITY,
+                ..CREASE
+            },
+            Crease {
+                point: [0.0, f64::NAN],
+                ..CREASE
+            },
+            Crease {
+                turn: Turn::Roll { turns: 0 },
+                ..CREASE
+            },
+        ] {
+            assert!(matches!(sheet.fold(&crease), Err(Error::Parameter { .. })));
+            assert!(crease_outline(&angular(), &crease).is_err());
+        }
+        assert!(crease_outline(&[[0.0, 0.0]], &CREASE).is_err());
+    }
+}

@@ -1,0 +1,281 @@
+//! Sheets solved side by side: every array holds one value for each of `L` lanes, and all lanes do the same.
+//!
+//! A lane never looks at another, so that a sheet's bits do not depend on its company.
+
+use crate::kernel::{Real, pull, verlet};
+use crate::mesh::{Disc, Pair};
+use crate::outline::distance;
+use crate::ring::{Curve, Ring, View};
+use crate::{Point, Vertex};
+use std::ops::{Index, IndexMut};
+
+/// One value for each lane. The alignment is that of a cache line: a row of 16 f32 must not straddle two.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Lane<T, const L: usize>(pub(crate) [T; L]);
+
+impl<T, const L: usize> Index<usize> for Lane<T, L> {
+    type Output = T;
+    #[inline(always)]
+    fn index(&self, l: usize) -> &T {
+        &self.0[l]
+    }
+}
+
+impl<T, const L: usize> IndexMut<usize> for Lane<T, L> {
+    #[inline(always)]
+    fn index_mut(&mut self, l: usize) -> &mut T {
+        &mut self.0[l]
+    }
+}
+
+/// x, y and z of one vertex in every lane.
+pub(crate) type Node<T, const L: usize> = [Lane<T, L>; 3];
+
+/// What all sheets of a mesh share: which vertices are bound, and where each may meet the outline.
+#[derive(Debug)]
+pub(crate) struct Topology {
+    /// Distances within the rim, from the rim inwards, and inside.
+    pub(crate) edges: [Vec<Pair>; 3],
+    /// Distances across edges, likewise.
+    pub(crate) bends: [Vec<Pair>; 3],
+    pub(crate) views: Vec<View>,
+    pub(crate) rim: usize,
+}
+
+impl Topology {
+    /// `sides` is the number of sides of the outline.
+    pub(crate) fn new(disc: &Disc, sides: usize) -> Topology {
+        // Pairs hold the smaller index first, and the rim comes before all others.
+        let on_rim = |p: &Pair| p.iter().filter(|&&v| (v as usize) < disc.rim).count();
+        let sorted = |pairs: &[Pair]| {
+            [2, 1, 0].map(|count| {
+                pairs
+                    .iter()
+                    .copied()
+                    .filter(|p| on_rim(p) == count)
+                    .collect()
+            })
+        };
+        Topology {
+            edges: sorted(&disc.edges),
+            bends: sorted(&disc.bends),
+            views: disc.points.iter().map(|&p| View::from(p, sides)).collect(),
+            rim: disc.rim,
+        }
+    }
+}
+
+/// One sheet before it is pressed, in units of its outline's equivalent radius.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub(crate) rest: Vec<Point>,
+    pub(crate) heights: Vec<f64>,
+    /// The outline before and after.
+    pub(crate) outline: [Vec<Point>; 2],
+}
+
+/// The state of `L` sheets.
+#[derive(Debug)]
+pub(crate) struct Batch<T, const L: usize> {
+    pub(crate) now: Vec<Node<T, L>>,
+    pub(crate) before: Vec<Node<T, L>>,
+    pub(crate) ring: Ring<T, L>,
+    /// The outline at the start and at the end.
+    pub(crate) ways: [Curve<T, L>; 2],
+    /// Rest lengths of [`Topology::edges`] and [`Topology::bends`].
+    pub(crate) edges: [Vec<Lane<T, L>>; 3],
+    pub(crate) bends: [Vec<Lane<T, L>>; 3],
+}
+
+impl<T: Real, const L: usize> Batch<T, L> {
+    /// # Panics
+    ///
+    /// If `starts` is empty; lanes beyond its length repeat the first.
+    pub(crate) fn new(topology: &Topology, starts: &[Start]) -> Batch<T, L> {
+        let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).unwrap_or(&starts[0]));
+        let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| T::of(value(s))));
+        let now: Vec<Node<T, L>> = (0..lanes[0].rest.len())
+            .map(|v| {
+                [
+                    row(&|s| s.rest[v][0]),
+                    row(&|s| s.rest[v][1]),
+                    row(&|s| s.heights[v]),
+                ]
+            })
+            .collect();
+        let ways = [0, 1].map(|way| -> Curve<T, L> {
+            (0..lanes[0].outline[way].len())
+                .map(|k| [0, 1].map(|axis| row(&|s| s.outline[way][k][axis])))
+                .collect()
+        });
+        let lengths = |pairs: &Vec<Pair>| {
+            pairs
+                .iter()
+                .map(|&[a, b]| row(&|s| distance(s.rest[a as usize], s.rest[b as usize])))
+                .collect()
+        };
+        Batch {
+            before: now.clone(),
+            ring: Ring::new(ways[0].clone(), now.len()),
+            now,
+            ways,
+            edges: topology.edges.each_ref().map(lengths),
+            bends: topology.bends.each_ref().map(lengths),
+        }
+    }
+
+    /// The vertices of one lane.
+    pub(crate) fn lane(&self, l: usize) -> Vec<Vertex> {
+        self.now
+            .iter()
+            .map(|n| [n[0][l].to_f64(), n[1][l].to_f64(), n[2][l].to_f64()])
+            .collect()
+    }
+}
+
+/// Eq. 4 on every vertex.
+#[inline(always)]
+pub(crate) fn advance<T: Real, const L: usize>(
+    now: &mut [Node<T, L>],
+    before: &mut [Node<T, L>],
+    keep: T,
+    gravity_dt2: T,
+) {
+    for (n, b) in now.iter_mut().zip(before) {
+        for (axis, acceleration) in [T::ZERO, T::ZERO, gravity_dt2].into_iter().enumerate() {
+            for l in 0..L {
+                let x = n[axis][l];
+                n[axis][l] = verlet(x, b[axis][l], acceleration, keep);
+                b[axis][l] = x;
+            }
+        }
+    }
+}
+
+/// How a set of distances is restored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Binding<T> {
+    /// Inverse masses of a pair's ends.
+    pub(crate) weights: [T; 2],
+    /// 1 / (∑w + α̃).
+    pub(crate) gain: T,
+    /// Relative shortening beyond which the resistance no longer grows.
+    pub(crate) gives_way: T,
+}
+
+/// One pass over the distances of `pairs`.
+#[inline(always)]
+pub(crate) fn project<T: Real, const L: usize>(
+    now: &mut [Node<T, L>],
+    pairs: &[Pair],
+    lengths: &[Lane<T, L>],
+    binding: Binding<T>,
+) {
+    let least = -(binding.gain * binding.gives_way);
+    for (&[a, b], rest) in pairs.iter().zip(lengths) {
+        let (mut p, mut q) = (now[a as usize], now[b as usize]);
+        for l in 0..L {
+            let d = [q[0][l] - p[0][l], q[1][l] - p[1][l], q[2][l] - p[2][l]];
+            let s = pull(d, rest[l], binding.gain).at_least(least);
+            for axis in 0..3 {
+                p[axis][l] = p[axis][l] + d[axis] * (s * binding.weights[0]);
+                q[axis][l] = q[axis][l] - d[axis] * (s * binding.weights[1]);
+            }
+        }
+        now[a as usize] = p;
+        now[b as usize] = q;
+    }
+}
+
+/// Ground and ceiling.
+#[inline(always)]
+pub(crate) fn confine<T: Real, const L: usize>(now: &mut [Node<T, L>], ceiling: T) {
+    for n in now {
+        for z in &mut n[2].0 {
+            *z = z.at_least(T::ZERO).at_most(ceiling);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::rng;
+    use rand_core::Rng;
+
+    fn nodes(count: usize) -> Vec<Node<f64, 1>> {
+        let mut rng = rng(1);
+        let mut value = || Lane([f64::from(rng.next_u32()) / f64::from(u32::MAX)]);
+        (0..count).map(|_| [value(), value(), value()]).collect()
+    }
+
+    #[test]
+    fn law_23_distances_conserve_momentum() {
+        let mut now = nodes(30);
+        let sum = |now: &[Node<f64, 1>]| {
+            [0, 1, 2].map(|axis| now.iter().map(|n| n[axis][0]).sum::<f64>())
+        };
+        let before = sum(&now);
+        let pairs: Vec<Pair> = (0..29).map(|k| [k, k + 1]).collect();
+        let lengths = vec![Lane([0.3]); 29];
+        for _ in 0..20 {
+            project(
+                &mut now,
+                &pairs,
+                &lengths,
+                Binding {
+                    weights: [1.0; 2],
+                    gain: 0.4,
+                    gives_way: 0.2,
+                },
+            );
+        }
+        for (a, b) in before.iter().zip(sum(&now)) {
+            assert!((a - b).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn law_23_what_falls_follows_a_parabola() {
+        let mut now = nodes(3);
+        let start = now.clone();
+        let mut before = now.clone();
+        for _ in 0..100 {
+            advance(&mut now, &mut before, 1.0, -0.01);
+        }
+        for (n, s) in now.iter().zip(&start) {
+            // ∑ 1..=100 of the constant acceleration.
+            assert!((n[2][0] - s[2][0] + 0.01 * 5050.0).abs() < 1e-10);
+            assert!((n[0][0] - s[0][0]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_crease_gives_way() {
+        let pull_by = |gives_way: f64| {
+            let mut now = vec![[Lane([0.0]); 3], [Lane([0.5]), Lane([0.0]), Lane([0.0])]];
+            project(
+                &mut now,
+                &[[0, 1]],
+                &[Lane([1.0])],
+                Binding {
+                    weights: [1.0; 2],
+                    gain: 0.5,
+                    gives_way,
+                },
+            );
+            now[1][0][0] - now[0][0][0]
+        };
+        assert!((pull_by(f64::MAX) - 1.0).abs() < 1e-12);
+        assert!((pull_by(0.1) - 0.55).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ground_and_ceiling_hold() {
+        let mut now = vec![[Lane([-1.0, 0.5, 2.0]); 3]];
+        confine(&mut now, 1.0);
+        assert_eq!(now[0][2].0, [0.0, 0.5, 1.0]);
+        assert_eq!(now[0][0].0, [-1.0, 0.5, 2.0]);
+    }
+}

@@ -1,0 +1,34 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+mod cloth;
+mod crease;
+mod error;
+mod kernel;
+mod lanes;
+mod mesh;
+mod outline;
+mod params;
+mod raster;
+mod refine;
+mod rest;
+mod ring;
+mod sheet;
+#[cfg(test)]
+mod testing;
+mod verlet;
+mod xpbd;
+
+pub use cloth::Cloth;
+pub use crease::{Crease, Turn, crease_outline};
+pub use error::Error;
+pub use params::{ClothParams, Rest, Smoothing, Solver, VerletParams, XpbdParams};
+pub use rand_core::Rng;
+pub use raster::View;
+pub use sheet::Sheet;
+
+/// A point or vector in the plane: x right, y down, in the unit of the caller's outline.
+pub type Point = [f64; 2];
+
+/// A point in space: x right, y down, z up from the ground, in the unit of the caller's outline.
+pub type Vertex = [f64; 3];

@@ -1,0 +1,259 @@
+//! The disc that every sheet is cut from: one triangulation for all, so that sheets can be solved side by side.
+
+use crate::{Error, Point};
+use spade::{DelaunayTriangulation, Triangulation};
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+/// The paper's mesh: 75 vertices on the rim of 538.
+const RIM_OF_PAPER: (f64, f64) = (75.0, 538.0);
+/// Sweeps that even out the triangles; beyond a dozen the edge lengths no longer change visibly.
+const RELAXATIONS: usize = 16;
+/// The sunflower's angle, 2π(1 - 1/φ): consecutive points never line up.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
+/// A pair of vertices bound by a distance.
+pub(crate) type Pair = [u32; 2];
+
+/// A triangulated unit disc. Vertices `0..rim` lie on the circle at equal angles, the others inside.
+#[derive(Debug, Clone)]
+pub(crate) struct Disc {
+    pub(crate) points: Vec<Point>,
+    pub(crate) rim: usize,
+    /// Counter-clockwise.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// Smaller index first, in sets that share no vertex.
+    pub(crate) edges: Vec<Pair>,
+    /// The two vertices opposite each inner edge, ordered likewise.
+    pub(crate) bends: Vec<Pair>,
+    /// `harmonics[k][v]`: weight of rim vertex k in inner vertex v.
+    harmonics: Vec<Vec<f64>>,
+}
+
+impl Disc {
+    pub(crate) fn new(vertices: usize) -> Result<Disc, Error> {
+        let (rim, inner) = split(vertices);
+        let mut points = sunflower(rim, inner);
+        for _ in 0..RELAXATIONS {
+            let triangles = delaunay(&points)?;
+            relax(&mut points, rim, &triangles);
+        }
+        let triangles = delaunay(&points)?;
+        let (edges, bends) = pairs(&triangles);
+        let harmonics = harmonics(&points, rim);
+        Ok(Disc {
+            rim,
+            triangles,
+            edges: coloured(&edges, points.len()),
+            bends: coloured(&bends, points.len()),
+            harmonics,
+            points,
+        })
+    }
+
+    /// Carries a closed curve of `rim` points into the disc: each coordinate becomes the harmonic function
+    /// with these values on the circle, the shape that a soap film would take.
+    pub(crate) fn spread(&self, curve: &[Point]) -> Vec<Point> {
+        let mut all = curve.to_vec();
+        all.resize(self.points.len(), [0.0; 2]);
+        for (weights, &[x, y]) in self.harmonics.iter().zip(curve) {
+            for (p, w) in all[self.rim..].iter_mut().zip(weights) {
+                p[0] += w * x;
+                p[1] += w * y;
+            }
+        }
+        all
+    }
+}
+
+/// Number of vertices on the rim and inside, in the proportion of the paper's mesh.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "counts far below 2^32"
+)]
+fn split(vertices: usize) -> (usize, usize) {
+    let rim = (RIM_OF_PAPER.0 * (vertices as f64 / RIM_OF_PAPER.1).sqrt()).round() as usize;
+    (rim, vertices - rim)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
+fn sunflower(rim: usize, inner: usize) -> Vec<Point> {
+    let reach = 1.0 - PI / rim as f64;
+    let on_rim = (0..rim).map(|k| (1.0, TAU * k as f64 / rim as f64));
+    let inside = (0..inner).map(|i| {
+        (
+            reach * ((i as f64 + 0.5) / inner as f64).sqrt(),
+            GOLDEN_ANGLE * i as f64,
+        )
+    });
+    on_rim
+        .chain(inside)
+        .map(|(r, angle)| [r * libm::cos(angle), r * libm::sin(angle)])
+        .collect()
+}
+
+fn delaunay(points: &[Point]) -> Result<Vec<[u32; 3]>, Error> {
+    let vertices = points
+        .iter()
+        .map(|p| spade::Point2::new(p[0], p[1]))
+        .collect();
+    let mesh =
+        DelaunayTriangulation::<_>::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
+            field: "vertices",
+            value: f64::NAN,
+            accepted: "a number whose sunflower can be triangulated",
+        })?;
+    #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
+    Ok(mesh
+        .inner_faces()
+        .map(|face| face.vertices().map(|v| v.fix().index() as u32))
+        .collect())
+}
+
+/// Moves each inner vertex to the centre of mass of the triangles around it.
+fn relax(points: &mut [Point], rim: usize, triangles: &[[u32; 3]]) {
+    let mut sums = vec![[0.0; 3]; points.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|v| points[v as usize]);
+        let area = cross(a, b, c);
+        for v in t {
+            let s = &mut sums[*v as usize];
+            s[0] += area * (a[0] + b[0] + c[0]) / 3.0;
+            s[1] += area * (a[1] + b[1] + c[1]) / 3.0;
+            s[2] += area;
+        }
+    }
+    for (p, s) in points.iter_mut().zip(&sums).skip(rim) {
+        *p = [s[0] / s[2], s[1] / s[2]];
+    }
+}
+
+/// Edges, and for each inner edge the two vertices opposite it.
+fn pairs(triangles: &[[u32; 3]]) -> (Vec<Pair>, Vec<Pair>) {
+    let mut opposite: BTreeMap<Pair, Vec<u32>> = BTreeMap::new();
+    for &[a, b, c] in triangles {
+        for (i, j, k) in [(a, b, c), (b, c, a), (c, a, b)] {
+            opposite.entry([i.min(j), i.max(j)]).or_default().push(k);
+        }
+    }
+    let bends = opposite
+        .values()
+        .filter(|o| o.len() == 2)
+        .map(|o| [o[0].min(o[1]), o[0].max(o[1])])
+        .collect();
+    (opposite.into_keys().collect(), bends)
+}
+
+/// Sorts pairs into sets without a common vertex (greedy colouring): neighbours in the list never wait for each other.
+fn coloured(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
+    let mut taken = vec![0_u64; vertices];
+    let mut sets: Vec<Vec<Pair>> = Vec::new();
+    for &[a, b] in pairs {
+        let colour = (!(taken[a as usize] | taken[b as usize])).trailing_zeros() as usize;
+        taken[a as usize] |= 1 << colour;
+        taken[b as usize] |= 1 << colour;
+        sets.resize(sets.len().max(colour + 1), Vec::new());
+        sets[colour].push([a, b]);
+    }
+    sets.concat()
+}
+
+/// Weights of the trigonometric polynomial through the rim, continued inwards:
+/// w = (1/K) ∑_l r^|l| cos l(θ - θ_k), |l| ≤ K/2.
+#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
+fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
+    let k_count = rim as f64;
+    let circle = &points[..rim];
+    circle
+        .iter()
+        .map(|&[cos_k, sin_k]| {
+            let weight = |&[x, y]: &Point| {
+                // z = r e^{i(θ - θ_k)}; its powers are the terms of the sum.
+                let z = [x * cos_k + y * sin_k, y * cos_k - x * sin_k];
+                let mut power = z;
+                let mut sum = 1.0;
+                for _ in 1..rim.div_ceil(2) {
+                    sum += 2.0 * power[0];
+                    power = [
+                        power[0] * z[0] - power[1] * z[1],
+                        power[0] * z[1] + power[1] * z[0],
+                    ];
+                }
+                if rim.is_multiple_of(2) {
+                    sum += power[0];
+                }
+                sum / k_count
+            };
+            points[rim..].iter().map(weight).collect()
+        })
+        .collect()
+}
+
+/// Twice the signed area of a triangle.
+pub(crate) fn cross(a: Point, b: Point, c: Point) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn the_disc_is_a_disc() {
+        let disc = Disc::new(538).unwrap();
+        assert_eq!((disc.points.len(), disc.rim), (538, 75));
+        // Euler: V − E + F = 1, and the rim is the boundary.
+        assert_eq!(538 + disc.triangles.len(), disc.edges.len() + 1);
+        assert_eq!(disc.edges.len() - disc.bends.len(), 75);
+        let area: f64 = disc
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| disc.points[v as usize]))
+            .map(|[a, b, c]| cross(a, b, c) / 2.0)
+            .sum();
+        assert!((area - 37.5 * libm::sin(TAU / 75.0)).abs() < 1e-9);
+        let lengths: Vec<f64> = disc
+            .edges
+            .iter()
+            .map(|&[a, b]| {
+                crate::outline::distance(disc.points[a as usize], disc.points[b as usize])
+            })
+            .collect();
+        let (least, most) = lengths
+            .iter()
+            .fold((f64::MAX, 0.0_f64), |(l, m), &d| (l.min(d), m.max(d)));
+        assert!(most < 3.0 * least, "{least} {most}");
+    }
+
+    #[test]
+    fn sets_of_pairs_share_no_vertex() {
+        let disc = Disc::new(200).unwrap();
+        for pairs in [&disc.edges, &disc.bends] {
+            let mut taken = BTreeSet::new();
+            let mut sets = 1;
+            for &[a, b] in pairs {
+                assert!(a < b);
+                if !taken.insert(a) | !taken.insert(b) {
+                    sets += 1;
+                    taken = BTreeSet::from([a, b]);
+                }
+            }
+            assert!(sets < 20, "{sets}");
+        }
+    }
+
+    #[test]
+    fn harmonic_functions_are_carried_inwards() {
+        let disc = Disc::new(400).unwrap();
+        // Re z³ and Im z² are harmonic.
+        let field = |&[x, y]: &Point| [x * x * x - 3.0 * x * y * y, 2.0 * x * y];
+        let rim: Vec<Point> = disc.points[..disc.rim].iter().map(field).collect();
+        for (found, p) in disc.spread(&rim).iter().zip(&disc.points) {
+            let wanted = field(p);
+            assert!((found[0] - wanted[0]).abs() < 1e-9 && (found[1] - wanted[1]).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,148 @@
+use crate::mesh::cross;
+use crate::outline::distance;
+use crate::refine::Parts;
+use crate::{Point, Vertex};
+
+/// Stands for the outside where an edge has a triangle on one side only.
+pub(crate) const OUTSIDE: u32 = u32::MAX;
+
+/// A pressed sheet: a triangle mesh with its flat rest state, in the unit of the outline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    pub(crate) vertices: Vec<Vertex>,
+    pub(crate) rest: Vec<Point>,
+    pub(crate) radius: Vec<f64>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) edges: Vec<Edge>,
+}
+
+/// An edge from `ends[0]` to `ends[1]` with the triangles on its left and right, or [`OUTSIDE`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Edge {
+    pub(crate) ends: [u32; 2],
+    pub(crate) sides: [u32; 2],
+}
+
+impl Sheet {
+    pub(crate) fn new(parts: Parts) -> Sheet {
+        let Parts {
+            vertices,
+            rest,
+            radius,
+            triangles,
+        } = parts;
+        let edges = edges(&triangles, vertices.len());
+        Sheet {
+            vertices,
+            rest,
+            radius,
+            triangles,
+            edges,
+        }
+    }
+
+    /// Where the sheet is. z ≥ 0 is the height above the ground.
+    #[must_use]
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
+    }
+
+    /// Indices of the triangles' corners.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Where each vertex was in the flat sheet, its centre of mass near the origin.
+    #[must_use]
+    pub fn rest(&self) -> &[Point] {
+        &self.rest
+    }
+
+    /// Each vertex's distance from the centre of the flat sheet over that of the rim, 0 to 1.
+    #[must_use]
+    pub fn rest_radius(&self) -> &[f64] {
+        &self.radius
+    }
+
+    /// Area of the flat sheet.
+    #[must_use]
+    pub fn rest_area(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|t| self.rest_area_of(t))
+            .sum()
+    }
+
+    /// Area of triangle `t` in the flat sheet.
+    pub(crate) fn rest_area_of(&self, t: usize) -> f64 {
+        let [a, b, c] = self.triangles[t].map(|v| self.rest[v as usize]);
+        0.5 * cross(a, b, c).abs()
+    }
+
+    /// Volume of the sheet under a thickness that depends on [`Sheet::rest_radius`], linear within each triangle: what
+    /// [`Sheet::thickness_into`] spreads over the picture.
+    pub fn volume(&self, thickness: impl Fn(f64) -> f64) -> f64 {
+        let mean = |t: &[u32; 3]| {
+            t.iter()
+                .map(|&v| thickness(self.radius[v as usize]))
+                .sum::<f64>()
+                / 3.0
+        };
+        self.triangles
+            .iter()
+            .enumerate()
+            .map(|(t, corners)| self.rest_area_of(t) * mean(corners))
+            .sum()
+    }
+
+    /// Root mean square of the edges' relative change in length.
+    #[must_use]
+    pub fn edge_strain_rms(&self) -> f64 {
+        let mut sum = 0.0;
+        for &Edge { ends: [a, b], .. } in &self.edges {
+            let (p, q) = (self.vertices[a as usize], self.vertices[b as usize]);
+            let flat = distance([p[0], p[1]], [q[0], q[1]]);
+            let rest = distance(self.rest[a as usize], self.rest[b as usize]);
+            let strain = (flat * flat + (p[2] - q[2]) * (p[2] - q[2])).sqrt() / rest - 1.0;
+            sum += strain * strain;
+        }
+        #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
+        let count = self.edges.len() as f64;
+        (sum / count).sqrt()
+    }
+}
+
+/// Pairs up the sides of all triangles.
+pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
+    // Each vertex keeps a list of the edges whose smaller end it is, chained through `next`.
+    const NONE: u32 = u32::MAX;
+    let mut first = vec![NONE; vertices];
+    let mut next: Vec<u32> = Vec::with_capacity(triangles.len() * 2);
+    let mut edges: Vec<Edge> = Vec::with_capacity(triangles.len() * 2);
+    for (t, &[a, b, c]) in triangles.iter().enumerate() {
+        #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
+        let (t, new) = (t as u32, |edges: &Vec<Edge>| edges.len() as u32);
+        for (i, j) in [(a, b), (b, c), (c, a)] {
+            let (low, high) = (i.min(j), i.max(j));
+            // The left of an edge from its smaller end is the triangle that runs that way.
+            let side = usize::from(i > j);
+            let mut at = first[low as usize];
+            while at != NONE && edges[at as usize].ends[1] != high {
+                at = next[at as usize];
+            }
+            if at == NONE {
+                let mut sides = [OUTSIDE; 2];
+                sides[side] = t;
+                next.push(first[low as usize]);
+                first[low as usize] = new(&edges);
+                edges.push(Edge {
+                    ends: [low, high],
+                    sides,
+                });
+            } else {
+                edges[at as usize].sides[side] = t;
+            }
+        }
+    }
+    edges
+}

@@ -1,0 +1,285 @@
+//! Fourier shape descriptors of a closed outline (Eqs. 1–3), and what can be done to them.
+
+use crate::Error;
+use crate::dft::{Direction, multiply, transform, unit};
+use crate::outline::{Point, count_as_f64, signed_area};
+
+/// Fewest points that enclose an area.
+const FEWEST_POINTS: usize = 3;
+
+/// Fourier shape descriptors u₋ₕ … u₀ … uₕ of a closed outline, Eq. 2.
+///
+/// A point (x, y) is the complex number z = x + iy (Eq. 1), given here as `[x, y]`. The outline is the curve
+/// z(t) = Σ uₗ e^{i2πlt}, 0 ≤ t < 1: u₀ is its centre, u₁ a circle run through once in the direction of positive area, u₋₁ makes it an ellipse, and higher |l| are finer detail.
+///
+/// # Differences from the paper
+///
+/// The index l is signed: the paper's u_{K−l} is u₋ₗ here. For an even number K of points the one descriptor u_{K/2} is shared
+/// equally between l = K/2 and −K/2; the outline through the K points is the same, and smoother between them.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Vec<Point>", into = "Vec<Point>"))]
+pub struct Descriptors {
+    /// u₋ₕ … uₕ: an odd number of them.
+    terms: Vec<Point>,
+}
+
+impl Descriptors {
+    /// Eq. 2: the descriptors of an outline of K points, all of them (|l| ≤ K/2).
+    ///
+    /// The points are taken as equally spaced in the curve's parameter; give [`crate::resample`]d points for the
+    /// arc length the paper asks for.
+    ///
+    /// # Errors
+    ///
+    /// If there are fewer than 3 points, one is not finite, or they enclose no area.
+    pub fn from_outline(outline: &[Point]) -> Result<Self, Error> {
+        let count = outline.len();
+        if count < FEWEST_POINTS {
+            return Err(Error::TooFewPoints {
+                count,
+                needed: FEWEST_POINTS,
+            });
+        }
+        if let Some(index) = outline
+            .iter()
+            .position(|p| !p.iter().all(|v| v.is_finite()))
+        {
+            return Err(Error::PointValue { index });
+        }
+        if signed_area(outline) == 0.0 {
+            return Err(Error::NoArea);
+        }
+        // Eq. 2: uₗ = (1/K) Σₖ z(k) e^{−i2πlk/K}, with z(k) = x(k) + iy(k) (Eq. 1).
+        let sums = transform(outline, Direction::Forward);
+        let half = count / 2;
+        let shared = if count.is_multiple_of(2) {
+            half
+        } else {
+            half + 1
+        };
+        let terms = (0..=2 * half)
+            .map(|place| {
+                let bin = (place + count - half) % count;
+                let share = if place.abs_diff(half) == shared {
+                    2.0
+                } else {
+                    1.0
+                };
+                sums[bin].map(|v| v / (share * count_as_f64(count)))
+            })
+            .collect();
+        Ok(Self { terms })
+    }
+
+    /// From the descriptors themselves, u₋ₕ … u₀ … uₕ.
+    ///
+    /// # Errors
+    ///
+    /// If their number is even or below 3, or one is not finite.
+    pub fn from_harmonics(terms: Vec<Point>) -> Result<Self, Error> {
+        if terms.len() < FEWEST_POINTS || terms.len().is_multiple_of(2) {
+            return Err(Error::Parameter {
+                field: "number of descriptors",
+                value: count_as_f64(terms.len()),
+                accepted: "odd and at least 3 (l from -h to h)",
+            });
+        }
+        match terms.iter().position(|u| !u.iter().all(|v| v.is_finite())) {
+            Some(index) => Err(Error::PointValue { index }),
+            None => Ok(Self { terms }),
+        }
+    }
+
+    /// The highest |l| held.
+    pub fn harmonics(&self) -> usize {
+        self.terms.len() / 2
+    }
+
+    /// uₗ as `[re, im]`; 0 beyond [`Self::harmonics`].
+    pub fn harmonic(&self, l: i32) -> [f64; 2] {
+        let centre = i64::try_from(self.harmonics()).unwrap_or(i64::MAX);
+        usize::try_from(centre + i64::from(l))
+            .ok()
+            .and_then(|place| self.terms.get(place).copied())
+            .unwrap_or([0.0, 0.0])
+    }
+
+    /// |uₗ|.
+    pub fn magnitude(&self, l: i32) -> f64 {
+        modulus(self.harmonic(l))
+    }
+
+    /// The size: |u₁|, in px. For a circle its radius, for an ellipse the mean of its half axes.
+    pub fn radius(&self) -> f64 {
+        self.magnitude(1)
+    }
+
+    /// Area enclosed by the continuous curve, π Σ l |uₗ|², in px²; exact, and positive in the orientation of [`crate::trace`].
+    pub fn area(&self) -> f64 {
+        let sum: f64 = self
+            .each()
+            .map(|(l, u)| l * (u[0] * u[0] + u[1] * u[1]))
+            .sum();
+        core::f64::consts::PI * sum
+    }
+
+    /// The curve at `count` equal steps of its parameter: the inverse of Eq. 2, at any number of points.
+    ///
+    /// ```
+    /// use fsd_shape::Descriptors;
+    /// let triangle = [[0.0, 0.0], [6.0, 0.0], [0.0, 6.0]];
+    /// let descriptors = Descriptors::from_outline(&triangle)?;
+    /// for (p, q) in descriptors.outline(3).iter().zip(&triangle) {
+    ///     assert!((p[0] - q[0]).abs() < 1e-12 && (p[1] - q[1]).abs() < 1e-12);
+    /// }
+    /// assert_eq!(descriptors.outline(100).len(), 100);
+    /// # Ok::<(), fsd_shape::Error>(())
+    /// ```
+    pub fn outline(&self, count: usize) -> Vec<Point> {
+        if count == 0 {
+            return Vec::new();
+        }
+        // z(k) = Σₗ uₗ e^{i2πlk/K}; e^{i2πlk/K} depends on l mod K only, so terms beyond K fold onto the others.
+        let mut bins = vec![[0.0, 0.0]; count];
+        let first = count - self.harmonics() % count;
+        for (place, u) in self.terms.iter().enumerate() {
+            let bin = &mut bins[(first + place) % count];
+            *bin = [bin[0] + u[0], bin[1] + u[1]];
+        }
+        transform(&bins, Direction::Inverse)
+    }
+
+    /// Only the terms with |l| ≤ `harmonics` (at least 1): a smoother outline.
+    #[must_use]
+    pub fn truncated(&self, harmonics: usize) -> Self {
+        let drop = self.harmonics().saturating_sub(harmonics.max(1));
+        Self {
+            terms: self.terms[drop..self.terms.len() - drop].to_vec(),
+        }
+    }
+
+    /// Eq. 3: ûₗ = uₗ / |u₁| and û₀ = 0, the shape without place and size.
+    ///
+    /// A curve without a first harmonic has no size by this measure; it is centred only.
+    #[must_use]
+    pub fn normalised(&self) -> Self {
+        let radius = self.radius();
+        let scale = if radius > 0.0 { 1.0 / radius } else { 1.0 };
+        let centre = self.harmonics();
+        let mut scaled = self.scaled(scale);
+        scaled.terms[centre] = [0.0, 0.0];
+        scaled
+    }
+
+    /// The shape in a standard pose: rotated, and its start point moved, so that u₁ and u₋₁ are real and not negative. Of the two
+    /// poses which satisfy this (half a turn apart) the one with Re u₂ ≥ 0 is taken.
+    ///
+    /// Outlines that differ only by start point and rotation (about the origin) become equal.
+    #[must_use]
+    pub fn aligned(&self) -> Self {
+        let argument = |u: Point| libm::atan2(u[1], u[0]);
+        let (forth, back) = (argument(self.harmonic(1)), argument(self.harmonic(-1)));
+        let (angle, start) = (-(forth + back) / 2.0, -(forth - back) / 2.0);
+        let mut posed = self.map(|l, u| multiply(u, unit(angle + l * start)));
+        if posed.harmonic(2)[0] < 0.0 {
+            // Half a turn of pose and start: (−1)^{l+1}.
+            let centre = self.harmonics();
+            for (place, u) in posed.terms.iter_mut().enumerate() {
+                if place.abs_diff(centre).is_multiple_of(2) {
+                    *u = [-u[0], -u[1]];
+                }
+            }
+        }
+        let centre = self.harmonics();
+        for place in [centre - 1, centre + 1] {
+            // Real by construction: what is left in the imaginary part is rounding.
+            posed.terms[place] = [modulus(self.terms[place]), 0.0];
+        }
+        posed
+    }
+
+    /// Turned about the origin by `rad`, from x towards y (clockwise on the screen): e^{iφ} uₗ.
+    #[must_use]
+    pub fn rotated(&self, rad: f64) -> Self {
+        let turn = unit(rad);
+        self.map(|_, u| multiply(u, turn))
+    }
+
+    /// Grown about the origin: s uₗ.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        self.map(|_, u| [factor * u[0], factor * u[1]])
+    }
+
+    /// Moved by `offset`: u₀ + offset.
+    #[must_use]
+    pub fn translated(&self, offset: Point) -> Self {
+        let mut moved = self.clone();
+        let centre = &mut moved.terms[self.harmonics()];
+        *centre = [centre[0] + offset[0], centre[1] + offset[1]];
+        moved
+    }
+
+    /// Started at parameter `fraction` of the curve instead of 0 (1 is once round): e^{i2πl·fraction} uₗ.
+    #[must_use]
+    pub fn shifted(&self, fraction: f64) -> Self {
+        self.map(|l, u| multiply(u, unit(core::f64::consts::TAU * l * fraction)))
+    }
+
+    /// Run through backwards from the same start: u₋ₗ. The area changes sign.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        Self {
+            terms: self.terms.iter().rev().copied().collect(),
+        }
+    }
+
+    /// The mirror image, y to −y: the conjugate of u₋ₗ. The area changes sign; [`Self::reversed`] restores it.
+    #[must_use]
+    pub fn reflected(&self) -> Self {
+        let mut mirrored = self.reversed();
+        for u in &mut mirrored.terms {
+            u[1] = -u[1];
+        }
+        mirrored
+    }
+
+    /// The terms with their l.
+    pub(crate) fn each(&self) -> impl Iterator<Item = (f64, Point)> + '_ {
+        let centre = count_as_f64(self.harmonics());
+        self.terms
+            .iter()
+            .enumerate()
+            .map(move |(place, &u)| (count_as_f64(place) - centre, u))
+    }
+
+    fn map(&self, change: impl Fn(f64, Point) -> Point) -> Self {
+        Self {
+            terms: self.each().map(|(l, u)| change(l, u)).collect(),
+        }
+    }
+
+    /// u₋ₕ … uₕ.
+    pub fn as_slice(&self) -> &[Point] {
+        &self.terms
+    }
+}
+
+impl TryFrom<Vec<Point>> for Descriptors {
+    type Error = Error;
+
+    fn try_from(terms: Vec<Point>) -> Result<Self, Error> {
+        Self::from_harmonics(terms)
+    }
+}
+
+impl From<Descriptors> for Vec<Point> {
+    fn from(descriptors: Descriptors) -> Self {
+        descriptors.terms
+    }
+}
+
+pub(crate) fn modulus(u: Point) -> f64 {
+    (u[0] * u[0] + u[1] * u[1]).sqrt()
+}

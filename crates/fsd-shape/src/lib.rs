@@ -1,0 +1,26 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+mod crossing;
+mod descriptors;
+mod dft;
+mod error;
+mod fit;
+mod model;
+mod outline;
+mod pca;
+mod roughness;
+mod sample;
+mod statistics;
+mod steps;
+mod trace;
+
+pub use crossing::self_intersects;
+pub use descriptors::Descriptors;
+pub use error::Error;
+pub use fit::{ShapeModelParams, Spread};
+pub use model::{Draw, ShapeModel};
+pub use outline::{Point, centroid, circularity, perimeter, resample, signed_area};
+pub use rand_core::Rng;
+pub use statistics::{PrincipalComponent, Residual, ShapeStatistics};
+pub use trace::trace;

@@ -1,0 +1,182 @@
+//! Closed polygons: length, area, roundness, and points at equal distances.
+
+/// A point or complex number: x right, y down, in pixels, pixel centres at integers.
+pub type Point = [f64; 2];
+
+/// How often [`resample`] corrects its spacing at most. Each pass shrinks the spread of the chords several times over;
+/// only needles narrower than one spacing are left after this many.
+const SPACING_PASSES: usize = 40;
+
+/// Spread of the chord lengths (standard deviation over mean) at which [`resample`] is content.
+const SPACING_SPREAD: f64 = 1e-4;
+
+/// Area enclosed, in px², positive if the outline runs clockwise on the screen (x right, y down), as [`crate::trace`] makes it.
+///
+/// ```
+/// assert_eq!(fsd_shape::signed_area(&[[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]), 12.0);
+/// ```
+pub fn signed_area(outline: &[Point]) -> f64 {
+    let Some(&origin) = outline.first() else {
+        return 0.0;
+    };
+    let twice: f64 = edges(outline)
+        .map(|(p, q)| cross(sub(p, origin), sub(q, origin)))
+        .sum();
+    twice / 2.0
+}
+
+/// Centre of gravity of the enclosed area; of an outline without area, the mean of its points; of none, the origin.
+pub fn centroid(outline: &[Point]) -> Point {
+    let Some(&origin) = outline.first() else {
+        return [0.0, 0.0];
+    };
+    let mut twice_area = 0.0;
+    let mut moment = [0.0, 0.0];
+    let mut sum = [0.0, 0.0];
+    for (p, q) in edges(outline) {
+        let (p, q) = (sub(p, origin), sub(q, origin));
+        let c = cross(p, q);
+        twice_area += c;
+        moment = [moment[0] + (p[0] + q[0]) * c, moment[1] + (p[1] + q[1]) * c];
+        sum = [sum[0] + p[0], sum[1] + p[1]];
+    }
+    // Three times twice the area: the centroid of the triangle (0, p, q) is a third of p + q.
+    let (sum, divisor) = if twice_area == 0.0 {
+        (sum, count_as_f64(outline.len()))
+    } else {
+        (moment, 3.0 * twice_area)
+    };
+    [origin[0] + sum[0] / divisor, origin[1] + sum[1] / divisor]
+}
+
+/// Length of the closed outline, in px.
+pub fn perimeter(outline: &[Point]) -> f64 {
+    edges(outline).map(|(p, q)| distance(p, q)).sum()
+}
+
+/// Isoperimetric quotient 4πA / P²: 1 for a circle, π/4 for a square, 0 for an outline without area or length.
+///
+/// It falls with every wiggle of the perimeter, so compare outlines of equal harmonics only.
+pub fn circularity(outline: &[Point]) -> f64 {
+    let length = perimeter(outline);
+    if length == 0.0 {
+        return 0.0;
+    }
+    4.0 * core::f64::consts::PI * signed_area(outline).abs() / (length * length)
+}
+
+/// `count` points on the outline at equal distances from each other, starting at its first point.
+///
+/// The points lie on the given polygon. First they are set at equal arc length, then moved along it until the chords between
+/// neighbours are equal too (spread below 0.1 %), which differs at corners. Where the polygon has needles
+/// narrower than the spacing this cannot be had, and the best found is returned. Fewer than two points are repeated.
+///
+/// ```
+/// let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+/// assert_eq!(fsd_shape::resample(&square, 8)[3], [2.0, 1.0]);
+/// ```
+pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
+    let Some(&first) = outline.first() else {
+        return Vec::new();
+    };
+    let mut arc = Vec::with_capacity(outline.len() + 1);
+    arc.push(0.0);
+    let mut length = 0.0;
+    for (p, q) in edges(outline) {
+        length += distance(p, q);
+        arc.push(length);
+    }
+    let usable = length > 0.0 && length.is_finite();
+    if !usable {
+        return vec![first; count];
+    }
+    let step = length / count_as_f64(count);
+    let mut places: Vec<f64> = (0..=count).map(|k| count_as_f64(k) * step).collect();
+    let mut points = Vec::with_capacity(count);
+    place(outline, &arc, &places[..count], &mut points);
+
+    let mut best = points.clone();
+    let mut best_spread = f64::INFINITY;
+    let mut chords = vec![0.0; count + 1];
+    for _ in 0..SPACING_PASSES {
+        let mut total = 0.0;
+        let mut squares = 0.0;
+        for (k, (p, q)) in edges(&points).enumerate() {
+            let chord = distance(p, q);
+            total += chord;
+            squares += chord * chord;
+            chords[k + 1] = total;
+        }
+        let mean = total / count_as_f64(count);
+        let spread = (squares / count_as_f64(count) / (mean * mean) - 1.0)
+            .max(0.0)
+            .sqrt();
+        if spread < best_spread {
+            best_spread = spread;
+            best.clone_from(&points);
+        }
+        if spread <= SPACING_SPREAD {
+            break;
+        }
+        // Arc length as a function of chord length, read at equal chords.
+        let mut moved = Vec::with_capacity(count + 1);
+        let mut k = 0;
+        for target in (0..count).map(|k| count_as_f64(k) * mean) {
+            while k + 1 < count && chords[k + 1] <= target {
+                k += 1;
+            }
+            let t = ratio(target - chords[k], chords[k + 1] - chords[k]);
+            moved.push(places[k] + t * (places[k + 1] - places[k]));
+        }
+        moved.push(length);
+        places = moved;
+        place(outline, &arc, &places[..count], &mut points);
+    }
+    best
+}
+
+/// Points of the polygon at ascending arc lengths `places`; `arc` holds the arc length at each vertex and at the end.
+fn place(outline: &[Point], arc: &[f64], places: &[f64], points: &mut Vec<Point>) {
+    points.clear();
+    let mut edge = 0;
+    for &s in places {
+        while edge + 1 < outline.len() && arc[edge + 1] <= s {
+            edge += 1;
+        }
+        let (p, q) = (outline[edge], outline[(edge + 1) % outline.len()]);
+        let t = ratio(s - arc[edge], arc[edge + 1] - arc[edge]);
+        points.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
+    }
+}
+
+/// Place of a part within a whole, 0..=1; 0 in a whole of no length.
+fn ratio(part: f64, whole: f64) -> f64 {
+    if whole > 0.0 {
+        (part / whole).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// The edges of the closed outline, the last one back to the start.
+pub(crate) fn edges(outline: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
+    let next = outline.iter().skip(1).chain(outline.first());
+    outline.iter().copied().zip(next.copied())
+}
+
+pub(crate) fn sub(p: Point, q: Point) -> Point {
+    [p[0] - q[0], p[1] - q[1]]
+}
+
+pub(crate) fn cross(p: Point, q: Point) -> f64 {
+    p[0] * q[1] - p[1] * q[0]
+}
+
+pub(crate) fn distance(p: Point, q: Point) -> f64 {
+    let d = sub(p, q);
+    (d[0] * d[0] + d[1] * d[1]).sqrt()
+}
+
+pub(crate) fn count_as_f64(count: usize) -> f64 {
+    count as f64
+}

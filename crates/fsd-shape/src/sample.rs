@@ -1,0 +1,228 @@
+//! Random numbers: uniform, normal, and normal bent to a given skewness and kurtosis.
+
+use rand_core::Rng;
+
+/// Uniform in 0..1, 53 bits.
+pub(crate) fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    (rng.next_u64() >> 11) as f64 * STEP
+}
+
+/// Standard normals in pairs by Marsaglia's polar method (doi:10.1137/1006063).
+pub(crate) struct Normals<'a, R: Rng + ?Sized> {
+    rng: &'a mut R,
+    spare: Option<f64>,
+}
+
+impl<'a, R: Rng + ?Sized> Normals<'a, R> {
+    pub(crate) fn new(rng: &'a mut R) -> Self {
+        Self { rng, spare: None }
+    }
+
+    pub(crate) fn draw(&mut self) -> f64 {
+        if let Some(spare) = self.spare.take() {
+            return spare;
+        }
+        loop {
+            let x = 2.0 * uniform(self.rng) - 1.0;
+            let y = 2.0 * uniform(self.rng) - 1.0;
+            let s = x * x + y * y;
+            if s > 0.0 && s < 1.0 {
+                let scale = (-2.0 * libm::log(s) / s).sqrt();
+                self.spare = Some(scale * y);
+                return scale * x;
+            }
+        }
+    }
+}
+
+/// Fleishman's polynomial −c + bz + cz² + dz³ of a standard normal z: mean 0, variance 1, and the skewness and excess
+/// kurtosis asked for (doi:10.1007/BF02293811).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bend {
+    b: f64,
+    c: f64,
+    d: f64,
+}
+
+/// Steps from the normal distribution to the moments asked for; each start lies so close to its solution that Newton's method finds it.
+const STEPS: u32 = 32;
+/// Newton steps at each.
+const NEWTON_STEPS: u32 = 8;
+/// Largest error of the moments accepted in the end.
+const TOLERANCE: f64 = 1e-8;
+
+impl Bend {
+    /// The least excess kurtosis this crate takes at a skewness. Fleishman's polynomials begin a little lower.
+    pub(crate) fn least_kurtosis(skewness: f64) -> f64 {
+        1.7 * skewness * skewness - 1.0
+    }
+
+    /// None if no polynomial has these moments.
+    pub(crate) fn new(skewness: f64, excess_kurtosis: f64) -> Option<Self> {
+        let mut p = [1.0, 0.0, 0.0];
+        for step in 1..=STEPS {
+            let t = f64::from(step) / f64::from(STEPS);
+            for _ in 0..NEWTON_STEPS {
+                let error = Self::errors(p, t * skewness, t * excess_kurtosis);
+                let change = solve(Self::jacobian(p), error)?;
+                for (value, by) in p.iter_mut().zip(change) {
+                    *value -= by;
+                }
+            }
+        }
+        let [b, c, d] = p;
+        let left = Self::errors(p, skewness, excess_kurtosis);
+        left.iter()
+            .all(|e| e.abs() < TOLERANCE)
+            .then_some(Self { b, c, d })
+    }
+
+    pub(crate) fn apply(self, z: f64) -> f64 {
+        ((self.d * z + self.c) * z + self.b) * z - self.c
+    }
+
+    /// Variance − 1, skewness and excess kurtosis of the polynomial, less those wanted.
+    fn errors([b, c, d]: [f64; 3], skewness: f64, kurtosis: f64) -> [f64; 3] {
+        [
+            b * b + 6.0 * b * d + 2.0 * c * c + 15.0 * d * d - 1.0,
+            2.0 * c * (b * b + 24.0 * b * d + 105.0 * d * d + 2.0) - skewness,
+            24.0 * (b * d
+                + c * c * (1.0 + b * b + 28.0 * b * d)
+                + d * d * (12.0 + 48.0 * b * d + 141.0 * c * c + 225.0 * d * d))
+                - kurtosis,
+        ]
+    }
+
+    fn jacobian([b, c, d]: [f64; 3]) -> [[f64; 3]; 3] {
+        [
+            [2.0 * b + 6.0 * d, 4.0 * c, 6.0 * b + 30.0 * d],
+            [
+                4.0 * c * (b + 12.0 * d),
+                2.0 * (b * b + 24.0 * b * d + 105.0 * d * d + 2.0),
+                2.0 * c * (24.0 * b + 210.0 * d),
+            ],
+            [
+                24.0 * (d + c * c * (2.0 * b + 28.0 * d) + 48.0 * d * d * d),
+                48.0 * (c * (1.0 + b * b + 28.0 * b * d) + 141.0 * c * d * d),
+                24.0 * (b
+                    + 28.0 * b * c * c
+                    + d * (24.0 + 144.0 * b * d + 282.0 * c * c + 900.0 * d * d)),
+            ],
+        ]
+    }
+}
+
+/// x with Mx = y, by Cramer's rule.
+fn solve(m: [[f64; 3]; 3], y: [f64; 3]) -> Option<[f64; 3]> {
+    let determinant = |m: [[f64; 3]; 3]| {
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+            - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+            + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    };
+    let whole = determinant(m);
+    let x = core::array::from_fn(|column| {
+        let mut replaced = m;
+        for (row, value) in replaced.iter_mut().zip(y) {
+            row[column] = value;
+        }
+        determinant(replaced) / whole
+    });
+    x.iter().all(|v: &f64| v.is_finite()).then_some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn moments(values: &[f64]) -> [f64; 4] {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let central = |k: usize| {
+            values
+                .iter()
+                .map(|v| [v - mean; 4][..k].iter().product::<f64>())
+                .sum::<f64>()
+                / n
+        };
+        let var = central(2);
+        [
+            mean,
+            var,
+            central(3) / (var * var.sqrt()),
+            central(4) / (var * var) - 3.0,
+        ]
+    }
+
+    #[test]
+    fn normals_have_normal_moments() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x40A1);
+        let mut normals = Normals::new(&mut rng);
+        let values: Vec<f64> = (0..200_000).map(|_| normals.draw()).collect();
+        let [mean, var, skew, kurtosis] = moments(&values);
+        let n = values.len() as f64;
+        // Standard errors of the four moments of a normal sample; bound 4.
+        assert!(mean.abs() < 4.0 * (1.0 / n).sqrt());
+        assert!((var - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
+        assert!(skew.abs() < 4.0 * (6.0 / n).sqrt());
+        assert!(kurtosis.abs() < 4.0 * (24.0 / n).sqrt());
+    }
+
+    #[test]
+    fn uniforms_fill_the_unit_interval() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0F0);
+        let values: Vec<f64> = (0..100_000).map(|_| uniform(&mut rng)).collect();
+        assert!(values.iter().all(|v| (0.0..1.0).contains(v)));
+        let [mean, var, ..] = moments(&values);
+        assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / 1e5_f64).sqrt());
+        assert!((var - 1.0 / 12.0).abs() < 4.0 * (1.0 / 180.0 / 1e5_f64).sqrt());
+    }
+
+    #[test]
+    fn no_moments_to_bend_to_leave_the_normal_alone() {
+        let bend = Bend::new(0.0, 0.0).unwrap();
+        assert_eq!(bend.apply(1.25), 1.25);
+    }
+
+    #[test]
+    fn bent_normals_have_the_moments_asked_for() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xBE4D);
+        for (skewness, kurtosis) in [
+            (-1.5, 3.4),
+            (1.6, 7.0),
+            (0.0, 5.0),
+            (0.6, -0.3),
+            (0.0, -1.0),
+        ] {
+            let bend = Bend::new(skewness, kurtosis).unwrap();
+            let mut normals = Normals::new(&mut rng);
+            let values: Vec<f64> = (0..400_000).map(|_| bend.apply(normals.draw())).collect();
+            let [mean, var, skew, excess] = moments(&values);
+            assert!(mean.abs() < 4.0 / 400_000_f64.sqrt());
+            assert!((var - 1.0).abs() < 0.03, "{var}");
+            assert!((skew - skewness).abs() < 0.1, "{skew} for {skewness}");
+            assert!(
+                (excess - kurtosis).abs() < 0.15 * (1.0 + kurtosis.abs()),
+                "{excess} for {kurtosis}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_accepted_pair_of_moments_has_a_polynomial() {
+        for s in -8..=8 {
+            let skewness = f64::from(s) / 4.0;
+            let least = Bend::least_kurtosis(skewness);
+            for k in 0..=20 {
+                let kurtosis = least + (12.0 - least) * f64::from(k) / 20.0;
+                assert!(
+                    Bend::new(skewness, kurtosis).is_some(),
+                    "{skewness} {kurtosis}"
+                );
+            }
+        }
+        assert!(Bend::new(3.0, 0.0).is_none());
+    }
+}

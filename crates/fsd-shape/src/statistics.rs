@@ -1,0 +1,231 @@
+//! What a shape model knows: numbers about a population of outlines, none of the outlines.
+
+use crate::Error;
+use crate::outline::count_as_f64;
+use crate::sample::Bend;
+use crate::steps;
+
+/// Most harmonics accepted; far more than any outline holds, a guard against nonsense in files.
+const MOST_HARMONICS: usize = 4096;
+
+/// Statistics of a population of outlines in terms of their normalised descriptors (Eq. 3), enough to draw new ones.
+///
+/// A shape is a vector of *coordinates*, Re u₋ₕ, Im u₋ₕ, …, Re uₕ, Im uₕ without u₀: four times `harmonics` numbers in
+/// units of |u₁|. It is drawn as
+///
+/// ```text
+/// x = mean + R · (Σ scoreₖ · loadingₖ + residual_sd · normal)
+/// ```
+///
+/// (if the residual is by steps, the residual's sum is turned back into descriptors first) with scores of mean 0, variance 1 and the component's skewness and kurtosis, and R the roughness: a factor for each shape, of mean square 1,
+/// upon |l| ≥ 2, and a random modulation along the outline, upon the fine detail |l| > harmonics / 5.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ShapeStatistics {
+    /// Highest |l|, 1..=4096.
+    pub harmonics: usize,
+    /// Number of outlines these statistics were taken from; for information.
+    pub outlines: usize,
+    /// Mean of ln |u₁|, |u₁| in px.
+    pub ln_radius_mean: f64,
+    /// Standard deviation of ln |u₁|, >= 0.
+    pub ln_radius_sd: f64,
+    /// Mean of the coordinates.
+    pub mean: Vec<f64>,
+    /// Directions in which the coordinates vary together, by falling variance; none in the paper's model.
+    pub components: Vec<PrincipalComponent>,
+    /// What the residual is independent in.
+    pub residual: Residual,
+    /// Standard deviation of what each coordinate does on its own, >= 0.
+    pub residual_sd: Vec<f64>,
+    /// Standard deviation of the logarithm of the roughness factor of a shape, 0..=1.
+    pub roughness_sd: f64,
+    /// Standard deviation of the modulation of roughness along an outline, relative to its mean, 0..=1.
+    pub local_roughness: f64,
+}
+
+/// The coordinates in which the residual of a shape is independent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Residual {
+    /// The descriptors: the paper's way.
+    Descriptors,
+    /// Steps along the outline: in place of u₁₊ₘ stands the m-th harmonic of the direction of the steps, in place of u₁₋ₘ that of their
+    /// length, for 3 ≤ m < harmonics. The points of a real outline lie at equal steps, so the second is small; with independent
+    /// descriptors it would be as large as the first.
+    Steps,
+}
+
+/// A direction in which the coordinates of a shape vary together.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct PrincipalComponent {
+    /// One standard deviation of it, in coordinates.
+    pub loading: Vec<f64>,
+    /// Skewness of its score, -2..=2.
+    pub skewness: f64,
+    /// Excess kurtosis of its score, from 1.7 skewness² - 1 to 12.
+    pub excess_kurtosis: f64,
+}
+
+impl PrincipalComponent {
+    /// Largest |skewness| of a score.
+    pub(crate) const MOST_SKEWNESS: f64 = 2.0;
+    /// Largest excess kurtosis of a score.
+    pub(crate) const MOST_KURTOSIS: f64 = 12.0;
+
+    /// The bend of a normal that gives its score.
+    pub(crate) fn bend(&self) -> Option<Bend> {
+        let kurtosis = Bend::least_kurtosis(self.skewness)..=Self::MOST_KURTOSIS;
+        let possible =
+            self.skewness.abs() <= Self::MOST_SKEWNESS && kurtosis.contains(&self.excess_kurtosis);
+        possible
+            .then(|| Bend::new(self.skewness, self.excess_kurtosis))
+            .flatten()
+    }
+}
+
+impl ShapeStatistics {
+    /// The same statistics with every number rounded to `digits` significant decimal digits (1..=17), so that they print short.
+    ///
+    /// Five digits change drawn outlines by less than a thousandth of a pixel per 100 px of radius.
+    ///
+    /// # Errors
+    ///
+    /// If `digits` is 0 or above 17.
+    pub fn rounded(&self, digits: usize) -> Result<Self, Error> {
+        if !(1..=17).contains(&digits) {
+            return Err(Error::Parameter {
+                field: "digits",
+                value: count_as_f64(digits),
+                accepted: "1..=17",
+            });
+        }
+        let round = |v: f64| round_to(v, digits);
+        let all = |values: &[f64]| values.iter().map(|&v| round(v)).collect();
+        Ok(Self {
+            harmonics: self.harmonics,
+            outlines: self.outlines,
+            ln_radius_mean: round(self.ln_radius_mean),
+            ln_radius_sd: round(self.ln_radius_sd),
+            mean: all(&self.mean),
+            components: self
+                .components
+                .iter()
+                .map(|c| PrincipalComponent {
+                    loading: all(&c.loading),
+                    skewness: round(c.skewness),
+                    excess_kurtosis: round(c.excess_kurtosis),
+                })
+                .collect(),
+            residual: self.residual,
+            residual_sd: all(&self.residual_sd),
+            roughness_sd: round(self.roughness_sd),
+            local_roughness: round(self.local_roughness),
+        })
+    }
+
+    /// Number of coordinates of a shape.
+    pub(crate) fn coordinates(&self) -> usize {
+        4 * self.harmonics
+    }
+
+    /// Variance that the residual gives each coordinate.
+    pub(crate) fn residual_squares(&self) -> Vec<f64> {
+        let mut squares: Vec<f64> = self.residual_sd.iter().map(|sd| sd * sd).collect();
+        if self.residual == Residual::Steps {
+            steps::squares_from_steps(&mut squares);
+        }
+        squares
+    }
+
+    /// Mean square of each term u₋ₕ … uₕ of a shape.
+    pub(crate) fn powers(&self) -> Vec<f64> {
+        let mut squares = self.residual_squares();
+        for (square, m) in squares.iter_mut().zip(&self.mean) {
+            *square += m * m;
+        }
+        for component in &self.components {
+            for (square, v) in squares.iter_mut().zip(&component.loading) {
+                *square += v * v;
+            }
+        }
+        let mut powers: Vec<f64> = squares.chunks_exact(2).map(|c| c[0] + c[1]).collect();
+        powers.insert(self.harmonics, 0.0);
+        powers
+    }
+
+    /// Whether the numbers fit together.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
+            return wrong(
+                "harmonics",
+                format!("is {}; accepted: 1..={MOST_HARMONICS}", self.harmonics),
+            );
+        }
+        check_number("ln_radius_mean", self.ln_radius_mean, -100.0, 100.0)?;
+        check_number("ln_radius_sd", self.ln_radius_sd, 0.0, 10.0)?;
+        check_number("roughness_sd", self.roughness_sd, 0.0, 1.0)?;
+        check_number("local_roughness", self.local_roughness, 0.0, 1.0)?;
+        self.check_vector("mean", &self.mean, f64::MIN)?;
+        self.check_vector("residual_sd", &self.residual_sd, 0.0)?;
+        for (k, component) in self.components.iter().enumerate() {
+            self.check_vector("components.loading", &component.loading, f64::MIN)?;
+            if component.bend().is_none() {
+                return wrong(
+                    "components",
+                    format!(
+                        "number {k} has skewness {} and excess kurtosis {}; accepted: -2..=2 and from 1.7 skewness² - 1 to 12",
+                        component.skewness, component.excess_kurtosis
+                    ),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn check_vector(&self, field: &'static str, values: &[f64], least: f64) -> Result<(), Error> {
+        if values.len() != self.coordinates() {
+            let problem = format!(
+                "has {} numbers; {} harmonics need {}",
+                values.len(),
+                self.harmonics,
+                self.coordinates()
+            );
+            return wrong(field, problem);
+        }
+        values
+            .iter()
+            .try_for_each(|&v| check_number(field, v, least, f64::MAX))
+    }
+}
+
+fn check_number(field: &'static str, value: f64, least: f64, most: f64) -> Result<(), Error> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let least = if least == f64::MIN {
+        "any".to_owned()
+    } else {
+        least.to_string()
+    };
+    let most = if most == f64::MAX {
+        "finite".to_owned()
+    } else {
+        most.to_string()
+    };
+    wrong(field, format!("holds {value}; accepted: {least}..={most}"))
+}
+
+fn wrong(field: &'static str, problem: String) -> Result<(), Error> {
+    Err(Error::Statistics { field, problem })
+}
+
+/// The nearest number of so many decimal digits, by way of its decimal form: exact, and the same everywhere.
+fn round_to(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+}

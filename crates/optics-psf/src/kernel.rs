@@ -1,0 +1,198 @@
+/// Mass of the infinite kernel that lies beyond the last tap is below this: half a unit in the
+/// last place of a single-precision 1.
+const LOST_TAIL: f64 = 1e-7;
+
+/// The discrete normal distribution of exact variance: wₙ ∝ exp(-t n²), of all distributions on
+/// the lattice with that variance the one of greatest entropy.
+///
+/// t is solved so that ∑ n² wₙ = σ² over the taps that are kept.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Kernel {
+    /// w₀, w₁ … w_radius; w₋ₙ = wₙ.
+    taps: Vec<f64>,
+    /// The same for pixels. The centre takes the rounding of the others, so that a constant
+    /// survives to the last bit or two.
+    half: Vec<f32>,
+}
+
+impl Kernel {
+    /// `sigma` finite and >= 0.
+    pub(crate) fn new(sigma: f64) -> Self {
+        let variance = sigma * sigma;
+        // Narrower than this, the side taps vanish even in double precision.
+        if variance < f64::MIN_POSITIVE {
+            return Self::from_taps(vec![1.0]);
+        }
+        let wide = ample_radius(sigma);
+        let radius = radius_of(&normalised(exponent(variance, wide), wide));
+        Self::from_taps(normalised(exponent(variance, radius), radius))
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "pixels are single precision"
+    )]
+    fn from_taps(taps: Vec<f64>) -> Self {
+        let mut half: Vec<f32> = taps.iter().map(|&w| w as f32).collect();
+        let sides: f64 = half[1..].iter().map(|&w| 2.0 * f64::from(w)).sum();
+        half[0] = (1.0 - sides) as f32;
+        Self { taps, half }
+    }
+
+    pub(crate) fn radius(&self) -> usize {
+        self.taps.len() - 1
+    }
+
+    pub(crate) fn taps(&self) -> &[f64] {
+        &self.taps
+    }
+
+    pub(crate) fn half(&self) -> &[f32] {
+        &self.half
+    }
+}
+
+/// A radius at which the tail is far below `LOST_TAIL`: eight standard deviations, and one lattice
+/// step for the widths that are smaller than one.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "positive and, with the accepted widths, small"
+)]
+fn ample_radius(sigma: f64) -> usize {
+    2 + (8.0 * sigma).ceil() as usize
+}
+
+/// The smallest radius, at least 1, beyond which less than `LOST_TAIL` lies.
+fn radius_of(taps: &[f64]) -> usize {
+    let mut tail = 0.0;
+    let mut radius = taps.len() - 1;
+    while radius > 1 && tail + 2.0 * taps[radius] < LOST_TAIL {
+        tail += 2.0 * taps[radius];
+        radius -= 1;
+    }
+    radius
+}
+
+fn normalised(t: f64, radius: usize) -> Vec<f64> {
+    let mut taps: Vec<f64> = (0..=radius)
+        .map(|n| {
+            let n = n as f64;
+            libm::exp(-t * n * n)
+        })
+        .collect();
+    let sum = 1.0 + 2.0 * taps[1..].iter().rev().sum::<f64>();
+    taps.iter_mut().for_each(|w| *w /= sum);
+    taps
+}
+
+/// The t at which the taps up to `radius` have this variance, by Newton's method on its logarithm.
+fn exponent(variance: f64, radius: usize) -> f64 {
+    // Both ends are known: t = 1/(2σ²) for a wide kernel, and for a narrow one w₁ = exp(-t) = σ²/2.
+    let mut t = if variance > 0.36 {
+        0.5 / variance
+    } else {
+        libm::log(2.0 / variance)
+    };
+    // It takes three to five steps; the rest is a bound for the loop.
+    for _ in 0..50 {
+        let taps = normalised(t, radius);
+        let (mut second, mut fourth) = (0.0, 0.0);
+        for (n, w) in taps.iter().enumerate().rev() {
+            let square = (n * n) as f64;
+            second += 2.0 * square * w;
+            fourth += 2.0 * square * square * w;
+        }
+        // d ln(variance) / dt = -(m₄ - m₂²) / m₂
+        let step = libm::log(second / variance) * second / (fourth - second * second);
+        t += step;
+        if step.abs() <= 1e-15 * t {
+            break;
+        }
+    }
+    t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn variance(kernel: &Kernel) -> f64 {
+        let side = |(n, w): (usize, &f64)| 2.0 * (n * n) as f64 * w;
+        kernel.taps().iter().enumerate().rev().map(side).sum()
+    }
+
+    fn widths() -> impl Iterator<Item = f64> {
+        (0..600)
+            .map(|i| 1e-6 * libm::exp(0.03 * f64::from(i)))
+            .filter(|s| *s < 300.0)
+    }
+
+    #[test]
+    fn variance_is_exact_at_every_width() {
+        for sigma in [0.05, 0.2, 0.5, 0.6, 0.9, 1.0, 3.6, 20.0, 300.0]
+            .into_iter()
+            .chain(widths())
+        {
+            let error = variance(&Kernel::new(sigma)) / (sigma * sigma) - 1.0;
+            assert!(error.abs() < 1e-12, "sigma {sigma}: {error}");
+        }
+        assert_eq!(Kernel::new(0.0).taps(), [1.0]);
+        assert_eq!(Kernel::new(1e-200).taps(), [1.0]);
+    }
+
+    #[test]
+    fn taps_are_positive_falling_and_sum_to_one() {
+        for sigma in widths() {
+            let kernel = Kernel::new(sigma);
+            let taps = kernel.taps();
+            assert!(taps.iter().all(|&w| w > 0.0));
+            assert!(taps.windows(2).all(|w| w[0] > w[1]));
+            let sum = taps[0] + 2.0 * taps[1..].iter().sum::<f64>();
+            assert!((sum - 1.0).abs() < 1e-14, "sigma {sigma}: {sum}");
+            let single: f64 = kernel
+                .half()
+                .iter()
+                .skip(1)
+                .map(|&w| 2.0 * f64::from(w))
+                .sum();
+            assert!((single + f64::from(kernel.half()[0]) - 1.0).abs() < 3.1e-8);
+        }
+    }
+
+    #[test]
+    fn a_wide_kernel_is_the_sampled_normal_density() {
+        for sigma in [1.0, 1.5, 3.6, 20.0_f64] {
+            let ratio = {
+                let wide = ample_radius(sigma);
+                (0.5 / exponent(sigma * sigma, wide)).sqrt() / sigma
+            };
+            let bound = if sigma > 1.0 { 1e-8 } else { 1.1e-7 };
+            assert!((ratio - 1.0).abs() < bound, "sigma {sigma}: {ratio}");
+            for (n, w) in Kernel::new(sigma).taps().iter().enumerate() {
+                let z = n as f64 / sigma;
+                let density = 0.398_942_280_401_432_7 / sigma * libm::exp(-0.5 * z * z);
+                assert!((w - density).abs() < 1e-6 / sigma, "sigma {sigma}, tap {n}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_kernel_is_continuous_through_focus() {
+        // No tap moves by more than the width itself does, from in focus to far out of it.
+        let mut before = Kernel::new(0.0);
+        for i in 1..4000 {
+            let now = Kernel::new(0.002 * f64::from(i));
+            for n in 0..=now.radius() {
+                let tap = |k: &Kernel| k.taps().get(n).copied().unwrap_or(0.0);
+                let moved = (tap(&now) - tap(&before)).abs();
+                assert!(
+                    moved < 0.002,
+                    "sigma {}: tap {n} by {moved}",
+                    0.002 * f64::from(i)
+                );
+            }
+            before = now;
+        }
+    }
+}

@@ -1,0 +1,385 @@
+//! Laws of the Gaussian blur, and slow oracles beside the fast paths.
+
+use optics_psf::{Border, Error, Gaussian, Method, Scratch};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+const SEED: u64 = 0x0b1a_f0c5;
+const WIDTHS: [f64; 7] = [0.0, 0.05, 0.2, 0.5, 0.9, 3.6, 20.0];
+const BORDERS: [Border; 3] = [Border::Zero, Border::Reflect, Border::Replicate];
+
+fn direct(sigma_px: f64) -> Gaussian {
+    Gaussian::with_method(sigma_px, Method::Direct).unwrap()
+}
+
+fn noise(len: usize) -> Vec<f32> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    (0..len)
+        .map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0)
+        .collect()
+}
+
+fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f32::max)
+}
+
+fn transposed(image: &[f32], width: usize) -> Vec<f32> {
+    (0..width)
+        .flat_map(|x| image.iter().skip(x).step_by(width).copied())
+        .collect()
+}
+
+/// Two-dimensional convolution in double precision, one pixel after the other.
+fn oracle(image: &[f32], width: usize, border: Border, gaussian: &Gaussian) -> Vec<f64> {
+    let (w, h) = (width.cast_signed(), (image.len() / width).cast_signed());
+    let r = gaussian.radius().cast_signed();
+    let fold = |i: isize, n: isize| match border {
+        Border::Zero => Some(i).filter(|i| (0..n).contains(i)),
+        Border::Replicate => Some(i.clamp(0, n - 1)),
+        Border::Reflect => Some(i.rem_euclid(2 * n).min(2 * n - 1 - i.rem_euclid(2 * n))),
+    };
+    let tap = |i: isize| gaussian.taps()[i.unsigned_abs()];
+    let pixel = |x: isize, y: isize| f64::from(image[(y * w + x).cast_unsigned()]);
+    let at = |x, y| fold(x, w).zip(fold(y, h)).map_or(0.0, |(x, y)| pixel(x, y));
+    let row = |x, y| (-r..=r).map(|i| tap(i) * at(x + i, y)).sum::<f64>();
+    let sum = |x, y| (-r..=r).map(|j| tap(j) * row(x, y + j)).sum::<f64>();
+    (0..h)
+        .flat_map(|y| (0..w).map(move |x| (x, y)))
+        .map(|(x, y)| sum(x, y))
+        .collect()
+}
+
+#[test]
+fn direct_is_the_convolution() {
+    for (width, height) in [(1, 1), (1, 9), (7, 1), (5, 4), (33, 20), (150, 9), (19, 70)] {
+        let image = noise(width * height);
+        for sigma in [0.05, 0.5, 0.9, 2.3] {
+            let gaussian = direct(sigma);
+            for border in BORDERS {
+                let fast = gaussian.blur(&image, width, border);
+                let slow = oracle(&image, width, border, &gaussian);
+                let difference = |(a, b): (&f32, &f64)| (f64::from(*a) - b).abs();
+                let error = fast.iter().zip(&slow).map(difference).fold(0.0, f64::max);
+                assert!(
+                    error < 3e-7,
+                    "{width} x {height}, {sigma}, {border:?}: {error}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn in_focus_nothing_happens() {
+    let image = noise(200 * 30);
+    for border in BORDERS {
+        assert_eq!(direct(0.0).blur(&image, 200, border), image);
+    }
+    assert_eq!(direct(0.0).spread(&image, 200), (image, 0));
+}
+
+#[test]
+fn a_constant_survives() {
+    for sigma in WIDTHS {
+        for method in [Method::Direct, Method::Decimated, Method::Auto] {
+            let gaussian = Gaussian::with_method(sigma, method).unwrap();
+            for border in [Border::Reflect, Border::Replicate] {
+                let blurred = gaussian.blur(&vec![0.7; 61 * 47], 61, border);
+                let error = largest_difference(&blurred, &vec![0.7; 61 * 47]);
+                assert!(error < 4e-7, "{sigma}, {method:?}, {border:?}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_sum_is_conserved() {
+    let sum = |image: &[f32]| image.iter().copied().map(f64::from).sum::<f64>();
+    let image = noise(61 * 47);
+    for sigma in WIDTHS {
+        for method in [Method::Direct, Method::Decimated, Method::Auto] {
+            let gaussian = Gaussian::with_method(sigma, method).unwrap();
+            let spread = sum(&gaussian.spread(&image, 61).0) / sum(&image) - 1.0;
+            assert!(spread.abs() < 1e-6, "{sigma}, {method:?}: {spread}");
+        }
+        let reflected = sum(&direct(sigma).blur(&image, 61, Border::Reflect)) / sum(&image) - 1.0;
+        assert!(reflected.abs() < 3e-7, "{sigma}: {reflected}");
+    }
+}
+
+/// Variance along x of what a single pixel becomes, and of its mean the distance from that pixel.
+fn response(gaussian: &Gaussian, x: usize, y: usize) -> [f64; 2] {
+    let mut image = vec![0.0; 17 * 17];
+    image[y * 17 + x] = 1.0;
+    let (spread, margin) = gaussian.spread(&image, 17);
+    let wide = 17 + 2 * margin;
+    let moment = |p: i32| {
+        let weigh = |(i, v): (usize, &f32)| {
+            let d = (i % wide) as f64 - (x + margin) as f64;
+            f64::from(*v) * (0..p).fold(1.0, |m, _| m * d)
+        };
+        spread.iter().enumerate().map(weigh).sum::<f64>()
+    };
+    [moment(2) / moment(0), moment(1) / moment(0)]
+}
+
+#[test]
+fn the_impulse_response_has_the_variance_asked_for() {
+    for sigma in WIDTHS.into_iter().chain([0.01, 1.7, 8.0]) {
+        let [variance, mean] = response(&direct(sigma), 8, 8);
+        assert!(
+            (variance - sigma * sigma).abs() <= 2e-6 * sigma * sigma,
+            "{sigma}: {variance}"
+        );
+        assert!(mean.abs() < 1e-6 * sigma.max(0.01), "{sigma}: {mean}");
+    }
+}
+
+#[test]
+fn decimated_keeps_the_variance_at_every_phase() {
+    for sigma in [3.6, 5.0, 12.0, 20.0, 33.3] {
+        let gaussian = Gaussian::with_method(sigma, Method::Decimated).unwrap();
+        for (x, y) in (0..17).map(|i| (i, 16 - i)) {
+            let [variance, mean] = response(&gaussian, x, y);
+            let error = variance / (sigma * sigma) - 1.0;
+            assert!(error.abs() < 2e-5, "{sigma} at {x}: {error}");
+            assert!(mean.abs() < 1e-5 * sigma, "{sigma} at {x}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn one_blur_after_the_other_is_the_blur_of_the_summed_variance() {
+    // Of a unit impulse, as a share of the highest pixel: small kernels on a lattice are not
+    // closed under convolution, wide ones are.
+    let widths = [
+        (0.1, 0.2, 2e-3),
+        (0.5, 0.5, 0.13),
+        (0.7, 0.9, 1e-2),
+        (0.9, 0.9, 1.4e-3),
+        (0.9, 1.2, 2e-4),
+        (1.5, 1.5, 1e-6),
+        (3.0, 4.0, 1e-6),
+    ];
+    for (a, b, bound) in widths {
+        let mut image = vec![0.0; 81 * 81];
+        image[40 * 81 + 40] = 1.0;
+        let twice = direct(a).blur(&direct(b).blur(&image, 81, Border::Zero), 81, Border::Zero);
+        let once = direct(f64::sqrt(a * a + b * b)).blur(&image, 81, Border::Zero);
+        let error = largest_difference(&once, &twice) / once[40 * 81 + 40];
+        assert!(error < bound, "{a} then {b}: {error}");
+    }
+}
+
+#[test]
+fn a_mirrored_image_gives_the_mirrored_blur() {
+    let (width, height) = (141, 75);
+    let image = noise(width * height);
+    let mirrored = |i: &[f32]| -> Vec<f32> {
+        i.chunks(width)
+            .flat_map(|r| r.iter().rev().copied())
+            .collect()
+    };
+    let flipped = |i: &[f32]| -> Vec<f32> { i.chunks(width).rev().flatten().copied().collect() };
+    for sigma in [0.3, 0.9, 3.6] {
+        for border in BORDERS {
+            let blur = |i: &[f32]| direct(sigma).blur(i, width, border);
+            let blurred = blur(&image);
+            assert_eq!(blur(&mirrored(&image)), mirrored(&blurred));
+            assert_eq!(blur(&flipped(&image)), flipped(&blurred));
+            let turned = direct(sigma).blur(&transposed(&image, width), height, border);
+            let error = largest_difference(&turned, &transposed(&blurred, width));
+            assert!(error < 3e-7, "{sigma}, {border:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_shifted_object_gives_the_shifted_blur() {
+    let (tile, wide) = (noise(40 * 40), 400);
+    let placed = |x: usize, y: usize| {
+        let mut image = vec![0.0; wide * 120];
+        for (j, row) in tile.chunks(40).enumerate() {
+            image[(y + j) * wide + x..][..40].copy_from_slice(row);
+        }
+        image
+    };
+    let cut = |image: &[f32], x: usize, y: usize| -> Vec<f32> {
+        image
+            .chunks(wide)
+            .skip(y - 30)
+            .take(100)
+            .flat_map(|r| r[x - 30..x + 70].to_vec())
+            .collect()
+    };
+    let blurred =
+        |gaussian: &Gaussian, x, y| cut(&gaussian.blur(&placed(x, y), wide, Border::Zero), x, y);
+    for (x, y) in [(31, 30), (77, 41), (203, 50), (330, 33)] {
+        let exact = direct(4.0);
+        assert_eq!(blurred(&exact, x, y), blurred(&exact, 30, 30));
+        let near = Gaussian::with_method(5.0, Method::Decimated).unwrap();
+        let error = largest_difference(&blurred(&near, x, y), &blurred(&near, 30, 30));
+        assert!(error < 2e-4, "at {x}, {y}: {error}");
+    }
+}
+
+#[test]
+fn an_object_spread_is_the_object_blurred_in_an_empty_frame() {
+    for (width, height) in [(3, 5), (50, 41), (130, 20)] {
+        let tile = noise(width * height);
+        for sigma in [0.05, 0.9, 3.6] {
+            let gaussian = direct(sigma);
+            let (spread, margin) = gaussian.spread(&tile, width);
+            let wide = width + 2 * margin;
+            let mut frame = vec![0.0; wide * (height + 2 * margin)];
+            for (j, row) in tile.chunks(width).enumerate() {
+                frame[(margin + j) * wide + margin..][..width].copy_from_slice(row);
+            }
+            assert_eq!(margin, gaussian.radius());
+            assert_eq!(spread, gaussian.blur(&frame, wide, Border::Zero));
+        }
+    }
+}
+
+/// White noise, a corner, a small disc and a smooth ramp, all from 0 to 1.
+fn phantoms(width: usize, height: usize) -> [Vec<f32>; 4] {
+    let image = |f: &dyn Fn(f32, f32) -> f32| -> Vec<f32> {
+        (0..width * height)
+            .map(|i| f((i % width) as f32, (i / width) as f32))
+            .collect()
+    };
+    let disc = |x: f32, y: f32| {
+        let (x, y) = (x - 140.3, y - 110.8);
+        (30.5 - (x * x + y * y).sqrt()).clamp(0.0, 1.0)
+    };
+    [
+        noise(width * height),
+        image(&|x, y| f32::from(u8::from(x > 123.0 && y > 77.0))),
+        image(&disc),
+        image(&|x, y| (x + y) / (width + height) as f32),
+    ]
+}
+
+#[test]
+fn decimated_agrees_with_direct() {
+    let (width, height) = (301, 219);
+    let images = phantoms(width, height);
+    let mut scratch = Scratch::new();
+    for (method, bound, widths) in [
+        (Method::Decimated, 1e-3, [3.5, 3.6, 4.3, 8.0]),
+        (Method::Auto, 2e-4, [4.72, 6.0, 9.6, 20.0]),
+    ] {
+        for sigma in widths {
+            let fast = Gaussian::with_method(sigma, method).unwrap();
+            for border in BORDERS {
+                for (i, image) in images.iter().enumerate() {
+                    let mut blurred = vec![0.0; image.len()];
+                    fast.blur_into(image, width, border, &mut blurred, &mut scratch);
+                    let exact = direct(sigma).blur(image, width, border);
+                    let error = largest_difference(&blurred, &exact);
+                    assert!(error < bound, "{sigma}, {border:?}, phantom {i}: {error}");
+                    assert_ne!(blurred, exact, "{sigma} was not decimated");
+                }
+            }
+            let (spread, _) = fast.spread(&images[2], width);
+            let error = largest_difference(&spread, &direct(sigma).spread(&images[2], width).0);
+            assert!(error < bound, "{sigma}, spread: {error}");
+        }
+    }
+}
+
+#[test]
+fn narrow_kernels_are_never_decimated() {
+    let image = noise(100 * 80);
+    for (method, sigma) in [(Method::Decimated, 3.49), (Method::Auto, 4.71)] {
+        let gaussian = Gaussian::with_method(sigma, method).unwrap();
+        let exact = direct(sigma).blur(&image, 100, Border::Reflect);
+        assert_eq!(gaussian.blur(&image, 100, Border::Reflect), exact);
+    }
+    assert_eq!(
+        Gaussian::new(9.0).unwrap(),
+        Gaussian::with_method(9.0, Method::default()).unwrap()
+    );
+}
+
+#[test]
+fn scratch_carries_nothing_from_call_to_call() {
+    let mut scratch = Scratch::new();
+    for (width, height, sigma) in [
+        (300, 200, 20.0),
+        (40, 30, 3.6),
+        (131, 90, 9.9),
+        (7, 5, 0.9),
+        (90, 90, 30.0),
+    ] {
+        let image = noise(width * height);
+        let gaussian = Gaussian::new(sigma).unwrap();
+        for border in BORDERS {
+            let mut reused = vec![f32::NAN; image.len()];
+            gaussian.blur_into(&image, width, border, &mut reused, &mut scratch);
+            assert_eq!(reused, gaussian.blur(&image, width, border));
+        }
+    }
+}
+
+#[test]
+fn impossible_widths_are_refused() {
+    for bad in [-0.1, f64::NAN, f64::INFINITY, 4097.0] {
+        let error = Gaussian::new(bad).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                Error::OutOfRange {
+                    field: "sigma_px",
+                    ..
+                }
+            ),
+            "{error}"
+        );
+        assert!(error.to_string().contains("from 0 to 4096"), "{error}");
+    }
+    assert_eq!(Gaussian::new(3.0).unwrap().sigma_px(), 3.0);
+}
+
+#[test]
+#[should_panic(expected = "not whole rows")]
+fn a_ragged_image_is_a_mistake() {
+    let _ = direct(1.0).blur(&[0.0; 10], 3, Border::Zero);
+}
+
+#[test]
+#[should_panic(expected = "dst has the wrong number of pixels")]
+fn a_short_destination_is_a_mistake() {
+    direct(1.0).blur_into(
+        &[0.0; 9],
+        3,
+        Border::Zero,
+        &mut [0.0; 6],
+        &mut Scratch::new(),
+    );
+}
+
+/// The same bytes on every machine, whatever its vector instructions.
+#[test]
+fn bits_are_pinned() {
+    let image = noise(211 * 97);
+    let hashes = [0.9, 3.6, 5.0, 20.0].map(|sigma| {
+        let blurred = Gaussian::new(sigma)
+            .unwrap()
+            .blur(&image, 211, Border::Reflect);
+        blurred.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, v| {
+            (h ^ u64::from(v.to_bits())).wrapping_mul(0x100_0000_01b3)
+        })
+    });
+    let pinned = [
+        0xaa80_296c_a49d_52eb,
+        0x5a29_9a94_bf88_4933,
+        0xc960_a6ca_b341_8c0d,
+        0xee8f_a659_c3b6_b29d,
+    ];
+    assert_eq!(hashes, pinned);
+}

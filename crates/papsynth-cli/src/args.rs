@@ -1,0 +1,329 @@
+//! What can be typed.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{ArgGroup, Args, Parser, Subcommand};
+use papsynth::recipe::Preset;
+
+/// Synthetic bright-field images of cervical smears, with exact truth.
+#[derive(Debug, Parser)]
+#[command(name = "papsynth", version, max_term_width = 100, after_help = "\
+Examples:
+  papsynth generate --out fields --frames 8            eight labelled fields of the default recipe
+  papsynth init --preset dense --out dense.toml        a commented recipe to change
+  papsynth preview dense.toml                          one field beside its truth
+  papsynth generate dense.toml --out dense --frames 100
+
+Exit codes: 0 done; 2 usage, recipe or input (trying again will not help); 74 input/output (it may);
+130 interrupted (run the same command again to go on).")]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) verb: Verb,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Verb {
+    Init(Init),
+    Generate(Generate),
+    Preview(Preview),
+    Learn(Learn),
+    Inspect(Inspect),
+    Schema(SchemaArgs),
+    Completions(Completions),
+}
+
+/// Print a commented recipe to start from.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth init > my.toml
+  papsynth init --preset high-grade --out my.toml
+  papsynth init --list")]
+pub(crate) struct Init {
+    /// The recipe to print
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
+    pub(crate) preset: Preset,
+    /// Write to this new file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// List the presets
+    #[arg(long, conflicts_with_all = ["preset", "out"])]
+    pub(crate) list: bool,
+}
+
+/// What a recipe is made of.
+#[derive(Debug, Args)]
+pub(crate) struct RecipeArgs {
+    /// Recipe in TOML, as `papsynth init` prints it; `-` reads standard input [default: the preset `lbc`]
+    #[arg(value_name = "RECIPE")]
+    pub(crate) recipe: Option<PathBuf>,
+    /// A built-in recipe instead of a file
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), conflicts_with = "recipe")]
+    pub(crate) preset: Option<Preset>,
+    /// Set one field over the recipe; repeatable, the last one wins
+    #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
+    pub(crate) set: Vec<String>,
+}
+
+/// What an engine is made of.
+#[derive(Debug, Args)]
+pub(crate) struct EngineArgs {
+    #[command(flatten)]
+    pub(crate) recipe: RecipeArgs,
+    /// Model that `papsynth learn` wrote [default: the one that ships]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Seed of the whole data set
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Threads to work with; the bytes are the same with any number [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+}
+
+impl EngineArgs {
+    /// Threads to work with.
+    pub(crate) fn threads(&self) -> usize {
+        match self.threads {
+            Some(threads) => usize::from(threads),
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+}
+
+/// Make images and their truth.
+///
+/// The same recipe, model and seed give the same bytes, whatever the number of threads and however the frames are
+/// split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
+Examples:
+  papsynth generate --out fields --frames 8
+  papsynth generate my.toml --out fields --frames 1000 --seed 7
+  papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
+  papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
+  papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
+pub(crate) struct Generate {
+    #[command(flatten)]
+    pub(crate) engine: EngineArgs,
+    /// Folder of the data set: new, empty, or one that this command began
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Number of frames: those with index 0 to N − 1
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) frames: Option<u64>,
+    /// Indices of the frames, from A up to but without B
+    #[arg(long, value_name = "A..B", value_parser = parse_range)]
+    pub(crate) range: Option<Range<u64>>,
+    /// Say nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    pub(crate) quiet: bool,
+    /// Say everything as JSON, one object a line, on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Generate {
+    /// Indices of the frames that are asked for.
+    pub(crate) fn indices(&self) -> Range<u64> {
+        self.range.clone().unwrap_or(0..self.frames.unwrap_or(1))
+    }
+}
+
+/// Make one field and show it beside its truth.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth preview
+  papsynth preview my.toml --out my.png --set background.level=0.8
+  papsynth preview --preset inflamed --index 3")]
+pub(crate) struct Preview {
+    #[command(flatten)]
+    pub(crate) engine: EngineArgs,
+    /// Picture to write, replacing an older one
+    #[arg(long, value_name = "FILE", default_value = "preview.png")]
+    pub(crate) out: PathBuf,
+    /// Which frame of the data set
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) index: u64,
+}
+
+/// Learn what cells of a class are like, from real material.
+///
+/// Reads nuclei with their masks, and cytoplasm as outlines or label images, and writes one model file for
+/// `papsynth generate --model`. What is not given is kept as the base model has it.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("material").required(true).multiple(true)
+    .args(["nuclei", "nucleus_outlines", "outlines", "labels"]), after_help = "\
+Examples:
+  papsynth learn --class intermediate --nuclei nuclei --outlines cells.csv --pixel-um 0.25 --out mine.json
+  papsynth learn --class high-grade --nuclei hsil/crops --masks hsil/masks --pixel-um 0.25 \\
+      --base mine.json --numbers-only --out mine.json
+  papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 --out mine.json
+
+Images are PNG or TIFF in grey; a mask or label image is 0 outside. An outline file is CSV with the columns
+outline, k, x_px, y_px: name of the outline, number of its point from 0, and its place in pixels.")]
+pub(crate) struct Learn {
+    /// Class that is learned: new, or one of the base model's to learn anew
+    #[arg(long, value_name = "NAME", value_parser = parse_class)]
+    pub(crate) class: String,
+    /// Folder of nuclei: `images` and `masks` in it hold files of the same names
+    #[arg(long, value_name = "DIR")]
+    pub(crate) nuclei: Option<PathBuf>,
+    /// Folder of the masks, where they are elsewhere; then `--nuclei` holds the images themselves
+    #[arg(long, value_name = "DIR", requires = "nuclei")]
+    pub(crate) masks: Option<PathBuf>,
+    /// Outlines of nuclei, instead of those of their masks
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) nucleus_outlines: Option<PathBuf>,
+    /// Outlines of whole cells
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "labels")]
+    pub(crate) outlines: Option<PathBuf>,
+    /// Folder of label images of whole cells; those at an image's border are left out
+    #[arg(long, value_name = "DIR")]
+    pub(crate) labels: Option<PathBuf>,
+    /// Size of a pixel of all of them, in micrometres
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
+    pub(crate) pixel_um: f64,
+    /// Class of the base model to take after in what the material does not show [default: the class itself]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) like: Option<String>,
+    /// Category of the Bethesda system, such as NILM or HSIL [default: that of the class it takes after]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) bethesda: Option<String>,
+    /// Where the material came from, for the record [default: the names of the files]
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) source: Option<String>,
+    /// Model to learn into [default: the one that ships]
+    #[arg(long, value_name = "MODEL")]
+    pub(crate) base: Option<PathBuf>,
+    /// Keep means, covariances and spectra alone, and no pixels
+    #[arg(long)]
+    pub(crate) numbers_only: bool,
+    /// Model file to write, replacing an older one
+    #[arg(long, value_name = "MODEL.json")]
+    pub(crate) out: PathBuf,
+}
+
+/// Show what is in a data set.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth inspect fields
+  papsynth inspect fields --verify
+  papsynth inspect fields --json")]
+pub(crate) struct Inspect {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    pub(crate) dir: PathBuf,
+    /// Read every file and compare its SHA-256, instead of its size alone
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// As JSON instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Print the JSON schema of recipes.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  papsynth schema > papsynth-recipe.schema.json")]
+pub(crate) struct SchemaArgs {}
+
+/// Print what makes a shell complete papsynth's words.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth completions bash > ~/.local/share/bash-completion/completions/papsynth
+  papsynth completions zsh > ~/.zfunc/_papsynth")]
+pub(crate) struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// Names of presets, each with what it shows.
+fn preset_parser() -> impl TypedValueParser<Value = Preset> {
+    let names = Preset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.summary()));
+    PossibleValuesParser::new(names)
+        .try_map(|name| Preset::by_name(&name).ok_or_else(|| format!("there is no preset `{name}`")))
+}
+
+fn parse_range(text: &str) -> Result<Range<u64>, String> {
+    let expected = "expected A..B with whole numbers A < B, such as 0..100";
+    let (from, to) = text.split_once("..").ok_or(expected)?;
+    let number = |part: &str| part.trim().parse::<u64>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    let range = number(from)?..number(to)?;
+    if range.is_empty() {
+        return Err(format!("no frame lies in it; {expected}"));
+    }
+    Ok(range)
+}
+
+/// A name that can stand in a recipe without quotes.
+fn parse_class(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match !text.is_empty() && text.chars().all(plain) {
+        true => Ok(text.to_owned()),
+        false => Err("expected letters, digits, `-` and `_`".to_owned()),
+    }
+}
+
+fn parse_pixel(text: &str) -> Result<f64, String> {
+    /// What a recipe's `field.pixel_um` may be as well.
+    const ALLOWED: std::ops::RangeInclusive<f64> = 0.05..=4.0;
+    match text.parse() {
+        Ok(value) if ALLOWED.contains(&value) => Ok(value),
+        _ => Err(format!("expected {} to {} micrometres", ALLOWED.start(), ALLOWED.end())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_is_sound_and_every_verb_shows_an_example() {
+        let mut command = Cli::command();
+        command.build();
+        command.clone().debug_assert();
+        for verb in command.get_subcommands().filter(|verb| verb.get_name() != "help") {
+            let help = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(help.contains(&format!("papsynth {}", verb.get_name())), "{}", verb.get_name());
+        }
+    }
+
+    #[test]
+    fn ranges_are_read() {
+        assert_eq!(parse_range("3..7"), Ok(3..7));
+        for bad in ["3", "7..3", "3..3", "a..b", "-1..3", "1..", "..4", "0..99999999999999999999999"] {
+            assert!(parse_range(bad).unwrap_err().contains("A..B"), "{bad}");
+        }
+    }
+
+    #[test]
+    fn pixel_sizes_are_bounded() {
+        assert_eq!(parse_pixel("0.25"), Ok(0.25));
+        for bad in ["0", "-1", "nan", "inf", "1e400", "x", "5"] {
+            assert!(parse_pixel(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn frames_or_a_range_not_both_and_not_neither() {
+        let parse = |words: &str| Cli::try_parse_from(words.split(' '));
+        assert!(parse("papsynth generate --out x").is_err());
+        assert!(parse("papsynth generate --out x --frames 2 --range 0..2").is_err());
+        assert!(parse("papsynth generate --out x --frames 0").is_err());
+        assert!(parse("papsynth generate r.toml --preset lbc --out x --frames 1").is_err());
+        let Verb::Generate(generate) = parse("papsynth generate --out x --range 3..5").unwrap().verb else {
+            unreachable!()
+        };
+        assert_eq!(generate.indices(), 3..5);
+    }
+}

@@ -1,0 +1,44 @@
+//! `papsynth generate`: frames and their truth.
+
+use papsynth::Threads;
+use papsynth::key::Key;
+use papsynth_dataset::{Dataset, DatasetInfo, Error, Run};
+
+use crate::args::Generate;
+use crate::exit::{Complaint, Failure};
+use crate::interrupt::Interrupt;
+use crate::report::{Progress, Start};
+use crate::setup::Setup;
+
+pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
+    let setup = Setup::load(&args.engine)?;
+    let seed = args.engine.seed;
+    let frames = args.indices();
+    let count = frames.end - frames.start;
+    // A slide that cannot be drawn is found out before anything is written.
+    setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
+
+    let interrupt = Interrupt::watch()?;
+    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed };
+    let dataset = Dataset::create_or_resume(&args.out, &info)?;
+    // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
+    let (at_once, threads) = match usize::try_from(count) {
+        Ok(count) if count < setup.threads => (1, setup.threads_of_a_frame()),
+        _ => (setup.threads, Threads::One),
+    };
+    let progress = Progress::start(args, Start { dir: args.out.clone(), seed, frames: count, threads: setup.threads })?;
+    let run = Run { frames, at_once, threads, stop: interrupt.flag() };
+    let outcome = dataset.generate(&setup.engine, &run, &|step| progress.step(step));
+    progress.clear();
+    let outcome = outcome.map_err(|error| match error {
+        Error::Engine(error) => setup.recipe.refuse(&error),
+        other => other.into(),
+    })?;
+    if outcome.stopped {
+        let whole = outcome.kept + outcome.made;
+        let message = format!("stopped after {whole} of {count} frames; every file in {} is whole", args.out.display());
+        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
+    }
+    dataset.finish()?;
+    progress.done(&outcome)
+}

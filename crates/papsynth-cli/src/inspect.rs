@@ -1,0 +1,111 @@
+//! `papsynth inspect`: what is in a data set.
+
+use std::fmt::Write;
+use std::ops::Range;
+
+use papsynth_dataset::{Check, Overview, inspect};
+
+use crate::args::Inspect;
+use crate::exit::{self, Complaint, Failure};
+
+pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
+    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let overview = inspect(&args.dir, check)?;
+    if args.json {
+        let text = serde_json::to_string_pretty(&overview).unwrap_or_default();
+        exit::print(&format!("{text}\n"))?;
+    } else {
+        exit::print(&table(&args.dir.display().to_string(), &overview))?;
+    }
+    match overview.defects.len() {
+        0 => Ok(()),
+        count => {
+            let frames = if count == 1 { "a frame is" } else { "frames are" };
+            let message = if count == 1 { frames.to_owned() } else { format!("{count} {frames}") };
+            let help = "the command that made the data set makes them again";
+            Err(Failure::input(Complaint::new(format!("{}: {message} damaged", args.dir.display())).help(help)))
+        }
+    }
+}
+
+/// Lines of the lists that are printed in full; the rest is counted.
+const MOST: usize = 10;
+
+fn table(dir: &str, overview: &Overview) -> String {
+    let identity = &overview.manifest.identity;
+    let mut out = String::new();
+    let mut row = |name: &str, value: &str| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{name:<12}{value}");
+    };
+    row("data set", dir);
+    row("written by", &overview.manifest.writer);
+    row("seed", &identity.seed.to_string());
+    row(
+        "versions",
+        &format!("recipe {}, model {}, stream {}", identity.recipe_version, identity.model_version, identity.stream_version),
+    );
+    row("frames", &overview.frames.to_string());
+    if !overview.missing.is_empty() {
+        row("missing", &listed(overview.missing.iter().map(shown)));
+    }
+    if overview.manifest.frames != overview.frames {
+        let known = overview.manifest.frames;
+        row("merged", &format!("{known} frames are in objects.csv and coco.json; `papsynth generate` merges the rest"));
+    }
+    for defect in overview.defects.iter().take(MOST) {
+        row("damaged", &format!("frame {}: {}", defect.index, defect.message));
+    }
+    if overview.frames > 0 {
+        let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));
+        let bits = listed(overview.bits.iter().map(|bits| format!("{bits} bits")));
+        let planes = listed(overview.planes.iter().map(|n| format!("{n} {}", if *n == 1 { "plane" } else { "planes" })));
+        let [least, most] = overview.pixel_um;
+        let pixel = if least == most { format!("{least}") } else { format!("{least} to {most}") };
+        row("images", &format!("{sizes}; {pixel} um a pixel; {bits}; {planes}"));
+        row("on disk", &bytes(overview.bytes));
+        row("", "");
+        row("objects", &format!("{:<28}{:>10}{:>12}", "", "in all", "a frame"));
+        for (category, count) in &overview.objects {
+            row("", &format!("{category:<28}{count:>10}{:>12.1}", *count as f64 / overview.frames as f64));
+        }
+        row("", &format!("{:<28}{:>10}", "partly outside the image", overview.truncated));
+    }
+    out
+}
+
+fn shown(range: &Range<u64>) -> String {
+    if range.end - range.start == 1 { range.start.to_string() } else { format!("{}..{}", range.start, range.end) }
+}
+
+/// The first few of a list.
+fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
+    let more = items.len().saturating_sub(MOST);
+    let mut text = items.take(MOST).collect::<Vec<_>>().join(", ");
+    if more > 0 {
+        text.push_str(&format!(" and {more} more"));
+    }
+    text
+}
+
+fn bytes(count: u64) -> String {
+    const UNITS: [(u64, &str); 3] = [(1_000_000_000, "GB"), (1_000_000, "MB"), (1_000, "kB")];
+    match UNITS.into_iter().find(|(unit, _)| count >= *unit) {
+        Some((unit, name)) => format!("{:.1} {name}", count as f64 / unit as f64),
+        None => format!("{count} bytes"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_lists_are_readable() {
+        assert_eq!(bytes(999), "999 bytes");
+        assert_eq!(bytes(1_234_567), "1.2 MB");
+        assert_eq!(shown(&(3..4)), "3");
+        assert_eq!(shown(&(3..9)), "3..9");
+        assert!(listed((0..12).map(|n: u64| n.to_string()).collect::<Vec<_>>().into_iter()).ends_with("9 and 2 more"));
+    }
+}

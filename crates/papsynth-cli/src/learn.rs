@@ -1,0 +1,174 @@
+//! `papsynth learn`: files of real material in, a model file out.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
+use papsynth::model::Model;
+use papsynth_dataset::read::{
+    GreyImage, Limits, NucleusSample, components, read_label_map, read_nuclei, read_outlines,
+};
+use papsynth_dataset::{Error, write_file};
+
+use crate::args::Learn;
+use crate::exit::{self, Complaint, Failure};
+use crate::nearest::nearest;
+use crate::schema::quoted;
+use crate::setup::read_model;
+
+/// Points of an outline that is traced from a label image: ten for each of the 40 harmonics that are fitted.
+const TRACED_POINTS: usize = 400;
+
+/// Smallest region of a label image that is taken for a cell, µm²: less than the smallest nucleus.
+const SMALLEST_CELL_UM2: f64 = 20.0;
+
+pub(crate) fn run(args: &Learn) -> Result<(), Failure> {
+    let limits = Limits::default();
+    let base = read_model(args.base.as_deref())?;
+    let like = class_to_take_after(args, &base)?;
+    let nuclei = match &args.nuclei {
+        None => Vec::new(),
+        Some(folder) => nuclei(folder, args.masks.as_deref(), &limits)?,
+    };
+    let cells = match (&args.outlines, &args.labels) {
+        (Some(file), _) => outlines(file, &limits)?,
+        (None, Some(folder)) => traced(folder, args.pixel_um, &limits)?,
+        (None, None) => Vec::new(),
+    };
+    let nucleus_outlines = args.nucleus_outlines.as_deref().map_or(Ok(Vec::new()), |file| outlines(file, &limits))?;
+    let material = Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cells };
+    let params = LearnParams {
+        class: args.class.clone(),
+        like,
+        bethesda: args.bethesda.clone().unwrap_or_default(),
+        pixel_um: args.pixel_um,
+        source: args.source.clone().unwrap_or_else(|| source(args)),
+        donors: if args.numbers_only { Donors::NumbersOnly } else { Donors::Keep },
+    };
+    let model = learn(&base, &material, &params).map_err(|error| {
+        Failure::input(Complaint::new(error.to_string()))
+    })?;
+    write_file(&args.out, model.to_json().as_bytes())?;
+    let out = args.out.display();
+    exit::print(&format!(
+        "{out}: class `{}` from {} images and {} outlines of nuclei and {} outlines of cells\n\
+         Use it with: papsynth generate --model {out} --set 'cells.{}.count=10' ...\n",
+        args.class,
+        nuclei.len(),
+        nucleus_outlines.len(),
+        cells.len(),
+        args.class,
+    ))
+}
+
+/// What the material does not show is taken from a class of the base model: the same, or the one that was named.
+fn class_to_take_after(args: &Learn, base: &Model) -> Result<String, Failure> {
+    let wanted = args.like.as_ref().unwrap_or(&args.class);
+    if base.classes.contains_key(wanted) {
+        return Ok(wanted.clone());
+    }
+    let known = || base.classes.keys().map(String::as_str);
+    let message = format!("the base model has no class `{wanted}`");
+    let help = match (nearest(wanted, known()), &args.like) {
+        (Some(near), _) => format!("did you mean `{near}`? It has {}", quoted(known())),
+        (None, Some(_)) => format!("it has {}", quoted(known())),
+        (None, None) => format!(
+            "a new class takes after another in what its material does not show: name one with --like, of {}",
+            quoted(known())
+        ),
+    };
+    Err(Failure::input(Complaint::new(message).help(help)))
+}
+
+/// The names of files and folders, without where they lie on this machine.
+fn source(args: &Learn) -> String {
+    let given = [&args.nuclei, &args.nucleus_outlines, &args.outlines, &args.labels];
+    let names = given.into_iter().flatten().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy());
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// Nuclei of a folder with `images` and `masks` in it, or of two folders.
+fn nuclei(folder: &Path, masks: Option<&Path>, limits: &Limits) -> Result<Vec<NucleusImage>, Failure> {
+    let samples = match masks {
+        None => read_nuclei(folder, limits)?,
+        Some(masks) => pairs(folder, masks, limits)?,
+    };
+    Ok(samples
+        .into_iter()
+        .map(|sample| NucleusImage {
+            light: sample.image.fractions(),
+            width: sample.image.width,
+            name: sample.name,
+            mask: sample.mask,
+        })
+        .collect())
+}
+
+/// Images and masks of the same name, endings aside.
+fn pairs(images: &Path, masks: &Path, limits: &Limits) -> Result<Vec<NucleusSample>, Failure> {
+    let (images_found, masks_found) = (images_in(images)?, images_in(masks)?);
+    let lonely = |path: &Path, wanted: &str, folder: &Path| {
+        let message = format!("{}: has no {wanted} of the same name in {}", path.display(), folder.display());
+        Failure::input(Complaint::new(message))
+    };
+    if let Some((_, path)) = masks_found.iter().find(|(name, _)| !images_found.contains_key(*name)) {
+        return Err(lonely(path, "image", images));
+    }
+    let mut samples = Vec::new();
+    for (name, path) in &images_found {
+        let mask = masks_found.get(name).ok_or_else(|| lonely(path, "mask", masks))?;
+        let (image, labels) = (GreyImage::read(path, limits)?, read_label_map(mask, limits)?);
+        let sample = NucleusSample::new(name, image, &labels);
+        samples.push(sample.map_err(|problem| Error::Input { path: mask.clone(), problem })?);
+    }
+    Ok(samples)
+}
+
+fn outlines(file: &Path, limits: &Limits) -> Result<Vec<Vec<Point>>, Failure> {
+    Ok(read_outlines(file, limits)?.into_iter().map(|outline| outline.points).collect())
+}
+
+/// The outlines of all regions of label images that lie in them completely.
+fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point>>, Failure> {
+    let smallest_px = SMALLEST_CELL_UM2 / (pixel_um * pixel_um);
+    let mut outlines = Vec::new();
+    for path in images_in(folder)?.values() {
+        let refuse = |what: String| Failure::input(Complaint::new(format!("{}: {what}", path.display())));
+        let labels = read_label_map(path, limits)?;
+        let regions = components(&labels, limits).map_err(|problem| Error::Input { path: path.clone(), problem })?;
+        for region in regions.iter().filter(|r| !r.touches_border && r.mask.area() as f64 >= smallest_px) {
+            let (tile, width, _) = region.tile();
+            let outline = fsd_shape::trace(&tile, width, 0.5).map_err(|error| refuse(error.to_string()))?;
+            outlines.push(fsd_shape::resample(&outline, TRACED_POINTS));
+        }
+    }
+    if outlines.is_empty() {
+        let message = format!("{}: no region of its label images is a whole cell", folder.display());
+        let help = format!("expected regions of at least {SMALLEST_CELL_UM2} um2 that do not touch the border");
+        return Err(Failure::input(Complaint::new(message).help(help)));
+    }
+    Ok(outlines)
+}
+
+/// The PNG and TIFF files of a folder by their names without ending.
+fn images_in(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
+    let failed = |error: std::io::Error| Failure::file("read", folder, &error);
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).unwrap_or_default();
+        let Some(name) = path.file_stem().map(|name| name.to_string_lossy().into_owned()) else { continue };
+        if !["png", "tif", "tiff"].contains(&ending.as_str()) || name.starts_with('.') {
+            continue;
+        }
+        if let Some(other) = found.insert(name, path.clone()) {
+            let message = format!("{} and {} have the same name, apart from their endings", other.display(), path.display());
+            return Err(Failure::input(Complaint::new(message)));
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::input(Complaint::new(format!("{}: holds no PNG or TIFF file", folder.display()))));
+    }
+    Ok(found)
+}

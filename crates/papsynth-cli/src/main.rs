@@ -1,0 +1,69 @@
+#![doc = include_str!("../README.md")]
+
+mod args;
+mod diagnose;
+mod exit;
+mod generate;
+mod init;
+mod inspect;
+mod interrupt;
+mod learn;
+mod nearest;
+mod preview;
+mod recipe_file;
+mod report;
+mod schema;
+mod setup;
+mod text_file;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+
+use args::{Cli, Verb};
+use exit::Failure;
+
+fn main() -> ExitCode {
+    exit::install_reports();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version arrive here too, with code 0; a closed pipe is no failure.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { exit::Exit::Input.code() } else { 0 });
+        }
+    };
+    let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
+    match run(cli.verb) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            let code = failure.exit().code();
+            if json {
+                // Whoever reads JSON reads it to the end, or closed the pipe.
+                let _ = report::event(&failure.json());
+            } else {
+                failure.print();
+            }
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn run(verb: Verb) -> Result<(), Failure> {
+    match verb {
+        Verb::Init(args) => init::run(&args),
+        Verb::Generate(args) => generate::run(&args),
+        Verb::Preview(args) => preview::run(&args),
+        Verb::Learn(args) => learn::run(&args),
+        Verb::Inspect(args) => inspect::run(&args),
+        Verb::Schema(_) => {
+            let schema = papsynth::recipe::Recipe::schema();
+            exit::print(&format!("{schema:#}\n"))
+        }
+        Verb::Completions(args) => {
+            let mut script = Vec::new();
+            clap_complete::generate(args.shell, &mut Cli::command(), "papsynth", &mut script);
+            exit::print(&String::from_utf8_lossy(&script))
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! "Did you mean …?": the nearest of some words.
+
+/// The candidate that is most likely meant by a misspelt word, if any is near.
+pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    /// A word is near when at most one in this many of its letters has to change.
+    const LETTERS_PER_CHANGE: usize = 3;
+    let plain = fold(word);
+    let reach = (plain.len() / LETTERS_PER_CHANGE).max(1);
+    candidates
+        .into_iter()
+        .map(|candidate| (distance(&plain, &fold(candidate)), candidate))
+        .filter(|(changes, _)| *changes <= reach)
+        .min_by_key(|(changes, _)| *changes)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Case and the kind of dash do not count.
+fn fold(word: &str) -> Vec<char> {
+    /// Words longer than any name are cut: their distance to every name is beyond reach anyway.
+    const LONGEST: usize = 64;
+    word.chars().take(LONGEST).map(|c| if c == '-' { '_' } else { c.to_ascii_lowercase() }).collect()
+}
+
+/// Changes, insertions, deletions and swaps of neighbours that turn one word into the other (optimal string alignment).
+fn distance(a: &[char], b: &[char]) -> usize {
+    let mut before: Vec<usize> = Vec::new();
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let same = usize::from(a[i - 1] != b[j - 1]);
+            let mut best = (last[j - 1] + same).min(last[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(before[j - 2] + 1);
+            }
+            row.push(best);
+        }
+        before = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changes(a: &str, b: &str) -> usize {
+        distance(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn distances_as_by_hand() {
+        assert_eq!(changes("", ""), 0);
+        assert_eq!(changes("", "abc"), 3);
+        assert_eq!(changes("width_px", "widht_px"), 1);
+        assert_eq!(changes("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn only_near_words_are_offered() {
+        let keys = ["width_px", "height_px", "pixel_um"];
+        assert_eq!(nearest("widht_px", keys), Some("width_px"));
+        assert_eq!(nearest("Width-px", keys), Some("width_px"));
+        assert_eq!(nearest("colour", keys), None);
+        assert_eq!(nearest(&"x".repeat(100_000), keys), None);
+    }
+}

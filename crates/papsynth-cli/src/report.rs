@@ -1,0 +1,160 @@
+//! How far the work is: a bar on a terminal, lines elsewhere, JSON, or nothing.
+
+use std::io::{self, IsTerminal, Write};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use papsynth_dataset::{Outcome, Progress as Step};
+use serde_json::json;
+
+use crate::args::Generate;
+use crate::exit::{self, Failure};
+
+/// Lines that a run prints at most, however many frames it makes.
+const MOST_LINES: u64 = 100;
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Style {
+    Bar,
+    Lines,
+    Json,
+    Quiet,
+}
+
+/// What a run is about to do.
+#[derive(Debug)]
+pub(crate) struct Start {
+    /// Folder of the data set.
+    pub(crate) dir: PathBuf,
+    /// Seed of the data set.
+    pub(crate) seed: u64,
+    /// Frames that are asked for.
+    pub(crate) frames: u64,
+    /// Threads that work.
+    pub(crate) threads: usize,
+}
+
+/// Says how far a run is. Shared by all threads.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    style: Style,
+    start: Start,
+    /// It counts and estimates in every style, and is drawn in one.
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// Announces a run.
+    pub(crate) fn start(args: &Generate, start: Start) -> Result<Self, Failure> {
+        let style = match (args.quiet, args.json) {
+            (true, _) => Style::Quiet,
+            (_, true) => Style::Json,
+            _ if io::stderr().is_terminal() => Style::Bar,
+            _ => Style::Lines,
+        };
+        let target = if style == Style::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(start.frames), target);
+        let template = "{msg} [{bar:30}] {pos} of {len} frames, {elapsed} gone, about {eta} left";
+        let look = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.set_style(look.progress_chars("=> "));
+        bar.set_message(start.dir.display().to_string());
+        if style == Style::Json {
+            let Start { dir, seed, frames, threads } = &start;
+            event(&json!({ "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads }))?;
+        }
+        if style == Style::Bar {
+            bar.tick();
+            // Frames may take a while: the clock runs on between them.
+            bar.enable_steady_tick(Duration::from_secs(1));
+        }
+        Ok(Self { style, start, bar })
+    }
+
+    /// A frame is done, or was there. Whoever closed the stream that this is told on no longer wants to know.
+    pub(crate) fn step(&self, step: Step) {
+        let summary = match step {
+            // What is there already takes no time and says nothing about the time left.
+            Step::Kept(_) => return self.bar.dec_length(1),
+            Step::Made(summary) => summary,
+        };
+        self.bar.inc(1);
+        let (done, of) = (self.bar.position(), self.bar.length().unwrap_or_default());
+        let left_s = self.bar.eta().as_secs();
+        let (index, objects) = (summary.index, summary.objects.values().sum::<u64>());
+        match self.style {
+            Style::Json => {
+                let _ = event(&json!({
+                    "event": "frame", "index": index, "objects": summary.objects, "done": done, "of": of, "left_s": left_s,
+                }));
+            }
+            Style::Lines if is_told(done, of) => {
+                let left = if done < of { format!(", about {} left", duration(left_s)) } else { String::new() };
+                let _ = writeln!(io::stderr().lock(), "frame {index}: {objects} objects and parts ({done} of {of}{left})");
+            }
+            Style::Lines | Style::Bar | Style::Quiet => {}
+        }
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    /// Everything is done.
+    pub(crate) fn done(&self, outcome: &Outcome) -> Result<(), Failure> {
+        let (dir, Outcome { made, kept, .. }) = (&self.start.dir, outcome);
+        match self.style {
+            Style::Json => event(&json!({ "event": "done", "dir": dir, "made": made, "kept": kept })),
+            Style::Quiet => Ok(()),
+            Style::Bar | Style::Lines => {
+                let (dir, frames) = (dir.display(), if *made == 1 { "frame" } else { "frames" });
+                let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
+                exit::print(&format!("{dir}: {made} {frames} made{there}
+Look at: {dir}/contact-sheet.png
+"))
+            }
+        }
+    }
+}
+
+/// Whether a line is due: at most [`MOST_LINES`] in all, and the last frame always.
+fn is_told(done: u64, of: u64) -> bool {
+    let due = |done: u64| u128::from(done) * u128::from(MOST_LINES) / u128::from(of.max(1));
+    of <= MOST_LINES || due(done) > due(done.saturating_sub(1))
+}
+
+/// An object on a line of standard output.
+pub(crate) fn event(value: &serde_json::Value) -> Result<(), Failure> {
+    exit::print(&format!("{value}\n"))
+}
+
+fn duration(seconds: u64) -> String {
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m} min {s:02} s"),
+        (h, m, _) => format!("{h} h {m:02} min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_stay_few_and_the_last_frame_is_told() {
+        for of in [1, 7, 100, 101, 12_345, 1_000_000] {
+            let told = (1..=of).filter(|&done| is_told(done, of)).count();
+            assert!(told as u64 <= MOST_LINES && told as u64 >= MOST_LINES.min(of) / 2, "{of}: {told}");
+            assert!(is_told(of, of));
+        }
+    }
+
+    #[test]
+    fn durations_are_readable() {
+        assert_eq!(duration(9), "9 s");
+        assert_eq!(duration(69), "1 min 09 s");
+        assert_eq!(duration(3600 * 30 + 61), "30 h 01 min");
+    }
+}

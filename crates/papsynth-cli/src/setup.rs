@@ -1,0 +1,57 @@
+//! From the command line to an engine.
+
+use std::path::Path;
+
+use papsynth::model::Model;
+use papsynth::{Engine, Threads};
+use papsynth_dataset::read::{Limits, read_inputs};
+
+use crate::args::EngineArgs;
+use crate::exit::{Complaint, Failure};
+use crate::recipe_file::RecipeFile;
+use crate::text_file;
+
+/// Largest model that is read: it may hold the textures of thousands of nuclei.
+const LARGEST_MODEL: u64 = 1 << 28;
+
+/// All that frames are made from.
+#[derive(Debug)]
+pub(crate) struct Setup {
+    /// The recipe, and where it was written.
+    pub(crate) recipe: RecipeFile,
+    /// What cells are like.
+    pub(crate) model: Model,
+    /// Makes the frames.
+    pub(crate) engine: Engine,
+    /// Threads to work with.
+    pub(crate) threads: usize,
+}
+
+impl Setup {
+    pub(crate) fn load(args: &EngineArgs) -> Result<Self, Failure> {
+        let recipe = RecipeFile::load(&args.recipe)?;
+        let model = read_model(args.model.as_deref())?;
+        recipe.check_classes(&model)?;
+        let inputs = read_inputs(&recipe.recipe, &recipe.folder, &Limits::default())
+            .map_err(|error| Failure::dataset(&error, recipe.complaint("layout.path", error.to_string())))?;
+        let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
+        Ok(Self { recipe, model, engine, threads: args.threads() })
+    }
+
+    /// All threads for one frame.
+    pub(crate) fn threads_of_a_frame(&self) -> Threads {
+        if self.threads == 1 {
+            return Threads::One;
+        }
+        // It fails only if there is a pool already, and then that one is used: the bytes are the same.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
+        Threads::All
+    }
+}
+
+/// The model of a file, or the one that ships.
+pub(crate) fn read_model(path: Option<&Path>) -> Result<Model, Failure> {
+    let Some(path) = path else { return Ok(Model::builtin()) };
+    let (name, text) = text_file::read(path, LARGEST_MODEL, "a model, as `papsynth learn` writes it")?;
+    Model::from_json(&text).map_err(|error| Failure::input(Complaint::new(format!("{name}: {error}"))))
+}

@@ -1,0 +1,153 @@
+//! Running the program in a folder of its own.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader, BufWriter, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::SystemTime;
+
+/// A field that is made in a moment.
+pub const TINY: &str = "--set field.width_px=96 --set field.height_px=80 --set layout.kind=uniform \
+    --set cells.intermediate.count=2 --set cells.superficial.count=0 --set debris.leukocytes.clusters=1 \
+    --set debris.bacilli.clusters=1 --set debris.speckles.count=3 --set debris.out_of_focus.count=0";
+
+/// A folder that is removed afterwards.
+pub struct Bench {
+    root: PathBuf,
+}
+
+/// What a run of the program left.
+pub struct Outcome {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+impl Bench {
+    pub fn new(name: &str) -> Self {
+        let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&root);
+        fs::create_dir_all(&root).unwrap();
+        Self { root }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.root.join(name)
+    }
+
+    fn command(&self, words: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_papsynth"));
+        command.args(words.split_whitespace()).current_dir(&self.root).stdin(Stdio::null());
+        command.env_remove("NO_GRAPHICS").env_remove("FORCE_COLOR");
+        command
+    }
+
+    pub fn run(&self, words: &str) -> Outcome {
+        let output = self.command(words).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// A run that must succeed.
+    pub fn good(&self, words: &str) -> Outcome {
+        let outcome = self.run(words);
+        assert_eq!(outcome.code, 0, "papsynth {words}\n{}{}", outcome.out, outcome.err);
+        outcome
+    }
+
+    /// The exit code of a run whose standard output nobody reads.
+    pub fn run_into_closed_pipe(&self, words: &str) -> Option<i32> {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        self.command(words).stdout(writer).stderr(Stdio::null()).status().unwrap().code()
+    }
+
+    /// Interrupts a run as Ctrl-C does once it has said something.
+    #[cfg(unix)]
+    pub fn interrupt_after_first_line(&self, words: &str) -> Outcome {
+        let mut child = self.command(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut out = BufReader::new(child.stdout.take().unwrap());
+        let mut text = String::new();
+        // The start, and the first frame.
+        out.read_line(&mut text).unwrap();
+        out.read_line(&mut text).unwrap();
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(killed.success());
+        out.read_to_string(&mut text).unwrap();
+        let mut err = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
+        Outcome { code: child.wait().unwrap().code().unwrap_or(-1), out: text, err }
+    }
+
+    /// The content of every file below a folder, by its name.
+    pub fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
+        self.walk(folder).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect()
+    }
+
+    /// When every file below a folder was written.
+    pub fn times(&self, folder: &str) -> BTreeMap<String, SystemTime> {
+        self.walk(folder).into_iter().map(|(name, path)| (name, fs::metadata(path).unwrap().modified().unwrap())).collect()
+    }
+
+    fn walk(&self, folder: &str) -> Vec<(String, PathBuf)> {
+        let root = self.path(folder);
+        let (mut open, mut found) = (vec![root.clone()], Vec::new());
+        while let Some(folder) = open.pop() {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    open.push(path);
+                } else {
+                    let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+                    found.push((name, path));
+                }
+            }
+        }
+        found
+    }
+
+    /// Writes a grey PNG.
+    pub fn grey_png(&self, name: &str, width: u32, height: u32, grey: impl Fn(u32, u32) -> u8) {
+        let file = BufWriter::new(fs::File::create(self.path(name)).unwrap());
+        let mut encoder = png::Encoder::new(file, width, height);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Eight);
+        let pixels: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| grey(x, y)).collect();
+        encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.root);
+    }
+}
+
+/// Outlines as a table: circles with lobes, each a little different.
+pub fn outlines(count: usize, points: usize, radius_px: f64) -> String {
+    let mut text = String::from("outline,k,x_px,y_px\n");
+    for outline in 0..count {
+        for k in 0..points {
+            let angle = std::f64::consts::TAU * k as f64 / points as f64;
+            let lobes = 1.0
+                + 0.10 * sine(3.0 * angle + outline as f64)
+                + 0.05 * sine((2 + outline % 4) as f64 * angle);
+            let (x, y) = (sine(angle + std::f64::consts::FRAC_PI_2), sine(angle));
+            text.push_str(&format!("{outline},{k},{:.3},{:.3}\n", radius_px * lobes * x, radius_px * lobes * y));
+        }
+    }
+    text
+}
+
+/// A sine good to a thousandth of a pixel, by its series.
+fn sine(angle: f64) -> f64 {
+    let turns = (angle / std::f64::consts::TAU).round();
+    let x = angle - turns * std::f64::consts::TAU;
+    let (mut term, mut sum) = (x, x);
+    for n in 1..14 {
+        term *= -x * x / (f64::from(2 * n) * f64::from(2 * n + 1));
+        sum += term;
+    }
+    sum
+}

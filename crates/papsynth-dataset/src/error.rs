@@ -1,0 +1,193 @@
+//! What can go wrong, and whether trying again can help.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why files cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file given by the user cannot be used.
+    #[error("{}: {problem}", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: Problem,
+    },
+    /// The system refused to read or write.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried: "read", "write", ….
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The folder of a data set cannot be used.
+    #[error("{}: {message}", path.display())]
+    Folder {
+        /// The folder, or the file in it that stands in the way.
+        path: PathBuf,
+        /// What is wrong, and what would help.
+        message: String,
+    },
+    /// What was handed over to be written does not fit together.
+    #[error("frame {index}: {message}")]
+    Frame {
+        /// Index of the frame.
+        index: u64,
+        /// What does not fit.
+        message: String,
+    },
+    /// The engine cannot make a frame.
+    #[error(transparent)]
+    Engine(#[from] papsynth::Error),
+}
+
+impl Error {
+    /// Whether the system failed (full disk, no permission), so that trying again may help; everything else lies in
+    /// what was asked for.
+    #[must_use]
+    pub fn is_io(&self) -> bool {
+        matches!(self, Self::Io { .. })
+    }
+
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+
+    pub(crate) fn input(path: &Path) -> impl FnOnce(Problem) -> Self {
+        move |problem| Self::Input { path: path.to_owned(), problem }
+    }
+}
+
+/// What is wrong with a file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The file is not there, or is a folder.
+    #[error("there is no such {wanted}")]
+    Missing {
+        /// "file" or "folder".
+        wanted: &'static str,
+    },
+    /// The file is of another format.
+    #[error("is neither a PNG nor a TIFF file")]
+    Format,
+    /// The file ends before its image does.
+    #[error("the {format} file is truncated: it ends before its image does")]
+    Truncated {
+        /// "PNG" or "TIFF".
+        format: &'static str,
+    },
+    /// The file does not follow its format.
+    #[error("the {format} file cannot be decoded: {message}")]
+    Broken {
+        /// "PNG", "TIFF", "CSV", ….
+        format: &'static str,
+        /// What the decoder said.
+        message: String,
+    },
+    /// The file is larger than it may be.
+    #[error("the file has {bytes} bytes; at most {limit} are read")]
+    FileSize {
+        /// Its size.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// The image is larger than it may be, or has no pixel.
+    #[error("the image is {width} x {height}; accepted are 1 to {max_side} pixels a side and at most {max_pixels} in all")]
+    ImageSize {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// Limit of either.
+        max_side: u64,
+        /// Limit of their product.
+        max_pixels: u64,
+    },
+    /// A pixel has a colour, or a transparency.
+    #[error("the pixel at ({x}, {y}) is {what}; accepted are grey and opaque pixels")]
+    NotGrey {
+        /// "coloured" or "transparent".
+        what: &'static str,
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+    },
+    /// The samples are of a type that has no meaning here.
+    #[error("has {found}; accepted are {accepted}")]
+    Samples {
+        /// The type in the file.
+        found: String,
+        /// The types that can be read.
+        accepted: &'static str,
+    },
+    /// A TIFF file holds several images.
+    #[error("holds several images; accepted is one image a file")]
+    Pages,
+    /// A mask is of another size than its image.
+    #[error("the mask is {} x {}, its image {} x {}; both must be the same", mask[0], mask[1], image[0], image[1])]
+    MaskSize {
+        /// Columns and rows of the mask.
+        mask: [usize; 2],
+        /// Columns and rows of the image.
+        image: [usize; 2],
+    },
+    /// No pixel of a mask is set.
+    #[error("the mask is empty: no pixel of it is above 0")]
+    EmptyMask,
+    /// A mask falls apart.
+    #[error("the mask falls into {count} separate components; a nucleus must be one")]
+    Components {
+        /// How many.
+        count: usize,
+    },
+    /// A nucleus of a single pixel.
+    #[error("the mask is a single pixel, at ({x}, {y}); a nucleus must have more")]
+    SinglePixel {
+        /// Column.
+        x: u32,
+        /// Row.
+        y: u32,
+    },
+    /// Too many regions for a label image.
+    #[error("has more than {limit} separate regions; is it a grey image rather than a mask or label image?")]
+    Regions {
+        /// The limit.
+        limit: usize,
+    },
+    /// A weight map that allows no place.
+    #[error("every pixel is 0, so that no place is allowed; some must be above 0")]
+    NoWeight,
+    /// A file without its counterpart.
+    #[error("has no {wanted} of the same name in {folder}")]
+    Unpaired {
+        /// "image" or "mask".
+        wanted: &'static str,
+        /// Where it was looked for.
+        folder: String,
+    },
+    /// Two files of one name.
+    #[error("has the same name as {other}, apart from its ending")]
+    Ambiguous {
+        /// The other.
+        other: String,
+    },
+    /// A folder without anything to read.
+    #[error("holds no PNG or TIFF file")]
+    NoImages,
+    /// A line of a table.
+    #[error("line {line}: {message}")]
+    Row {
+        /// Number of the line, from 1.
+        line: u64,
+        /// What is wrong with it, and what would be accepted.
+        message: String,
+    },
+}

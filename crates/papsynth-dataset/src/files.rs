@@ -1,0 +1,369 @@
+//! Whole files or none: a file gets its name only when all of it is on the disk.
+
+use std::fs::{self, File};
+use std::hash::{BuildHasher, RandomState};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::error::Error;
+use crate::record::{Check, FileRecord};
+
+const TEMPORARY_ENDING: &str = ".tmp";
+
+/// How much is read at a time to be hashed.
+const HASH_BLOCK: usize = 1 << 16;
+
+/// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
+///
+/// # Errors
+/// If the system refuses; then there is no such file, or still the former one.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Folder::new(folder).write(&name, bytes).map(|_| ())
+}
+
+/// A folder into which files are written by names relative to it, with `/` between folders.
+#[derive(Debug, Clone)]
+pub(crate) struct Folder {
+    root: PathBuf,
+}
+
+impl Folder {
+    pub(crate) fn new(root: &Path) -> Self {
+        Self { root: root.to_owned() }
+    }
+
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.root.join(name)
+    }
+
+    /// Writes a whole file.
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
+        let pending = self.pending(name)?;
+        pending.handle()?.write_all(bytes).map_err(Error::io("write", &pending.path))?;
+        pending.commit()
+    }
+
+    /// Writes a file piece by piece, unless there is one of the same content.
+    pub(crate) fn write_if_new(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut Output) -> Result<(), Error>,
+    ) -> Result<FileRecord, Error> {
+        let pending = self.pending(name)?;
+        let mut output = Output { writer: BufWriter::new(pending.handle()?), path: pending.path.clone() };
+        fill(&mut output)?;
+        output.flush()?;
+        pending.commit_if_new(self)
+    }
+
+    /// Opens a file that will have this name once it is committed.
+    pub(crate) fn pending(&self, name: &str) -> Result<Pending, Error> {
+        let path = self.path(name);
+        let folder = path.parent().unwrap_or(&self.root);
+        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
+        // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
+        let unique = RandomState::new().hash_one(&path);
+        let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
+        let open = || {
+            fault::point()?;
+            File::options().read(true).write(true).create_new(true).open(&temporary)
+        };
+        let file = open().or_else(|e| match e.kind() {
+            io::ErrorKind::NotFound => fs::create_dir_all(folder).and_then(|()| open()),
+            _ => Err(e),
+        });
+        let file = file.map_err(Error::io("write", &path))?;
+        // Says that somebody is at work on it; see `sweep`. File systems without locks do without.
+        let _ = file.try_lock();
+        Ok(Pending { file, temporary, path, name: name.to_owned(), committed: false })
+    }
+
+    /// What is wrong with a file, if anything is.
+    pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
+        let (path, name) = (self.path(&record.path), &record.path);
+        let size = match fs::metadata(&path) {
+            Ok(found) if found.is_file() => found.len(),
+            Ok(_) => return Ok(Some(format!("{name} is no file"))),
+            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                return Ok(Some(format!("{name} is missing")));
+            }
+            Err(e) => return Err(Error::io("read", &path)(e)),
+        };
+        Ok(if size != record.bytes {
+            Some(format!("{name} has {size} bytes, not {}", record.bytes))
+        } else if check == Check::Hashes && self.record(name)?.sha256 != record.sha256 {
+            Some(format!("{name} has another content than it was written with"))
+        } else {
+            None
+        })
+    }
+
+    /// Size and hash of a file that is there.
+    pub(crate) fn record(&self, name: &str) -> Result<FileRecord, Error> {
+        let path = self.path(name);
+        let measured = File::open(&path).and_then(|mut file| measure(&mut file));
+        let (bytes, sha256) = measured.map_err(Error::io("read", &path))?;
+        Ok(FileRecord { path: name.to_owned(), bytes, sha256 })
+    }
+
+    /// Removes what killed processes left behind. A temporary file that somebody works on is locked, and stays.
+    pub(crate) fn sweep(&self, folder: &str) -> Result<(), Error> {
+        let path = self.path(folder);
+        let entries = match fs::read_dir(&path) {
+            Ok(entries) => entries,
+            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return Ok(()),
+            Err(e) => return Err(Error::io("read", &path)(e)),
+        };
+        for entry in entries {
+            let entry = entry.map_err(Error::io("read", &path))?;
+            if !is_temporary(&entry.file_name().to_string_lossy()) {
+                continue;
+            }
+            let abandoned = File::options().write(true).open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+            if abandoned {
+                // Gone already is as good.
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the names in a folder to the disk. Losing one to a power failure loses no more than its file, which is
+    /// then made again; so this is done once at the end.
+    pub(crate) fn sync_names(&self, folder: &str) {
+        // Not every system can do this to a folder.
+        let _ = File::open(self.path(folder)).and_then(|f| f.sync_all());
+    }
+}
+
+/// Whether a file of this name is one that was never finished.
+pub(crate) fn is_temporary(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(TEMPORARY_ENDING)
+}
+
+/// A file without its name yet. Dropped before it is committed, it vanishes.
+#[derive(Debug)]
+pub(crate) struct Pending {
+    file: File,
+    temporary: PathBuf,
+    path: PathBuf,
+    name: String,
+    committed: bool,
+}
+
+impl Pending {
+    /// The path that the file will have.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes to the file. Nothing is held back: what is written through a handle is written when the call returns.
+    pub(crate) fn handle(&self) -> Result<Handle, Error> {
+        self.file.try_clone().map(Handle).map_err(Error::io("write", &self.path))
+    }
+
+    /// Brings the file to the disk and gives it its name.
+    pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
+        let record = self.seal().map_err(Error::io("write", &self.path))?;
+        self.rename()?;
+        Ok(record)
+    }
+
+    /// As [`commit`](Self::commit), but leaves a file of the same content untouched.
+    pub(crate) fn commit_if_new(mut self, folder: &Folder) -> Result<FileRecord, Error> {
+        let record = self.seal().map_err(Error::io("write", &self.path))?;
+        if folder.flaw(&record, Check::Hashes)?.is_some() {
+            self.rename()?;
+        }
+        Ok(record)
+    }
+
+    fn seal(&mut self) -> io::Result<FileRecord> {
+        fault::point()?;
+        self.file.sync_all()?;
+        // Read back: what counts is what is there, however it was written.
+        self.file.seek(SeekFrom::Start(0))?;
+        let (bytes, sha256) = measure(&mut self.file)?;
+        Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
+    }
+
+    fn rename(&mut self) -> Result<(), Error> {
+        let renamed = fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
+        renamed.map_err(Error::io("write", &self.path))?;
+        self.committed = true;
+        Ok(())
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        if !self.committed {
+            // Nothing more can be done about a file that cannot be removed.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// A file that is written piece by piece.
+pub(crate) struct Output {
+    writer: BufWriter<Handle>,
+    path: PathBuf,
+}
+
+impl Output {
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.writer.write_all(bytes).map_err(Error::io("write", &self.path))
+    }
+
+    pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
+        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.path)(e.into()))
+    }
+
+    /// The elements of a JSON array between its brackets, one a line.
+    pub(crate) fn json_lines<T: Serialize>(&mut self, items: impl IntoIterator<Item = Result<T, Error>>) -> Result<(), Error> {
+        for (i, item) in items.into_iter().enumerate() {
+            self.bytes(if i == 0 { b"\n" } else { b",\n" })?;
+            self.json(&item?)?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        self.writer.flush().map_err(Error::io("write", &self.path))
+    }
+}
+
+/// Writes to a pending file.
+#[derive(Debug)]
+pub(crate) struct Handle(File);
+
+impl Write for Handle {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        fault::point()?;
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Seek for Handle {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.0.seek(position)
+    }
+}
+
+/// Size and SHA-256 of the rest of a file.
+fn measure(file: &mut File) -> io::Result<(u64, String)> {
+    let mut hash = Sha256::new();
+    let mut block = vec![0; HASH_BLOCK];
+    let mut bytes = 0;
+    loop {
+        match file.read(&mut block)? {
+            0 => return Ok((bytes, hex(&hash.finalize()))),
+            read => {
+                hash.update(&block[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+}
+
+/// SHA-256 as hexadecimal digits.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Failures of the disk, made on purpose: every call that touches it passes a point.
+pub(crate) mod fault {
+    #[cfg(test)]
+    thread_local! {
+        /// Points that are still passed without harm; none set, all are.
+        pub(crate) static LEFT: std::cell::Cell<Option<usize>> = const { std::cell::Cell::new(None) };
+    }
+
+    #[cfg(not(test))]
+    #[expect(clippy::unnecessary_wraps, reason = "fails in tests")]
+    pub(crate) fn point() -> std::io::Result<()> {
+        Ok(())
+    }
+
+    #[cfg(test)]
+    pub(crate) fn point() -> std::io::Result<()> {
+        LEFT.with(|left| match left.get() {
+            None => Ok(()),
+            Some(0) => Err(std::io::Error::new(std::io::ErrorKind::StorageFull, "no space left (on purpose)")),
+            Some(n) => {
+                left.set(Some(n - 1));
+                Ok(())
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[path = "../../tests/support/mod.rs"]
+    mod support;
+
+    use papsynth::model::Model;
+
+    use super::*;
+    use crate::{Dataset, DatasetInfo};
+    use support::{SEED, Scratch, contents, frame, recipe};
+
+    /// A data set of one stack, from nothing.
+    fn make(path: &Path) -> Result<(), Error> {
+        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
+        let dataset = Dataset::create_or_resume(path, &info)?;
+        if !dataset.is_whole(0, Check::Sizes)? {
+            let frame = frame(0, 2, 8, 1);
+            let mut writer = dataset.frame_writer(&frame.finished.scene)?;
+            frame.planes.iter().try_for_each(|plane| writer.write_plane(plane))?;
+            writer.finish(&frame.finished)?;
+        }
+        dataset.finish().map(|_| ())
+    }
+
+    #[test]
+    fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_set() {
+        let good = Scratch::new("faults-none");
+        make(good.path()).unwrap();
+        let expected = contents(good.path());
+        let mut failures = 0;
+        for passed in 0.. {
+            let scratch = Scratch::new("faults");
+            fault::LEFT.set(Some(passed));
+            let result = make(scratch.path());
+            fault::LEFT.set(None);
+            if result.is_ok() {
+                break;
+            }
+            failures += 1;
+            let error = result.unwrap_err();
+            assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
+            for (name, bytes) in contents(scratch.path()) {
+                // The manifest alone changes: it is written at the beginning and at the end.
+                let whole = expected.iter().any(|(n, b)| *n == name && (*b == bytes || name == "manifest.json"));
+                assert!(whole, "{name} after {passed} calls");
+            }
+            make(scratch.path()).unwrap();
+            assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
+        }
+        assert!(failures > 50, "{failures}");
+    }
+}

@@ -1,0 +1,102 @@
+//! Grey images and label images.
+
+use std::path::Path;
+
+use papsynth::truth::LabelMap;
+
+use super::png::{self, Meaning};
+use super::raster::{Raster, Samples};
+use super::{Limits, parse, tiff};
+use crate::error::{Error, Problem};
+
+const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Little- and big-endian TIFF and BigTIFF.
+const TIFF_SIGNATURES: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];
+
+/// An image in grey levels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GreyImage {
+    /// Columns.
+    pub width: usize,
+    /// Grey levels `0..=white`, row by row.
+    pub grey: Vec<u16>,
+    /// The largest grey level that the file could hold: 255 or 65535. A camera of 12 bits fills only the lowest
+    /// sixteenth of a 16-bit file.
+    pub white: u16,
+}
+
+impl GreyImage {
+    /// Decodes a PNG or TIFF file.
+    ///
+    /// # Errors
+    /// If the bytes are not a whole image of grey pixels within the limits.
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
+        let raster = decode(bytes, limits, Meaning::Brightness)?;
+        let width = raster.width;
+        let (grey, white) = match raster.grey()? {
+            Samples::U8(samples) => (samples.into_iter().map(u16::from).collect(), u8::MAX.into()),
+            Samples::U16(samples) => (samples, u16::MAX),
+            Samples::U32(_) => {
+                return Err(Problem::Samples { found: "32 bit samples".to_owned(), accepted: "8 or 16 bit grey images" });
+            }
+        };
+        Ok(Self { width, grey, white })
+    }
+
+    /// Reads a PNG or TIFF file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is not a whole image of grey pixels within the limits.
+    pub fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
+        parse(path, limits, |bytes| Self::decode(bytes, limits))
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.grey.len() / self.width.max(1)
+    }
+
+    /// Grey levels as fractions of [`white`](Self::white), 0 to 1.
+    #[must_use]
+    pub fn fractions(&self) -> Vec<f32> {
+        let white = f32::from(self.white.max(1));
+        self.grey.iter().map(|&g| f32::from(g) / white).collect()
+    }
+}
+
+/// Decodes a PNG or TIFF file of labels; 0 is no object.
+///
+/// # Errors
+/// If the bytes are not a whole image of one channel within the limits.
+pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
+    let raster = decode(bytes, limits, Meaning::Labels)?;
+    let width = raster.width;
+    let ids = match raster.grey()? {
+        Samples::U8(samples) => samples.into_iter().map(u32::from).collect(),
+        Samples::U16(samples) => samples.into_iter().map(u32::from).collect(),
+        Samples::U32(samples) => samples,
+    };
+    Ok(LabelMap { width, ids })
+}
+
+/// Reads a PNG or TIFF file of labels; 0 is no object.
+///
+/// # Errors
+/// If the file cannot be read, or is not a whole image of one channel within the limits.
+pub fn read_label_map(path: &Path, limits: &Limits) -> Result<LabelMap, Error> {
+    parse(path, limits, |bytes| label_map(bytes, limits))
+}
+
+fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+    if bytes.starts_with(PNG_SIGNATURE) {
+        png::decode(bytes, limits, meaning)
+    } else if TIFF_SIGNATURES.iter().any(|s| bytes.starts_with(s)) {
+        tiff::decode(bytes, limits)
+    } else if bytes.len() < PNG_SIGNATURE.len() && PNG_SIGNATURE.starts_with(bytes) && !bytes.is_empty() {
+        Err(Problem::Truncated { format: "PNG" })
+    } else {
+        Err(Problem::Format)
+    }
+}

@@ -1,0 +1,9 @@
+//! Images as bytes, the same for the same image: no time, fixed settings.
+
+mod ome;
+mod png;
+mod tiff;
+
+pub(crate) use ome::description;
+pub(crate) use png::{grey_png, rgb_png};
+pub(crate) use tiff::{PageWriter, Pixels, label_tiff};

@@ -1,0 +1,285 @@
+//! Small frames made by hand, and folders that vanish.
+#![allow(dead_code, reason = "each test uses its part")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use papsynth::key::Key;
+use papsynth::recipe::{PhotonNoise, Recipe, Restore};
+use papsynth::scene::{
+    Kind, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View,
+};
+use papsynth::truth::{Mask, ObjectTruth, Part, Truth, front_masks, layers};
+use papsynth::{Finished, Frame, Plane};
+
+pub(crate) const WIDTH: usize = 70;
+pub(crate) const HEIGHT: usize = 50;
+pub(crate) const SEED: u64 = 11;
+
+/// A folder of this test alone, removed at its end.
+pub(crate) struct Scratch(PathBuf);
+
+impl Scratch {
+    pub(crate) fn new(name: &str) -> Self {
+        let path =
+            std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+
+    pub(crate) fn join(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Every file below a folder with its content, by its path from there.
+pub(crate) fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    collect(folder, "", &mut found);
+    found.sort();
+    found
+}
+
+fn collect(folder: &Path, prefix: &str, found: &mut Vec<(String, Vec<u8>)>) {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries {
+        let path = entry.unwrap().path();
+        let name = format!("{prefix}{}", path.file_name().unwrap().to_string_lossy());
+        if path.is_dir() {
+            collect(&path, &format!("{name}/"), found);
+        } else {
+            found.push((name, fs::read(&path).unwrap()));
+        }
+    }
+}
+
+/// A recipe whose classes the frames use.
+pub(crate) fn recipe() -> Recipe {
+    Recipe::default()
+}
+
+pub(crate) fn class() -> String {
+    recipe().cells.keys().next().unwrap().clone()
+}
+
+pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
+    Scene {
+        key: Key { seed: SEED, index },
+        view: View {
+            width: WIDTH,
+            height: HEIGHT,
+            pixel_um: 0.25,
+        },
+        planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
+        background: SceneBackground {
+            level: 0.9,
+            illumination: SceneIllumination::Border { exponent: 0.02 },
+            scatter: 0.01,
+            scatter_um: 60.0,
+        },
+        optics: SceneOptics {
+            sigma_xy_um: 0.225,
+            sigma_z_um_per_um: 0.25,
+            restore: Restore::Off,
+            restore_feather_um: 1.0,
+        },
+        camera: SceneCamera {
+            bits,
+            full_well_e: 17_600.0,
+            read_noise_e: 8.0,
+            offset_dn: 0.0,
+            photon_noise: PhotonNoise::Exact,
+        },
+        overlap: 1.0,
+        objects: Vec::new(),
+    }
+}
+
+fn disc(x: f32, y: f32, radius: f32) -> Mask {
+    let tile: Vec<f32> = (0..WIDTH * HEIGHT)
+        .map(|i| {
+            let (dx, dy) = ((i % WIDTH) as f32 - x, (i / WIDTH) as f32 - y);
+            if dx * dx + dy * dy <= radius * radius {
+                1.0
+            } else {
+                0.0
+            }
+        })
+        .collect();
+    Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
+}
+
+fn object(
+    id: u32,
+    part: Part,
+    kind: Kind,
+    class: &str,
+    depth_um: f64,
+    planes: &[f64],
+    amodal: Mask,
+) -> ObjectTruth {
+    ObjectTruth {
+        id,
+        part,
+        kind,
+        class: class.to_owned(),
+        bethesda: if kind == Kind::Cell {
+            "NILM".to_owned()
+        } else {
+            String::new()
+        },
+        traits: "flap;pyknotic".to_owned(),
+        cluster: 1,
+        centre_um: [3.25, 7.5],
+        depth_um,
+        stain: 0.3,
+        rotation_deg: 12.5,
+        area_um2: amodal.area() as f64 / 16.0,
+        truncated: amodal.bounds().is_some_and(|b| b.x == 0),
+        front: Mask::default(),
+        amodal,
+        defocus_um: planes.iter().map(|z| z - depth_um).collect(),
+        detectability: planes
+            .iter()
+            .map(|z| 10.0 / (1.0 + (z - depth_um).abs()))
+            .collect(),
+    }
+}
+
+/// Two cells of which one overlaps the other, and two things that are no cell. `first_id` is that of the first cell.
+pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Frame {
+    let scene = scene(index, planes, bits);
+    let (class, z) = (class(), &scene.planes_um);
+    let shift = (index % 7) as f32;
+    let near = first_id + 1;
+    let mut objects = vec![
+        object(
+            first_id,
+            Part::Cytoplasm,
+            Kind::Cell,
+            &class,
+            -0.5,
+            z,
+            disc(18.0 + shift, 22.0, 17.0),
+        ),
+        object(
+            first_id,
+            Part::Nucleus,
+            Kind::Cell,
+            &class,
+            -0.5,
+            z,
+            disc(18.0 + shift, 22.0, 5.0),
+        ),
+        object(
+            near,
+            Part::Cytoplasm,
+            Kind::Cell,
+            &class,
+            0.5,
+            z,
+            disc(40.0, 24.0, 16.0),
+        ),
+        object(
+            near,
+            Part::Nucleus,
+            Kind::Cell,
+            &class,
+            0.5,
+            z,
+            disc(42.0, 24.0, 4.0),
+        ),
+        object(
+            near + 1,
+            Part::Whole,
+            Kind::Leukocyte,
+            "leukocyte",
+            0.0,
+            z,
+            disc(0.0, 45.0, 6.0),
+        ),
+        object(
+            near + 2,
+            Part::Whole,
+            Kind::Speckle,
+            "speckle",
+            1.0,
+            z,
+            disc(60.0, 6.0, 0.5),
+        ),
+    ];
+    let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
+        (0..objects.len())
+            .filter(|&i| objects[i].part == part)
+            .collect()
+    };
+    let labels = [Part::Cytoplasm, Part::Nucleus, Part::Whole].map(|part| {
+        let members = of_part(&objects, part);
+        let stack: Vec<_> = members
+            .iter()
+            .map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal))
+            .collect();
+        let (labels, fronts) = front_masks(&stack, WIDTH, HEIGHT);
+        for (i, front) in members.into_iter().zip(fronts) {
+            objects[i].front = front;
+        }
+        labels
+    });
+    let cytoplasms = objects.iter().filter(|o| o.part == Part::Cytoplasm);
+    let layers = layers(cytoplasms.map(|o| &o.amodal), WIDTH, HEIGHT);
+    let white = u16::try_from((1_u32 << bits) - 1).unwrap();
+    let all_in_focus: Vec<f32> = (0..WIDTH * HEIGHT)
+        .map(|i| {
+            let ids = labels.iter().filter(|l| l.ids[i] > 0).count() as f32;
+            f32::from(white) * (0.9 - 0.25 * ids)
+        })
+        .collect();
+    let planes = (0..planes)
+        .map(|z| {
+            let noise_free: Vec<f32> = all_in_focus
+                .iter()
+                .map(|v| v * (1.0 - 0.05 * z as f32))
+                .collect();
+            let mut state = index.wrapping_mul(31) + z as u64 + 1;
+            let grey = noise_free.iter().map(|v| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let noise = (state >> 40) as f32 / (1 << 24) as f32 - 0.5;
+                (v + noise * 0.05 * f32::from(white)).clamp(0.0, f32::from(white)) as u16
+            });
+            Plane {
+                index: z,
+                depth_um: scene.planes_um[z],
+                grey: grey.collect(),
+                noise_free,
+                saturated: z,
+            }
+        })
+        .collect();
+    Frame {
+        planes,
+        finished: Finished {
+            scene,
+            truth: Truth {
+                objects,
+                labels,
+                layers,
+            },
+            all_in_focus,
+        },
+    }
+}

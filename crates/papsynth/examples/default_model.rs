@@ -1,0 +1,193 @@
+//! Writes the model that ships, from real material and from published tables.
+//!
+//! ```sh
+//! cargo run --release -p papsynth --example default_model -- REFERENCE crates/papsynth/model/default.json
+//! ```
+//!
+//! Outlines, chromatin and its statistics are learned from `REFERENCE/outlines` and `REFERENCE/nuclei` (numbers only).
+//! Sizes are those of the Herlev table (log-normal, Jantzen et al. 2005) and absorbances those measured on
+//! monochrome liquid-based fields and on the authors' nuclei.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
+use papsynth::model::{CellClass, ChromatinStatistics, CytoplasmStatistics, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics, Shapes};
+
+/// Thickness from rim to centre in ten steps, relative to a cell's median: measured on free cells.
+const RIM_TO_CENTRE: [f64; 10] = [0.61, 0.87, 0.96, 1.04, 1.08, 1.14, 1.22, 1.23, 1.31, 1.31];
+
+/// Size of the reference's pixels, µm.
+const PIXEL_UM: f64 = 0.25;
+
+/// What a class is like beyond what its images show.
+struct Facts {
+    name: &'static str,
+    bethesda: &'static str,
+    /// Cell diameter, µm: mean and sd of the natural logarithm.
+    cell: [f64; 2],
+    /// Nucleus area, µm²: mean and sd of the natural logarithm.
+    nucleus: [f64; 2],
+    /// Correlation of their logarithms.
+    correlation: f64,
+    /// Distance of the nucleus from the cell's middle, fraction of the radius.
+    off_centre: [f64; 2],
+    /// Absorbance of the cytoplasm: median, sd of the logarithm.
+    cytoplasm: [f64; 2],
+    /// Folder of the nuclei, and file of their outlines.
+    nuclei: [&'static str; 2],
+}
+
+const CLASSES: [Facts; 3] = [
+    Facts {
+        name: "intermediate",
+        bethesda: "NILM",
+        cell: [3.857, 0.182],
+        nucleus: [3.928, 0.25],
+        correlation: 0.34,
+        off_centre: [0.172, 0.091],
+        cytoplasm: [0.125, 0.40],
+        nuclei: ["nuclei/normal", "outlines/nucleus.csv"],
+    },
+    Facts {
+        name: "superficial",
+        bethesda: "NILM",
+        cell: [3.991, 0.20],
+        nucleus: [3.33, 0.28],
+        correlation: 0.30,
+        off_centre: [0.170, 0.096],
+        cytoplasm: [0.105, 0.44],
+        nuclei: ["nuclei/normal", "outlines/nucleus.csv"],
+    },
+    Facts {
+        name: "high-grade",
+        bethesda: "HSIL",
+        cell: [3.116, 0.236],
+        nucleus: [4.75, 0.28],
+        correlation: 0.76,
+        off_centre: [0.20, 0.12],
+        cytoplasm: [0.15, 0.35],
+        nuclei: ["nuclei/high_grade", "outlines/nucleus_high_grade.csv"],
+    },
+];
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let (Some(reference), Some(out)) = (arguments.next(), arguments.next()) else {
+        eprintln!("usage: default_model REFERENCE OUT.json");
+        std::process::exit(2);
+    };
+    let reference = Path::new(&reference);
+    let cells = outlines(&reference.join("outlines/cytoplasm.csv"));
+    let mut model = Model { version: MODEL_VERSION, provenance: Vec::new(), classes: BTreeMap::new() };
+    for facts in &CLASSES {
+        let nuclei = nuclei(&reference.join(facts.nuclei[0]));
+        let nucleus_outlines = outlines(&reference.join(facts.nuclei[1]));
+        model.classes.insert(facts.name.to_owned(), blank(facts));
+        let material = Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cells };
+        let params = LearnParams {
+            class: facts.name.to_owned(),
+            like: facts.name.to_owned(),
+            bethesda: facts.bethesda.to_owned(),
+            pixel_um: PIXEL_UM,
+            source: "library of the PAPSYNTH authors (Malm, Brun, Bengtsson 2015); sizes: Herlev table".to_owned(),
+            donors: Donors::NumbersOnly,
+        };
+        model = learn(&model, &material, &params).unwrap_or_else(|e| panic!("{e}"));
+        let class = model.classes.get_mut(facts.name).expect("just learned");
+        let known = blank(facts);
+        class.cytoplasm.radius_um = known.cytoplasm.radius_um;
+        class.nucleus.radius_um = known.nucleus.radius_um;
+        if facts.name == "superficial" {
+            // Small, condensed: darker and with less texture than those of intermediate cells.
+            class.nucleus.absorbance = Normal { mean: 0.40, sd: 0.10 };
+            class.nucleus.chromatin.sd = Normal { mean: 0.055, sd: 0.018 };
+        }
+        let chromatin = &class.nucleus.chromatin;
+        println!(
+            "{}: nuclei A {:?}, sd {:?}, skewness {}, nu {}, length {} um, profile {:?}",
+            facts.name, class.nucleus.absorbance, chromatin.sd, chromatin.skewness, chromatin.nu, chromatin.length_um, chromatin.rim_to_centre
+        );
+    }
+    let text = model.to_json();
+    std::fs::write(&out, &text).unwrap_or_else(|e| panic!("{out}: {e}"));
+    println!("{out}: {} bytes", text.len());
+}
+
+/// A class as the tables have it, before anything is learned.
+fn blank(facts: &Facts) -> CellClass {
+    let nothing = fsd_shape::ShapeStatistics {
+        harmonics: 1,
+        outlines: 0,
+        ln_radius_mean: 0.0,
+        ln_radius_sd: 0.0,
+        mean: vec![0.0, 0.0, 1.0, 0.0],
+        components: Vec::new(),
+        residual: fsd_shape::Residual::Descriptors,
+        residual_sd: vec![0.0; 4],
+        roughness_sd: 0.0,
+        local_roughness: 0.0,
+    };
+    let shapes = Shapes { correlated: nothing.clone(), independent: nothing };
+    let round = |v: f64| (v * 1e4).round() / 1e4;
+    CellClass {
+        bethesda: facts.bethesda.to_owned(),
+        cytoplasm: CytoplasmStatistics {
+            radius_um: LogNormal { median: round(libm::exp(facts.cell[0]) / 2.0), log_sd: facts.cell[1] },
+            absorbance: LogNormal { median: facts.cytoplasm[0], log_sd: facts.cytoplasm[1] },
+            rim_to_centre: RIM_TO_CENTRE.to_vec(),
+            shapes: shapes.clone(),
+        },
+        nucleus: NucleusStatistics {
+            radius_um: LogNormal {
+                median: round((libm::exp(facts.nucleus[0]) / core::f64::consts::PI).sqrt()),
+                log_sd: facts.nucleus[1] / 2.0,
+            },
+            size_correlation: facts.correlation,
+            off_centre: Normal { mean: facts.off_centre[0], sd: facts.off_centre[1] },
+            absorbance: Normal { mean: 0.33, sd: 0.09 },
+            chromatin: ChromatinStatistics {
+                nu: 1.0,
+                length_um: 0.5,
+                sd: Normal { mean: 0.074, sd: 0.02 },
+                skewness: 0.4,
+                rim_to_centre: vec![1.0],
+            },
+            shapes,
+            donors: Vec::new(),
+        },
+    }
+}
+
+/// Outlines of a CSV file with the columns outline, k, x_px, y_px.
+fn outlines(path: &Path) -> Vec<Vec<Point>> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let mut outlines: BTreeMap<u32, Vec<Point>> = BTreeMap::new();
+    for line in text.lines().skip(1) {
+        let fields: Vec<f64> = line.split(',').map(|f| f.trim().parse().unwrap_or(f64::NAN)).collect();
+        outlines.entry(fields[0] as u32).or_default().push([fields[2], fields[3]]);
+    }
+    outlines.into_values().collect()
+}
+
+/// The nuclei of a folder with `images` and `masks`.
+fn nuclei(folder: &Path) -> Vec<NucleusImage> {
+    let mut names: Vec<_> = std::fs::read_dir(folder.join("images"))
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .filter_map(|entry| Some(entry.ok()?.file_name()))
+        .collect();
+    names.sort();
+    let open = |path: std::path::PathBuf| image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8();
+    names
+        .iter()
+        .map(|name| {
+            let (image, mask) = (open(folder.join("images").join(name)), open(folder.join("masks").join(name)));
+            NucleusImage {
+                name: name.to_string_lossy().into_owned(),
+                light: image.iter().map(|v| f32::from(*v)).collect(),
+                mask: mask.iter().map(|v| if *v > 0 { 1.0 } else { 0.0 }).collect(),
+                width: image.width() as usize,
+            }
+        })
+        .collect()
+}

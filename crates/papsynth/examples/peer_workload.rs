@@ -1,0 +1,93 @@
+//! The workload of the Python peer, timed: `peer_workload frame|stack|throughput COUNT [THREADS]`.
+//!
+//! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and the peak of
+//! resident memory. Truth is made with every image; no file is written.
+
+use std::time::Instant;
+
+use papsynth::key::Key;
+use papsynth::model::Model;
+use papsynth::recipe::{Number, Recipe};
+use papsynth::{Engine, Error, Inputs, Threads};
+
+/// The recipe that mirrors the peer's defaults.
+const RECIPE: &str = include_str!("../../../benches/peer.toml");
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let what = arguments.next().unwrap_or_else(|| "frame".to_owned());
+    let count: u64 = arguments.next().map_or(Ok(7), |text| text.parse())?;
+    let threads: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let mut recipe: Recipe = toml::from_str(RECIPE)?;
+    if what == "stack" {
+        recipe.focus.planes = Number::Fixed(21.0);
+        recipe.focus.step_um = Number::Fixed(0.4);
+    }
+    let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
+    if what == "throughput" {
+        return throughput(&engine, count, threads);
+    }
+    render(&engine, 0)?;
+    let (mut cpu, mut wall) = (Vec::new(), Vec::new());
+    for index in 1..=count {
+        let (c, w) = (cpu_seconds(), now());
+        render(&engine, index)?;
+        cpu.push(cpu_seconds() - c);
+        wall.push(w.elapsed().as_secs_f64());
+    }
+    println!(
+        "{{\"what\":\"{what}\",\"cpu_med\":{:.6},\"cpu_min\":{:.6},\"wall_med\":{:.6},\"peak_mb\":{:.1}}}",
+        median(&mut cpu),
+        cpu.first().copied().unwrap_or(0.0),
+        median(&mut wall),
+        peak_mb()
+    );
+    Ok(())
+}
+
+/// Frames a second of wall time with so many threads, each making whole frames.
+fn throughput(engine: &Engine, count: u64, threads: u64) -> Result<(), Box<dyn std::error::Error>> {
+    let start = now();
+    std::thread::scope(|scope| {
+        for thread in 0..threads {
+            scope.spawn(move || (thread..count).step_by(threads as usize).try_for_each(|index| render(engine, index)));
+        }
+    });
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{{\"what\":\"throughput\",\"threads\":{threads},\"frames_per_s\":{:.4}}}", count as f64 / seconds);
+    Ok(())
+}
+
+fn render(engine: &Engine, index: u64) -> Result<(), Error> {
+    let mut sum = 0_u64;
+    let finished = engine.stream::<Error>(Key { seed: 3, index }, Threads::One, |plane| {
+        sum += plane.grey.iter().map(|g| u64::from(*g)).sum::<u64>();
+        Ok(())
+    })?;
+    std::hint::black_box((sum, finished.truth.objects.len()));
+    Ok(())
+}
+
+#[expect(clippy::disallowed_methods, reason = "a bench is what clocks are for")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// CPU time of this process so far: user and system, in ticks of a hundredth of a second or finer where the kernel has it.
+fn cpu_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
+    let nanoseconds: f64 = text.split_whitespace().next().and_then(|t| t.parse().ok()).unwrap_or(0.0);
+    nanoseconds / 1e9
+}
+
+/// Peak of resident memory, MB.
+fn peak_mb() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("VmHWM"));
+    line.and_then(|l| l.split_whitespace().nth(1)).and_then(|t| t.parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+}

@@ -1,0 +1,64 @@
+//! Signal detection: from light to grey levels (Eq. 13), and how detectable an object is in them.
+
+use ccd_noise::{Camera, CameraParams};
+
+use crate::recipe::PhotonNoise;
+use crate::scene::{Scene, SceneCamera};
+
+/// Electrons above which [`PhotonNoise::Normal`] draws one normal deviate: the skewness 1/√µ is below 0.05.
+const NORMAL_ABOVE_E: f64 = 400.0;
+
+/// How much more than the largest grey level stands for a pixel holds: the converter clips first, as in real cameras.
+const WELL_MARGIN: f64 = 1.02;
+
+/// The camera of a scene.
+pub(crate) struct Detector {
+    pub(crate) camera: Camera,
+    scene: SceneCamera,
+    gain: f64,
+}
+
+impl Detector {
+    pub(crate) fn new(scene: &Scene) -> Result<Self, String> {
+        let camera = scene.camera;
+        let largest = libm::exp2(f64::from(camera.bits)) - 1.0;
+        let gain = (largest - camera.offset_dn) / camera.full_well_e;
+        let params = CameraParams {
+            full_well_e: camera.full_well_e * WELL_MARGIN,
+            gain_dn_per_e: gain,
+            offset_dn: camera.offset_dn,
+            read_noise_e: camera.read_noise_e,
+            bit_depth: camera.bits,
+            photon_noise: match camera.photon_noise {
+                PhotonNoise::Exact => ccd_noise::PhotonNoise::Exact,
+                PhotonNoise::Normal => ccd_noise::PhotonNoise::NormalAbove { mean_e: NORMAL_ABOVE_E },
+                PhotonNoise::Off => ccd_noise::PhotonNoise::Off,
+            },
+            ..CameraParams::default()
+        };
+        Ok(Self { camera: Camera::new(&params).map_err(|e| format!("camera: {e}"))?, scene: camera, gain })
+    }
+
+    /// Light as a fraction of full scale becomes mean electrons.
+    pub(crate) fn electrons(&self, light: &mut [f32]) {
+        let scale = self.scene.full_well_e as f32;
+        light.iter_mut().for_each(|v| *v *= scale);
+    }
+
+    /// The grey level expected from a number of electrons.
+    pub(crate) fn expected_dn(&self, electrons: f64) -> f64 {
+        self.scene.offset_dn + self.gain * electrons
+    }
+
+    /// Standard deviation of the grey level of a pixel that expects this many electrons.
+    pub(crate) fn noise_dn(&self, electrons: f64) -> f64 {
+        /// Variance of rounding to whole grey levels.
+        const ROUNDING: f64 = 1.0 / 12.0;
+        let shot = match self.scene.photon_noise {
+            PhotonNoise::Off => 0.0,
+            PhotonNoise::Exact | PhotonNoise::Normal => electrons,
+        };
+        let read = self.scene.read_noise_e * self.scene.read_noise_e;
+        (self.gain * self.gain * (shot + read) + ROUNDING).sqrt()
+    }
+}

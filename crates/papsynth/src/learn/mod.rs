@@ -1,0 +1,168 @@
+//! From real cells to a model: outlines and nucleus images in, statistics (and donors) out.
+//!
+//! Nothing here reads files: images are slices, outlines are lists of points.
+
+mod chromatin;
+mod nucleus;
+
+use fsd_shape::{ShapeModel, ShapeModelParams, Spread};
+
+use crate::error::Error;
+use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
+
+pub use nucleus::NucleusImage;
+use nucleus::Measured;
+
+/// A point in pixels: x right, y down.
+pub type Point = [f64; 2];
+
+/// What a class is learned from. Whatever is empty is kept as the base model has it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Material<'a> {
+    /// Nuclei: images with masks.
+    pub nuclei: &'a [NucleusImage],
+    /// Outlines of nuclei, px; taken from the masks of `nuclei` if empty.
+    pub nucleus_outlines: &'a [Vec<Point>],
+    /// Outlines of whole cells, px.
+    pub cytoplasm_outlines: &'a [Vec<Point>],
+}
+
+/// Whether textures are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Donors {
+    /// The textures of all nuclei become donors: the model holds pixels of real cells.
+    Keep,
+    /// Only numbers are kept (means, covariances, spectra): nothing of a real cell can be seen in the model.
+    NumbersOnly,
+}
+
+/// How a class is learned.
+#[derive(Debug, Clone)]
+pub struct LearnParams {
+    /// Name of the class that is learned, or learned anew.
+    pub class: String,
+    /// Class of the base model that it takes after in everything the material does not show.
+    pub like: String,
+    /// Category of the Bethesda system; that of the base class if empty.
+    pub bethesda: String,
+    /// Size of a pixel of the material, µm.
+    pub pixel_um: f64,
+    /// Where the material came from, for the record.
+    pub source: String,
+    /// Whether textures are kept.
+    pub donors: Donors,
+}
+
+/// Harmonics of a cell's outline: enough for its corners.
+const CYTOPLASM_HARMONICS: usize = 40;
+/// Harmonics of a nucleus's outline.
+const NUCLEUS_HARMONICS: usize = 10;
+/// Fewest outlines that a covariance can be taken from.
+const FEWEST: usize = 3;
+/// Digits of every number in a model.
+const DIGITS: usize = 5;
+
+/// Learns a class and adds it to a model.
+///
+/// # Errors
+/// If the material is too little or cannot be used, or the class to take after is not in the base model: it says which
+/// image or outline, and why.
+pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, Error> {
+    let fail = |message: String| Error::Learn { class: params.class.clone(), message };
+    if !(params.pixel_um.is_finite() && (0.05..=4.0).contains(&params.pixel_um)) {
+        return Err(fail(format!("pixel size {} µm is outside 0.05 to 4", params.pixel_um)));
+    }
+    let like = base.classes.get(&params.like).ok_or_else(|| fail(crate::scene::unknown_class(&params.like, base)))?;
+    let mut class = like.clone();
+    let mut provenance = Vec::new();
+    let mut note = |what: &str, count: usize| {
+        provenance.push(Provenance {
+            class: params.class.clone(),
+            what: what.to_owned(),
+            count,
+            pixel_um: params.pixel_um,
+            source: params.source.clone(),
+        });
+    };
+    if !params.bethesda.is_empty() {
+        class.bethesda.clone_from(&params.bethesda);
+    }
+    if !material.cytoplasm_outlines.is_empty() {
+        let (shapes, radius) = shapes(material.cytoplasm_outlines, CYTOPLASM_HARMONICS, params.pixel_um, "cell").map_err(fail)?;
+        class.cytoplasm.shapes = shapes;
+        class.cytoplasm.radius_um = radius;
+        note("outlines of cells", material.cytoplasm_outlines.len());
+    }
+    let measured =
+        material.nuclei.iter().map(|nucleus| nucleus.measure()).collect::<Result<Vec<Measured>, _>>().map_err(fail)?;
+    let traced: Vec<Vec<Point>> = measured.iter().map(|m| m.outline.clone()).collect();
+    let outlines = if material.nucleus_outlines.is_empty() { &traced } else { material.nucleus_outlines };
+    if !outlines.is_empty() {
+        let (shapes, radius) = shapes(outlines, NUCLEUS_HARMONICS, params.pixel_um, "nucleus").map_err(fail)?;
+        class.nucleus.shapes = shapes;
+        class.nucleus.radius_um = radius;
+        note("outlines of nuclei", outlines.len());
+    }
+    if !measured.is_empty() {
+        learn_texture(&mut class, &measured, params).map_err(fail)?;
+        note("images of nuclei", measured.len());
+    }
+    let mut model = base.clone();
+    model.provenance.retain(|p| p.class != params.class);
+    model.provenance.extend(provenance);
+    model.classes.insert(params.class.clone(), class);
+    model.check().map_err(fail)?;
+    Ok(model)
+}
+
+/// Statistics of outlines in both ways, and of their size.
+fn shapes(outlines: &[Vec<Point>], harmonics: usize, pixel_um: f64, what: &str) -> Result<(Shapes, LogNormal), String> {
+    if outlines.len() < FEWEST {
+        return Err(format!("{} outlines of the {what} are too few; expected at least {FEWEST}", outlines.len()));
+    }
+    let fit = |spread: Spread| {
+        let params = ShapeModelParams { harmonics, spread };
+        let model = ShapeModel::fit(outlines, &params).map_err(|e| format!("outlines of the {what}: {e}"))?;
+        model.statistics().rounded(DIGITS).map_err(|e| format!("outlines of the {what}: {e}"))
+    };
+    let correlated = fit(ShapeModelParams::default().spread)?;
+    let radius = LogNormal {
+        median: rounded(libm::exp(correlated.ln_radius_mean) * pixel_um),
+        log_sd: rounded(correlated.ln_radius_sd),
+    };
+    Ok((Shapes { correlated, independent: fit(Spread::Independent)? }, radius))
+}
+
+fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnParams) -> Result<(), String> {
+    let nucleus = &mut class.nucleus;
+    nucleus.absorbance = normal(measured.iter().map(|m| m.mean));
+    let chromatin = &mut nucleus.chromatin;
+    chromatin.sd = normal(measured.iter().map(|m| m.sd));
+    chromatin.skewness = rounded(normal(measured.iter().map(|m| m.skewness)).mean);
+    chromatin.rim_to_centre = nucleus::mean_profile(measured).into_iter().map(rounded).collect();
+    let (nu, length_um) = chromatin::fit_matern(&chromatin::mean_autocorrelation(measured), params.pixel_um);
+    chromatin.nu = nu;
+    chromatin.length_um = rounded(length_um);
+    nucleus.donors = match params.donors {
+        Donors::NumbersOnly => Vec::new(),
+        Donors::Keep => measured.iter().map(|m| m.donor(params.pixel_um)).collect::<Vec<Donor>>(),
+    };
+    Ok(())
+}
+
+fn normal(values: impl Iterator<Item = f64> + Clone) -> Normal {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let variance = values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / (count - 1.0).max(1.0);
+    Normal { mean: rounded(mean), sd: rounded(variance.sqrt()) }
+}
+
+/// A number with as many digits as a model keeps.
+fn rounded(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let places = DIGITS as f64 - 1.0 - libm::floor(libm::log10(value.abs()));
+    let scale = libm::exp10(places);
+    libm::round(value * scale) / scale
+}

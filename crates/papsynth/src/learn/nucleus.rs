@@ -1,0 +1,137 @@
+//! What one image of a nucleus shows.
+
+use crate::model::{Donor, OUTSIDE};
+
+use super::Point;
+
+/// The image of a nucleus, with its mask.
+#[derive(Debug, Clone)]
+pub struct NucleusImage {
+    /// Name for messages, such as that of its file.
+    pub name: String,
+    /// Transmitted light in any linear unit, row by row.
+    pub light: Vec<f32>,
+    /// 1 inside the nucleus, 0 outside.
+    pub mask: Vec<f32>,
+    /// Columns.
+    pub width: usize,
+}
+
+/// Steps of the profile from rim to centre.
+pub(super) const PROFILE: usize = 5;
+
+/// What was measured on an image.
+#[derive(Debug, Clone)]
+pub(super) struct Measured {
+    pub(super) outline: Vec<Point>,
+    pub(super) mean: f64,
+    pub(super) sd: f64,
+    pub(super) skewness: f64,
+    /// Mean absorbance in steps from rim to centre.
+    pub(super) profile: [f64; PROFILE],
+    /// Absorbance above the surroundings; NaN outside the nucleus.
+    pub(super) absorbance: Vec<f64>,
+    pub(super) width: usize,
+}
+
+impl NucleusImage {
+    /// Measures absorbance inside the mask against the surroundings of the nucleus.
+    pub(super) fn measure(&self) -> Result<Measured, String> {
+        /// Points of a traced outline.
+        const POINTS: usize = 64;
+        /// The rim of the nucleus reaches so far beyond its mask that the surroundings begin after it, px …
+        const GAP: f64 = 2.5;
+        /// … and end here.
+        const REACH: f64 = 9.0;
+        /// Pixels of surroundings that a median can be trusted with.
+        const FEWEST: usize = 12;
+        let fail = |message: String| format!("{}: {message}", self.name);
+        if self.width == 0 || self.light.len() != self.mask.len() || self.light.len() % self.width != 0 {
+            return Err(fail(format!(
+                "its image has {} pixels, its mask {}; expected as many, in rows of {}",
+                self.light.len(),
+                self.mask.len(),
+                self.width
+            )));
+        }
+        if let Some(bad) = self.light.iter().position(|v| !v.is_finite() || *v < 0.0) {
+            return Err(fail(format!("pixel ({}, {}) is {}", bad % self.width, bad / self.width, self.light[bad])));
+        }
+        let outline = fsd_shape::trace(&self.mask, self.width, 0.5).map_err(|e| fail(format!("its mask: {e}")))?;
+        let outline = fsd_shape::resample(&outline, POINTS);
+        let distance = self.distances(&outline);
+        let mut around: Vec<f64> = (0..self.light.len())
+            .filter(|&i| self.mask[i] < 0.5 && (GAP..REACH).contains(&distance[i]))
+            .map(|i| f64::from(self.light[i]))
+            .collect();
+        if around.len() < FEWEST {
+            return Err(fail(format!("only {} pixels surround its mask; expected a wider crop", around.len())));
+        }
+        around.sort_by(f64::total_cmp);
+        let surroundings = around[around.len() / 2];
+        if surroundings <= 0.0 {
+            return Err(fail("its surroundings are black".to_owned()));
+        }
+        // Eq. 11 against the surroundings; black pixels count as half a step of the darkest light seen.
+        let floor = surroundings / 512.0;
+        let absorbance: Vec<f64> = (0..self.light.len())
+            .map(|i| {
+                let light = f64::from(self.light[i]).max(floor);
+                if self.mask[i] >= 0.5 { -libm::log10(light / surroundings) } else { f64::NAN }
+            })
+            .collect();
+        let inside: Vec<f64> = absorbance.iter().copied().filter(|a| !a.is_nan()).collect();
+        let count = inside.len() as f64;
+        if inside.len() < FEWEST {
+            return Err(fail(format!("its mask has {} pixels; expected at least {FEWEST}", inside.len())));
+        }
+        let mean = inside.iter().sum::<f64>() / count;
+        let moment = |power: i32| inside.iter().map(|a| libm::pow(a - mean, f64::from(power))).sum::<f64>() / count;
+        let sd = moment(2).sqrt();
+        let skewness = if sd > 0.0 { moment(3) / (sd * sd * sd) } else { 0.0 };
+        let profile = profile(&absorbance, &distance, mean);
+        Ok(Measured { outline, mean, sd, skewness, profile, absorbance, width: self.width })
+    }
+
+    /// Distance of every pixel from the outline.
+    fn distances(&self, outline: &[Point]) -> Vec<f64> {
+        (0..self.light.len())
+            .map(|i| {
+                let (x, y) = ((i % self.width) as f64, (i / self.width) as f64);
+                let square = outline.iter().map(|p| (p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y));
+                square.fold(f64::INFINITY, f64::min).sqrt()
+            })
+            .collect()
+    }
+}
+
+/// Mean absorbance in steps of the distance from the rim; the overall mean where a step has no pixel.
+fn profile(absorbance: &[f64], distance: &[f64], mean: f64) -> [f64; PROFILE] {
+    let inside = || absorbance.iter().zip(distance).filter(|(a, _)| !a.is_nan());
+    let deepest = inside().fold(1.0_f64, |most, (_, d)| most.max(*d));
+    let mut sums = [[0.0; 2]; PROFILE];
+    for (a, d) in inside() {
+        let step = crate::random::count((d / deepest * PROFILE as f64).floor()).min(PROFILE - 1);
+        sums[step][0] += a;
+        sums[step][1] += 1.0;
+    }
+    sums.map(|[sum, count]| if count > 0.0 { sum / count } else { mean })
+}
+
+/// The profile of a class, relative to its mean absorbance.
+pub(super) fn mean_profile(measured: &[Measured]) -> Vec<f64> {
+    let mean: f64 = measured.iter().map(|m| m.mean).sum();
+    (0..PROFILE).map(|step| measured.iter().map(|m| m.profile[step]).sum::<f64>() / mean.max(1e-9)).map(|v| v.max(0.0)).collect()
+}
+
+impl Measured {
+    /// The texture as a donor.
+    pub(super) fn donor(&self, pixel_um: f64) -> Donor {
+        let milli = |a: &f64| {
+            #[expect(clippy::cast_possible_truncation, reason = "clamped to the range of i16")]
+            let value = libm::round(a * 1000.0).clamp(-32_767.0, 32_767.0) as i16;
+            if a.is_nan() { OUTSIDE } else { value }
+        };
+        Donor { pixel_um, width: self.width, absorbance_milli: self.absorbance.iter().map(milli).collect() }
+    }
+}

@@ -1,0 +1,318 @@
+//! The texture inside nuclei: donors, and patches of them ("Texture synthesis", Figs. 4, 5).
+
+use fsd_shape::ShapeModel;
+use quilt_texture::{QuiltParams, Quilter, Source};
+use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
+
+use super::tile::{Point, Tile};
+use crate::key::{Key, Stream};
+use crate::model::{ChromatinStatistics, Donor, NucleusStatistics, OUTSIDE};
+use crate::random;
+
+/// Size of the pixels of donors made from a spectrum, µm: the paper's.
+const MADE_PIXEL_UM: f64 = 0.25;
+
+/// Donors made from a spectrum for each class.
+const MADE_DONORS: usize = 48;
+
+/// Spread of the microscope behind the measured standard deviations of chromatin, µm (the paper's 0.9 px).
+const MEASURED_SIGMA_UM: f64 = 0.225;
+
+/// The donors of a class: textures of mean 0 and variance 1 inside their nuclei.
+#[derive(Debug)]
+pub(crate) struct Donors {
+    sources: Vec<Source>,
+    pixel_um: f64,
+    /// Whether they were taken from images.
+    pub(crate) imaged: bool,
+    /// Factor from a standard deviation as imaged to one in the object plane.
+    pub(crate) sharpening: f64,
+    /// Draws a whole field instead of patches.
+    field: FieldSource,
+}
+
+/// A field of the class's spectrum, with its marginal.
+#[derive(Debug)]
+struct FieldSource {
+    field: SpectralField,
+    skewness: f64,
+    profile: Vec<f64>,
+}
+
+impl Donors {
+    /// The donors of a class: learned ones where there are some, else made from the spectrum.
+    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel, fft: Fft) -> Result<Self, String> {
+        let field = FieldSource::new(&nucleus.chromatin, fft)?;
+        let imaged = !nucleus.donors.is_empty();
+        let (sources, pixel_um) = match nucleus.donors.first() {
+            Some(first) => {
+                let same = nucleus.donors.iter().all(|d| (d.pixel_um - first.pixel_um).abs() < 1e-6);
+                if !same {
+                    return Err(format!("classes.{name}.nucleus.donors: their pixels differ in size; expected one size"));
+                }
+                (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
+            }
+            None => {
+                let make = |index| made(name, index, nucleus, shapes, &field);
+                ((0..MADE_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, MADE_PIXEL_UM)
+            }
+        };
+        let sharpening = if imaged { 1.0 } else { 1.0 / blur_attenuation(&nucleus.chromatin) };
+        Ok(Self { sources, pixel_um, imaged, sharpening, field })
+    }
+
+    /// A texture for a nucleus by patches from some of the donors: mean 0 and variance 1 over the covered pixels.
+    pub(crate) fn quilt(
+        &self,
+        coverage: &Tile,
+        pixel_um: f64,
+        donors: usize,
+        params: &QuiltParams,
+        rng: &mut Stream,
+    ) -> Result<Vec<f32>, String> {
+        let chosen: Vec<&Source> = choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
+        let quilter = Quilter::new(&chosen, params).map_err(|e| e.to_string())?;
+        let grid = Grid::new(coverage, pixel_um / self.pixel_um);
+        let texture = quilter.synthesise(&grid.mask, grid.width, rng);
+        let mut pixels = grid.sample(&texture.pixels, coverage);
+        standardise(&mut pixels, &coverage.values);
+        Ok(pixels)
+    }
+
+    /// A texture for a nucleus that is a field of its own.
+    pub(crate) fn field(&self, coverage: &Tile, pixel_um: f64, rng: &mut Stream) -> Vec<f32> {
+        let grid = Grid::new(coverage, pixel_um / MADE_PIXEL_UM);
+        let texture = self.field.texture(&grid.mask, grid.width, rng);
+        let mut pixels = grid.sample(&texture, coverage);
+        standardise(&mut pixels, &coverage.values);
+        pixels
+    }
+
+    /// Size of the donors' pixels, µm.
+    pub(crate) fn pixel_um(&self) -> f64 {
+        self.pixel_um
+    }
+}
+
+/// Some of `count` things without repetition, all if there are not so many.
+fn choose(count: usize, wanted: usize, rng: &mut Stream) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..count).collect();
+    (0..wanted.min(count)).map(|_| left.swap_remove(random::below(left.len(), rng))).collect()
+}
+
+fn learned(donor: &Donor) -> Result<Source, String> {
+    let mask: Vec<f32> = donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { 1.0 }).collect();
+    let mut pixels: Vec<f32> =
+        donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { f32::from(v) / 1000.0 }).collect();
+    standardise(&mut pixels, &mask);
+    Source::new(&pixels, &mask, donor.width).map_err(|e| format!("nucleus.donors: {e}"))
+}
+
+/// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
+fn made(name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel, field: &FieldSource) -> Result<Source, String> {
+    // Donors belong to the model, not to an image: their key is the same for every data set.
+    let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
+    let radius = nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
+    /// Smallest donor worth taking patches from, px.
+    const SMALLEST: f64 = 9.0;
+    let drawn = shapes.draw(radius.max(SMALLEST), &mut rng).map_err(|e| e.to_string())?;
+    let outline: Vec<Point> = drawn.descriptors.outline(64);
+    let mut coverage = Tile::around(&outline, 1.0);
+    coverage.cover(&outline);
+    let mut pixels = field.texture(&coverage.values, coverage.width, &mut rng);
+    standardise(&mut pixels, &coverage.values);
+    Source::new(&pixels, &coverage.values, coverage.width).map_err(|e| e.to_string())
+}
+
+impl FieldSource {
+    fn new(chromatin: &ChromatinStatistics, fft: Fft) -> Result<Self, String> {
+        /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
+        const SIDE: usize = 128;
+        let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / MADE_PIXEL_UM };
+        let params = FieldParams { width: SIDE, height: SIDE, spectrum, fft, padding: Padding::Periodic };
+        Ok(Self {
+            field: SpectralField::new(&params).map_err(|e| e.to_string())?,
+            skewness: chromatin.skewness,
+            profile: chromatin.rim_to_centre.clone(),
+        })
+    }
+
+    /// A field with the class's marginal and its profile from rim to centre.
+    fn texture(&self, mask: &[f32], width: usize, rng: &mut Stream) -> Vec<f32> {
+        /// Mean absorbance in units of its standard deviation inside a nucleus: what the profile is relative to.
+        const MEAN_OVER_SD: f64 = 4.0;
+        let side = self.field.width();
+        let draw = self.field.draw(rng);
+        let depth = depth_from_rim(mask, width);
+        (0..mask.len())
+            .map(|i| {
+                let (x, y) = (i % width, i / width);
+                let normal = f64::from(draw[(y % side) * side + x % side]);
+                let trend = MEAN_OVER_SD * (interpolate(&self.profile, depth[i]) - 1.0);
+                (trend + skewed(normal, self.skewness)) as f32
+            })
+            .collect()
+    }
+}
+
+/// A standard normal turned into a shifted log-normal of about the wanted skewness, mean 0 and variance 1.
+fn skewed(normal: f64, skewness: f64) -> f64 {
+    // For small s the skewness of exp(s·n) is 3 s.
+    let s = skewness / 3.0;
+    if s.abs() < 1e-6 {
+        return normal;
+    }
+    let variance = libm::expm1(s * s) * libm::exp(s * s);
+    (libm::exp(s * normal) - libm::exp(0.5 * s * s)) / (variance.sqrt() * s.signum())
+}
+
+/// Depth of every pixel below the rim, 0 at the rim to 1 at the deepest, by a two-pass chamfer distance.
+fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
+    const DIAGONAL: f64 = core::f64::consts::SQRT_2;
+    let height = mask.len() / width;
+    let mut depth: Vec<f64> = mask.iter().map(|m| if *m >= 0.5 { f64::INFINITY } else { 0.0 }).collect();
+    let get = |depth: &[f64], x: i64, y: i64| {
+        if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 { 0.0 } else { depth[y as usize * width + x as usize] }
+    };
+    let relax = |depth: &mut Vec<f64>, x: i64, y: i64, neighbours: [(i64, i64, f64); 4]| {
+        let at = y as usize * width + x as usize;
+        for (dx, dy, step) in neighbours {
+            depth[at] = depth[at].min(get(depth, x + dx, y + dy) + step);
+        }
+    };
+    for y in 0..height as i64 {
+        for x in 0..width as i64 {
+            relax(&mut depth, x, y, [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, DIAGONAL), (1, -1, DIAGONAL)]);
+        }
+    }
+    for y in (0..height as i64).rev() {
+        for x in (0..width as i64).rev() {
+            relax(&mut depth, x, y, [(1, 0, 1.0), (0, 1, 1.0), (1, 1, DIAGONAL), (-1, 1, DIAGONAL)]);
+        }
+    }
+    let deepest = depth.iter().fold(1.0_f64, |a, b| a.max(*b));
+    depth.iter().map(|d| d / deepest).collect()
+}
+
+/// Linear interpolation in a profile of even steps, `at` from 0 (first step's outer edge) to 1 (last one's inner edge).
+pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
+    let position = (at.clamp(0.0, 1.0) * profile.len() as f64 - 0.5).clamp(0.0, (profile.len() - 1) as f64);
+    let cell = random::count(position.floor()).min(profile.len() - 1);
+    let next = (cell + 1).min(profile.len() - 1);
+    profile[cell] + (position - cell as f64) * (profile[next] - profile[cell])
+}
+
+/// Shifts and scales to mean 0 and variance 1 over the pixels of a mask, zero elsewhere.
+fn standardise(pixels: &mut [f32], mask: &[f32]) {
+    let inside = || pixels.iter().zip(mask).filter(|(_, m)| **m >= 0.5).map(|(p, _)| f64::from(*p));
+    let count = inside().count().max(1) as f64;
+    let mean = inside().sum::<f64>() / count;
+    let variance = inside().map(|p| (p - mean) * (p - mean)).sum::<f64>() / count;
+    let scale = if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 };
+    for (pixel, mask) in pixels.iter_mut().zip(mask) {
+        *pixel = if *mask > 0.0 { ((f64::from(*pixel) - mean) * scale) as f32 } else { 0.0 };
+    }
+}
+
+/// The share of chromatin's standard deviation that is left in an image of the microscope it was measured with.
+fn blur_attenuation(chromatin: &ChromatinStatistics) -> f64 {
+    /// Frequencies up to here, cycles per µm: far beyond what the microscope passes.
+    const HIGHEST: f64 = 8.0;
+    const STEPS: usize = 4000;
+    let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um };
+    let (mut all, mut passed) = (0.0, 0.0);
+    for step in 0..STEPS {
+        let f = HIGHEST * (step as f64 + 0.5) / STEPS as f64;
+        let power = spectrum.density(f) * f;
+        let transfer = libm::exp(-2.0 * (core::f64::consts::PI * MEASURED_SIGMA_UM * f) * (core::f64::consts::PI * MEASURED_SIGMA_UM * f));
+        all += power;
+        passed += power * transfer * transfer;
+    }
+    (passed / all).sqrt()
+}
+
+/// A nucleus on the grid of its donors, whose pixels may differ from the image's.
+struct Grid {
+    mask: Vec<f32>,
+    width: usize,
+    /// Donor pixels to an image pixel.
+    ratio: f64,
+}
+
+impl Grid {
+    fn new(coverage: &Tile, ratio: f64) -> Self {
+        if (ratio - 1.0).abs() < 1e-9 {
+            return Self { mask: coverage.values.clone(), width: coverage.width, ratio: 1.0 };
+        }
+        let size = |pixels: usize| random::count((pixels as f64 * ratio).ceil()) + 2;
+        let (width, height) = (size(coverage.width), size(coverage.height()));
+        let mut mask = vec![0.0; width * height];
+        for (i, value) in mask.iter_mut().enumerate() {
+            // Whatever pixel of the image may look here must find texture.
+            let at = |position: usize, count: usize| random::count(position as f64 / ratio).min(count - 1);
+            let (x, y) = (at(i % width, coverage.width), at(i / width, coverage.height()));
+            for (nx, ny) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+                let (nx, ny) = (nx.min(coverage.width - 1), ny.min(coverage.height() - 1));
+                if coverage.values[ny * coverage.width + nx] > 0.0 {
+                    *value = 1.0;
+                }
+            }
+        }
+        Self { mask, width, ratio }
+    }
+
+    /// The texture on the image's grid, by linear interpolation.
+    fn sample(&self, texture: &[f32], coverage: &Tile) -> Vec<f32> {
+        if self.ratio == 1.0 {
+            return texture.to_vec();
+        }
+        let height = texture.len() / self.width;
+        let mut out = Vec::with_capacity(coverage.values.len());
+        for y in 0..coverage.height() {
+            for x in 0..coverage.width {
+                let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
+                let (x0, y0) = (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
+                let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
+                let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
+                let at = |x: usize, y: usize| texture[y * self.width + x];
+                let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
+                let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
+                out.push(upper + fy * (lower - upper));
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_skewed_normal_keeps_mean_and_variance() {
+        let mut rng = Key { seed: 5, index: 0 }.stream("test", 0, "skew");
+        let n = 40_000;
+        let draws: Vec<f64> = (0..n).map(|_| skewed(random::normal(&mut rng), 0.4)).collect();
+        let moment = |k: i32| draws.iter().map(|x| libm::pow(*x, f64::from(k))).sum::<f64>() / f64::from(n);
+        assert!(moment(1).abs() < 0.02, "{}", moment(1));
+        assert!((moment(2) - 1.0).abs() < 0.03, "{}", moment(2));
+        assert!((moment(3) - 0.4).abs() < 0.1, "{}", moment(3));
+    }
+
+    #[test]
+    fn depth_grows_from_the_rim() {
+        let mask: Vec<f32> = (0..81).map(|i| if (1..8).contains(&(i % 9)) && (1..8).contains(&(i / 9)) { 1.0 } else { 0.0 }).collect();
+        let depth = depth_from_rim(&mask, 9);
+        assert_eq!(depth[4 * 9 + 4], 1.0);
+        assert_eq!(depth[0], 0.0);
+        assert_eq!(depth[9 + 4], 0.25);
+    }
+
+    #[test]
+    fn profiles_interpolate_between_their_steps() {
+        assert_eq!(interpolate(&[1.0, 3.0], 0.5), 2.0);
+        assert_eq!(interpolate(&[1.0, 3.0], 0.0), 1.0);
+        assert_eq!(interpolate(&[1.0, 3.0], 1.0), 3.0);
+        assert_eq!(interpolate(&[7.0], 0.3), 7.0);
+    }
+}

@@ -1,0 +1,81 @@
+//! From a scene to phantoms: what each object absorbs when it is in focus, and the exact cover of its parts.
+//!
+//! One file a kind of object. A phantom depends on its object and on the object's own streams alone.
+
+mod bacillus;
+mod cell;
+mod chromatin;
+mod leukocyte;
+mod nucleus;
+mod out_of_focus;
+mod pools;
+mod speckle;
+mod studio;
+pub(crate) mod tile;
+mod wobble;
+
+use crate::scene::{Body, Object, Scene};
+use crate::truth::Part;
+
+pub(crate) use pools::Pools;
+pub(crate) use studio::Studio;
+use tile::Tile;
+
+/// A part of an object, in its own tile.
+#[derive(Debug, Clone)]
+pub(crate) struct Piece {
+    /// Which part it is.
+    pub(crate) part: Part,
+    /// What it absorbs along the light's path when it is in focus, decadic.
+    pub(crate) absorbance: Tile,
+    /// Share of each pixel that its in-focus outline covers.
+    pub(crate) coverage: Tile,
+    /// Area within its outline, also outside the image, px².
+    pub(crate) area_px: f64,
+    /// Whether its absorbance was taken from an image, and has been through optics already.
+    pub(crate) imaged: bool,
+}
+
+/// What an object absorbs.
+#[derive(Debug, Clone)]
+pub(crate) struct Phantom {
+    /// Its parts, from the outside in.
+    pub(crate) pieces: Vec<Piece>,
+    /// Variants that its shape shows, for the truth.
+    pub(crate) traits: Vec<&'static str>,
+}
+
+/// Makes the phantoms of a run of objects.
+///
+/// Objects are handed over in batches because sheets are pressed side by side in SIMD lanes; the result is the same
+/// for any grouping.
+pub(crate) fn make(studio: &Studio, scene: &Scene, pools: &Pools, objects: &[&Object]) -> Result<Vec<Phantom>, String> {
+    let cells: Vec<(&Object, &crate::scene::CellBody)> = objects
+        .iter()
+        .filter_map(|object| match &object.body {
+            Body::Cell(body) => Some((*object, &**body)),
+            _ => None,
+        })
+        .collect();
+    let mut cells = cell::make(studio, scene, pools, &cells)?.into_iter();
+    Ok(objects
+        .iter()
+        .map(|object| match &object.body {
+            Body::Cell(_) => cells.next().unwrap_or_else(|| Phantom { pieces: Vec::new(), traits: Vec::new() }),
+            Body::Leukocyte { .. } => leukocyte::make(scene, object),
+            Body::Bacillus { .. } => bacillus::make(scene, object),
+            Body::Speckle { .. } => speckle::make(scene, object),
+            Body::OutOfFocus { .. } => out_of_focus::make(scene, object),
+        })
+        .collect())
+}
+
+/// Number of objects that are worth making together: the lanes of a batch of sheets.
+pub(crate) const BATCH: usize = 16;
+
+impl Phantom {
+    /// A phantom without parts of its own.
+    fn whole(absorbance: Tile, coverage: Tile, area_px: f64) -> Self {
+        Self { pieces: vec![Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false }], traits: Vec::new() }
+    }
+}

@@ -1,0 +1,91 @@
+//! The nucleus of a cell: outline, chromatin, rim.
+
+use super::Piece;
+use super::studio::{ClassStudio, Studio};
+use super::tile::{Point, Tile, area};
+use super::wobble::placed;
+use crate::random;
+use crate::recipe::Chromatin;
+use crate::scene::{CellBody, Object, Scene};
+use crate::truth::Part;
+
+/// Points of a nucleus's outline (the paper's K = 64).
+const POINTS: usize = 64;
+
+/// Width of the dark rim, µm: the nuclear membrane and the chromatin that lies against it, as a microscope shows them.
+const RIM_UM: f64 = 0.45;
+
+/// Harmonics that wrinkle a nucleus.
+const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
+
+/// Amplitude of the strongest wrinkles, relative to the radius.
+const WRINKLE: f64 = 0.075;
+
+/// Makes the nucleus of a cell whose middle lies at `cell_centre`.
+pub(super) fn make(
+    studio: &Studio,
+    class: &ClassStudio,
+    scene: &Scene,
+    object: &Object,
+    body: &CellBody,
+    cell_centre: Point,
+) -> Result<Piece, String> {
+    let nucleus = &body.nucleus;
+    let pixel_um = scene.view.pixel_um;
+    let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
+    let radius_px = nucleus.radius_um / pixel_um;
+    let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
+    let mut outline = drawn.descriptors.outline(POINTS);
+    if nucleus.wrinkle > 0.0 {
+        wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
+    }
+    let [dx, dy] = nucleus.off_centre.map(|share| share * body.radius_um / pixel_um);
+    let centre = [cell_centre[0] + dx, cell_centre[1] + dy];
+    let outline: Vec<Point> = outline.iter().map(|p| placed(*p, nucleus.rotation_deg.to_radians(), centre)).collect();
+
+    let mut coverage = Tile::around(&outline, 2.0);
+    coverage.cover(&outline);
+    let mut inner = coverage.blank();
+    let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
+    let inside: Vec<Point> =
+        outline.iter().map(|p| [centre[0] + shrink * (p[0] - centre[0]), centre[1] + shrink * (p[1] - centre[1])]).collect();
+    inner.cover(&inside);
+
+    let mut rng = scene.key.stream("cell", object.number, "nucleus.texture");
+    let texture = match studio.recipe.nucleus.chromatin {
+        Chromatin::Quilt => {
+            let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
+            class.donors.quilt(&coverage, pixel_um, donors, &class.quilt, &mut rng)?
+        }
+        Chromatin::Field => class.donors.field(&coverage, pixel_um, &mut rng),
+    };
+    let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
+    let contrast = (nucleus.texture * class.donors.sharpening) as f32;
+    let mut absorbance = coverage.clone();
+    for (i, value) in absorbance.values.iter_mut().enumerate() {
+        let rim = (coverage.values[i] - inner.values[i]).max(0.0) * nucleus.rim as f32;
+        let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
+        *value *= level.max(0.0);
+    }
+    Ok(Piece { part: Part::Nucleus, absorbance, coverage, area_px: area(&outline), imaged })
+}
+
+/// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.
+fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut crate::key::Stream) {
+    let radius = (area(outline) / core::f64::consts::PI).sqrt();
+    let waves: Vec<[f64; 3]> = WRINKLES
+        .map(|harmonic| {
+            let amplitude = strength * radius * random::normal(rng) / (f64::from(harmonic) / 3.0);
+            [f64::from(harmonic), amplitude, random::direction(rng)]
+        })
+        .collect();
+    for point in outline.iter_mut() {
+        let angle = libm::atan2(point[1], point[0]);
+        let length = (point[0] * point[0] + point[1] * point[1]).sqrt();
+        // The absolute value gives notches a corner and leaves bulges round, as a wrinkled membrane has them.
+        let push: f64 = waves.iter().map(|[h, a, phase]| -a.abs() * (libm::cos(h * angle + phase)).abs() + 0.6 * a.abs()).sum();
+        let scale = ((length + push) / length.max(1e-9)).clamp(0.5, 1.5);
+        point[0] *= scale;
+        point[1] *= scale;
+    }
+}

@@ -1,0 +1,130 @@
+//! What all images of one recipe share: models, meshes, donors, plans.
+
+use std::collections::BTreeMap;
+
+use cloth_verlet::{Cloth, ClothParams};
+use fsd_shape::ShapeModel;
+use quilt_texture::QuiltParams;
+use spectral_field::Fft;
+use voronoi_cytoskeleton::{Skeleton, SkeletonParams};
+
+use super::chromatin::Donors;
+use super::pools::PoolMaker;
+use crate::model::{CellClass, Model, Shapes};
+use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
+use crate::scene::unknown_class;
+
+/// Excesses of sheets that meshes are made for: a cell's own lies between the least and the largest of them.
+const EXCESSES: usize = 4;
+
+/// Everything that phantoms are made with.
+#[derive(Debug)]
+pub(crate) struct Studio {
+    pub(crate) recipe: Recipe,
+    pub(crate) classes: BTreeMap<String, ClassStudio>,
+    pub(crate) cloths: Vec<(f64, Cloth)>,
+    pub(crate) skeleton: Skeleton,
+    pub(crate) pools: PoolMaker,
+}
+
+/// What cells of one class are made with.
+#[derive(Debug)]
+pub(crate) struct ClassStudio {
+    pub(crate) class: CellClass,
+    pub(crate) cytoplasm: ShapeModel,
+    pub(crate) nucleus: ShapeModel,
+    pub(crate) donors: Donors,
+    pub(crate) quilt: QuiltParams,
+}
+
+impl Studio {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, fft: Fft) -> Result<Self, String> {
+        let mut classes = BTreeMap::new();
+        for name in recipe.cells.keys() {
+            let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
+            classes.insert(name.clone(), ClassStudio::new(name, class, recipe, fft)?);
+        }
+        Ok(Self {
+            recipe: recipe.clone(),
+            classes,
+            cloths: cloths(recipe)?,
+            skeleton: Skeleton::new(&SkeletonParams::default()).map_err(|e| e.to_string())?,
+            pools: PoolMaker::new(fft)?,
+        })
+    }
+
+    /// The mesh whose excess is nearest to a cell's.
+    pub(crate) fn cloth(&self, excess: f64) -> usize {
+        let distance = |index: &usize| (self.cloths[*index].0 - excess).abs();
+        (0..self.cloths.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    }
+}
+
+fn cloths(recipe: &Recipe) -> Result<Vec<(f64, Cloth)>, String> {
+    let params = match recipe.cytoplasm.sheet {
+        Sheet::Flat => return Ok(Vec::new()),
+        Sheet::Verlet => ClothParams::paper(),
+        Sheet::Xpbd => ClothParams::default(),
+    };
+    let [low, high] = recipe.cytoplasm.excess.bounds();
+    let steps = if high > low { EXCESSES } else { 1 };
+    (0..steps)
+        .map(|step| {
+            let excess = low + (high - low) * (step as f64 + 0.5) / steps as f64;
+            let cloth = Cloth::new(&ClothParams { excess, ..params.clone() });
+            cloth.map(|cloth| (excess, cloth)).map_err(|e| format!("cytoplasm: {e}"))
+        })
+        .collect()
+}
+
+impl ClassStudio {
+    fn new(name: &str, class: &CellClass, recipe: &Recipe, fft: Fft) -> Result<Self, String> {
+        let model = |shapes: &Shapes, spread: ShapeSpread| {
+            let statistics = match spread {
+                ShapeSpread::Correlated => &shapes.correlated,
+                ShapeSpread::Independent => &shapes.independent,
+            };
+            ShapeModel::from_statistics(statistics.clone()).map_err(|e| format!("classes.{name}: {e}"))
+        };
+        let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
+        let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
+        let donors = Donors::new(name, &class.nucleus, &nucleus, fft)?;
+        let quilt = quilt(recipe, class, donors.pixel_um(), fft);
+        Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
+    }
+}
+
+/// The quilting that a recipe asks for, on donors with pixels of a size.
+fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64, fft: Fft) -> QuiltParams {
+    let nucleus = &recipe.nucleus;
+    let pixels = |um: f64, least: usize| crate::random::count(um / pixel_um).max(least);
+    // Patch and overlap are those in the middle of their range: a quilt has patches of one size.
+    let middle = |number: &crate::recipe::Number| number.bounds().iter().sum::<f64>() / 2.0;
+    let (overlap_px, core_px) = (pixels(middle(&nucleus.overlap_um), 1), pixels(middle(&nucleus.patch_um), 2));
+    let patch_px = core_px + overlap_px;
+    let default = QuiltParams::default();
+    QuiltParams {
+        patch_px: patch_px.max(2 * overlap_px),
+        overlap_px,
+        acceptance: match nucleus.acceptance {
+            // Donors are scaled to a standard deviation of one, and so is the threshold.
+            Acceptance::Threshold => quilt_texture::Acceptance::Threshold {
+                d_max: middle(&nucleus.d_max) / class.nucleus.chromatin.sd.mean.max(1e-6),
+                max_tries: TRIES,
+            },
+            Acceptance::Near => default.acceptance,
+        },
+        seam: match nucleus.seam {
+            Seam::MinCut => default.seam,
+            Seam::Feather => quilt_texture::Seam::Feather,
+        },
+        fft: match fft {
+            Fft::Fastest => quilt_texture::Fft::Fastest,
+            Fft::Portable => quilt_texture::Fft::Portable,
+        },
+        ..default
+    }
+}
+
+/// Random candidates before the best of them is taken, where none is near enough.
+const TRIES: usize = 400;

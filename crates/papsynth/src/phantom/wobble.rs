@@ -1,0 +1,78 @@
+//! The paper's parametric shape (Eqs. 6, 7): a circle whose points are pushed about.
+
+use rand_core::Rng;
+
+use super::tile::Point;
+use crate::random;
+
+/// Points of the perturbed circle before it is smoothed (K of Eq. 7).
+const CORNERS: usize = 12;
+
+/// Points between two corners on the smooth curve through them.
+const BETWEEN: usize = 6;
+
+/// A closed curve about the origin (Eq. 7):
+/// xᵢ = s·\[U(−α, α) + cos(θᵢ + U(−β, β))\], yᵢ = s·\[U(−α, α) + sin(θᵢ + U(−β, β))\], with the points joined by a
+/// closed Catmull–Rom curve.
+pub(crate) fn wobbled_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f64, rng: &mut R) -> Vec<Point> {
+    let corners: Vec<Point> = (0..CORNERS)
+        .map(|i| {
+            // Eq. 6: (cos θ, sin θ) is the circle itself.
+            let theta = core::f64::consts::TAU * i as f64 / CORNERS as f64;
+            let [tx, ty] = [random::between(-beta, beta, rng), random::between(-beta, beta, rng)];
+            let [ax, ay] = [random::between(-alpha, alpha, rng), random::between(-alpha, alpha, rng)];
+            [radius * (ax + libm::cos(theta + tx)), radius * (ay + libm::sin(theta + ty))]
+        })
+        .collect();
+    smooth(&corners, BETWEEN)
+}
+
+/// A closed Catmull–Rom curve through the corners.
+pub(crate) fn smooth(corners: &[Point], between: usize) -> Vec<Point> {
+    let n = corners.len();
+    let mut curve = Vec::with_capacity(n * between);
+    for i in 0..n {
+        let [a, b, c, d] = [corners[(i + n - 1) % n], corners[i], corners[(i + 1) % n], corners[(i + 2) % n]];
+        for step in 0..between {
+            let t = step as f64 / between as f64;
+            let at = |axis: usize| {
+                let (a, b, c, d) = (a[axis], b[axis], c[axis], d[axis]);
+                b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+            };
+            curve.push([at(0), at(1)]);
+        }
+    }
+    curve
+}
+
+/// A point turned by an angle about the origin and moved.
+pub(crate) fn placed(point: Point, angle: f64, centre: Point) -> Point {
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    [centre[0] + point[0] * cos - point[1] * sin, centre[1] + point[0] * sin + point[1] * cos]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::key::Key;
+
+    #[test]
+    fn without_perturbation_it_is_the_circle() {
+        let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "wobble");
+        for [x, y] in wobbled_circle(5.0, 0.0, 0.0, &mut rng) {
+            assert!(((x * x + y * y).sqrt() - 5.0).abs() < 0.02);
+        }
+    }
+
+    #[test]
+    fn perturbations_stay_within_their_range() {
+        let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "wobble");
+        for _ in 0..200 {
+            let curve = wobbled_circle(1.0, 0.2, 0.1, &mut rng);
+            for corner in curve.iter().step_by(BETWEEN) {
+                let radius = (corner[0] * corner[0] + corner[1] * corner[1]).sqrt();
+                assert!((radius - 1.0).abs() <= 0.2 * 2.0_f64.sqrt() + 0.11, "{radius}");
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Drawing epithelial cells: places, sizes, stains, folds.
+
+use rand_core::Rng;
+
+use crate::key::Stream;
+use crate::model::{CellClass, Model};
+use crate::random;
+use crate::recipe::{CellMix, Recipe};
+
+use super::depth::Relief;
+use super::draw::FieldNumbers;
+use super::layout::{Places, weight_map};
+use super::{Body, CellBody, CellDetail, Fold, FoldForm, NucleusBody, Object, View, WeightMap};
+
+/// Draws every cell of a field, class by class.
+pub(super) fn draw_cells(
+    recipe: &Recipe,
+    model: &Model,
+    given: Option<&WeightMap>,
+    view: View,
+    field: &FieldNumbers,
+) -> Result<Vec<Object>, String> {
+    let counts: Vec<usize> =
+        recipe.cells.iter().map(|(class, mix)| field.count(&format!("cells.{class}.count"), &mix.count)).collect();
+    let total = counts.iter().sum();
+    if total == 0 {
+        return Ok(Vec::new());
+    }
+    let map = weight_map(&recipe.layout, given, view, field)?;
+    let spacing = field.draw("slide.spacing_um", &recipe.slide.spacing_um);
+    let mut places = Places::new(&map, total, spacing, view)?;
+    let relief = Relief::new(
+        view.size_um(),
+        field.draw("slide.depth_um", &recipe.slide.depth_um),
+        field.draw("slide.relief_um", &recipe.slide.relief_um),
+        field.draw("slide.median_um", &recipe.slide.median_um),
+        field.key.stream("field", 0, "slide.relief").next_u64(),
+    )?;
+    let stain = FieldStain {
+        cytoplasm: field.draw("stain.field_cytoplasm", &recipe.stain.field_cytoplasm),
+        nucleus: field.draw("stain.field_nucleus", &recipe.stain.field_nucleus),
+        texture: field.draw("stain.field_texture", &recipe.stain.field_texture),
+    };
+    let mut cells = Vec::with_capacity(total);
+    for ((name, mix), count) in recipe.cells.iter().zip(counts) {
+        let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
+        for _ in 0..count {
+            let number = cells.len() as u64;
+            let centre_um = places.next(&mut field.key.stream("cell", number, "place"))?;
+            let mut rng = field.key.stream("cell", number, "body");
+            let rotation_deg = random::between(0.0, 360.0, &mut rng);
+            let body = draw_body(recipe, name, class, mix, &stain, &mut rng);
+            let stacking = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
+            cells.push(Object {
+                id: 0,
+                number,
+                cluster: 0,
+                centre_um,
+                depth_um: relief.at(centre_um) + stacking,
+                rotation_deg,
+                bethesda: class.bethesda.clone(),
+                body: Body::Cell(Box::new(body)),
+            });
+        }
+    }
+    Ok(cells)
+}
+
+/// The message for a class that a model does not have.
+pub(crate) fn unknown_class(name: &str, model: &Model) -> String {
+    let known: Vec<&str> = model.classes.keys().map(String::as_str).collect();
+    format!("the model has no class `{name}`; it has {}", known.join(", "))
+}
+
+/// How strongly a field took up the stain.
+struct FieldStain {
+    cytoplasm: f64,
+    nucleus: f64,
+    texture: f64,
+}
+
+fn draw_body(recipe: &Recipe, name: &str, class: &CellClass, mix: &CellMix, stain: &FieldStain, rng: &mut Stream) -> CellBody {
+    let size = mix.size.draw(rng);
+    let cytoplasm = &class.cytoplasm;
+    let nucleus = &class.nucleus;
+    // Radii of cell and nucleus vary together: a bivariate normal of their logarithms.
+    let first = random::normal(rng);
+    let second = random::normal(rng);
+    let correlation = nucleus.size_correlation;
+    let partner = correlation * first + (1.0 - correlation * correlation).max(0.0).sqrt() * second;
+    let radius_um = size * cytoplasm.radius_um.median * libm::exp(cytoplasm.radius_um.log_sd * first);
+    let mut nucleus_um = size * nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * partner);
+    /// A nucleus wider than this share of its cell would stand out of it.
+    const WIDEST: f64 = 0.72;
+    nucleus_um = nucleus_um.min(WIDEST * radius_um);
+    let cytoplasm_absorbance = cytoplasm.absorbance.median
+        * libm::exp(cytoplasm.absorbance.log_sd * random::normal(rng))
+        * stain.cytoplasm
+        * mix.cytoplasm_stain.draw(rng);
+    let detail = draw_detail(recipe, rng);
+    let fold = draw_fold(recipe, rng);
+    let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
+    // However far off its centre, the nucleus stays inside the cell.
+    let distance = distance.min((0.85 - nucleus_um / radius_um).max(0.0));
+    let angle = random::direction(rng);
+    let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
+    let wrinkled = random::chance(recipe.nucleus.wrinkled.draw(rng), rng);
+    let mut body = NucleusBody {
+        radius_um: nucleus_um,
+        off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
+        rotation_deg: random::between(0.0, 360.0, rng),
+        absorbance: normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
+            * stain.nucleus
+            * mix.nucleus_stain.draw(rng),
+        texture: normal_at_least(nucleus.chromatin.sd.mean, nucleus.chromatin.sd.sd, 0.25, rng) * stain.texture,
+        rim: recipe.nucleus.rim.draw(rng),
+        pyknotic,
+        wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
+    };
+    if pyknotic {
+        // Shrunken, almost black, without structure.
+        body.radius_um *= random::between(0.55, 0.8, rng);
+        body.absorbance *= random::between(1.4, 2.0, rng);
+        body.texture *= random::between(0.2, 0.5, rng);
+    }
+    CellBody { class: name.to_owned(), radius_um, cytoplasm_absorbance, detail, fold, nucleus: body }
+}
+
+/// A normal cut off below a share of its mean, so that no stain vanishes or turns negative.
+fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
+    (mean + sd * random::normal(rng)).max(share * mean)
+}
+
+fn draw_detail(recipe: &Recipe, rng: &mut Stream) -> CellDetail {
+    let cytoplasm = &recipe.cytoplasm;
+    let excess = cytoplasm.excess.draw(rng);
+    let granular = random::chance(cytoplasm.granular.draw(rng), rng);
+    let granules = cytoplasm.granules.draw(rng);
+    CellDetail {
+        excess,
+        clouds: cytoplasm.clouds.draw(rng),
+        clouds_um: cytoplasm.clouds_um.draw(rng),
+        flecks: cytoplasm.flecks.draw(rng),
+        flecks_threshold: cytoplasm.flecks_threshold.draw(rng),
+        cytoskeleton: cytoplasm.cytoskeleton.draw(rng),
+        grain: cytoplasm.grain.draw(rng),
+        granules: if granular { granules } else { 0.0 },
+        fray_um: cytoplasm.fray_um.draw(rng),
+    }
+}
+
+fn draw_fold(recipe: &Recipe, rng: &mut Stream) -> Option<Fold> {
+    let folds = &recipe.cytoplasm.folds;
+    let roll = folds.roll.draw(rng);
+    let cigar = folds.cigar.draw(rng);
+    let flap = folds.flap.draw(rng);
+    let which = random::uniform(rng);
+    let direction_deg = random::between(0.0, 360.0, rng);
+    let depth = folds.depth.draw(rng);
+    let radius_um = folds.radius_um.draw(rng);
+    let form = if which < cigar {
+        FoldForm::Cigar
+    } else if which < cigar + roll {
+        FoldForm::Roll
+    } else if which < cigar + roll + flap {
+        FoldForm::Flap
+    } else {
+        return None;
+    };
+    /// A rolled rim takes in less of the cell than a flap.
+    const ROLLED: f64 = 0.45;
+    /// Each side of a cigar is folded in from about two thirds of the radius.
+    const CIGAR: f64 = 0.62;
+    let depth = match form {
+        FoldForm::Flap => depth,
+        FoldForm::Roll => depth * ROLLED,
+        FoldForm::Cigar => CIGAR,
+    };
+    Some(Fold { form, direction_deg, depth, radius_um })
+}

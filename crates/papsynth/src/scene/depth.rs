@@ -1,0 +1,97 @@
+//! How depth varies over a slide: "a median filtered Perlin noise image, scaled to encompass the desired depth".
+
+use perlin_bg::{Fractal, FractalParams};
+
+/// Depth at every place of a field.
+#[derive(Debug, Clone)]
+pub(crate) struct Relief {
+    width: usize,
+    height: usize,
+    pitch_um: f64,
+    depths: Vec<f64>,
+}
+
+impl Relief {
+    /// A relief of `depth_um` over a field of `size_um`, from Perlin noise with cells of `relief_um` behind a median
+    /// filter of `median_um`.
+    pub(crate) fn new(size_um: [f64; 2], depth_um: f64, relief_um: f64, median_um: f64, key: u64) -> Result<Self, String> {
+        /// Samples to a cell of the noise: enough for linear interpolation between them.
+        const SAMPLES: f64 = 8.0;
+        let pitch_um = relief_um / SAMPLES;
+        let samples = |length: f64| crate::random::count((length / pitch_um).ceil()) + 2;
+        let (width, height) = (samples(size_um[0]), samples(size_um[1]));
+        let noise = Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key).map_err(|e| e.to_string())?;
+        let mut raw = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                raw.push(f64::from(noise.at(x as f64 / SAMPLES, y as f64 / SAMPLES)));
+            }
+        }
+        let mut depths = median(&raw, width, crate::random::count(median_um / pitch_um / 2.0));
+        // Scaled to encompass the depth asked for, centred on the middle of the slide.
+        let (low, high) = depths.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+        let scale = if high > low { depth_um / (high - low) } else { 0.0 };
+        for depth in &mut depths {
+            *depth = (*depth - 0.5 * (low + high)) * scale;
+        }
+        Ok(Self { width, height, pitch_um, depths })
+    }
+
+    /// Depth at a place, µm.
+    pub(crate) fn at(&self, place_um: [f64; 2]) -> f64 {
+        let grid = |value: f64, count: usize| {
+            let position = (value / self.pitch_um).clamp(0.0, (count - 1) as f64);
+            let cell = crate::random::count(position.floor()).min(count - 2);
+            (cell, position - cell as f64)
+        };
+        let ((x, fx), (y, fy)) = (grid(place_um[0], self.width), grid(place_um[1], self.height));
+        let at = |x: usize, y: usize| self.depths[y * self.width + x];
+        let upper = at(x, y) * (1.0 - fx) + at(x + 1, y) * fx;
+        let lower = at(x, y + 1) * (1.0 - fx) + at(x + 1, y + 1) * fx;
+        upper * (1.0 - fy) + lower * fy
+    }
+}
+
+/// Median over squares of 2·radius + 1, cut off at the border.
+fn median(values: &[f64], width: usize, radius: usize) -> Vec<f64> {
+    let height = values.len() / width;
+    let mut window = Vec::new();
+    let mut out = Vec::with_capacity(values.len());
+    for y in 0..height {
+        for x in 0..width {
+            window.clear();
+            for row in y.saturating_sub(radius)..(y + radius + 1).min(height) {
+                window.extend_from_slice(&values[row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)]);
+            }
+            let middle = window.len() / 2;
+            out.push(*window.select_nth_unstable_by(middle, f64::total_cmp).1);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_relief_spans_its_depth_and_is_centred() {
+        let relief = Relief::new([300.0, 200.0], 5.0, 60.0, 15.0, 42).unwrap();
+        let (low, high) = relief.depths.iter().fold((0.0_f64, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+        assert!((low + 2.5).abs() < 1e-9 && (high - 2.5).abs() < 1e-9, "{low} {high}");
+        for step in 0..100 {
+            let depth = relief.at([f64::from(step) * 3.0, f64::from(step) * 2.0]);
+            assert!(depth.abs() <= 2.5 + 1e-9);
+            let near = relief.at([f64::from(step) * 3.0 + 0.1, f64::from(step) * 2.0]);
+            assert!((depth - near).abs() < 0.2, "continuous");
+        }
+    }
+
+    #[test]
+    fn a_median_removes_a_single_spike() {
+        let mut values = vec![1.0; 49];
+        values[24] = 100.0;
+        assert_eq!(median(&values, 7, 1), vec![1.0; 49]);
+        assert_eq!(median(&values, 7, 0), values);
+    }
+}

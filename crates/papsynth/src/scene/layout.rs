@@ -1,0 +1,170 @@
+//! From a layout to a weight map, and from that to places that keep their distance.
+
+use rand_core::Rng;
+
+use crate::random;
+use crate::recipe::Layout;
+
+use super::draw::FieldNumbers;
+use super::weight::{Sampler, WeightMap};
+use super::View;
+
+/// Size of a pixel of a weight map, µm: far below the size of a cell.
+const PITCH_UM: f64 = 4.0;
+
+/// Largest number of pixels along a side of a weight map, for huge fields.
+const MOST_PIXELS: usize = 2048;
+
+/// Most tries that a whole field may be expected to take.
+const MOST_TRIES: f64 = 1e9;
+
+/// Share of a plane that discs cover when no further one fits, if each was placed at random:
+/// random sequential adsorption jams at 0.547 (Feder 1980, doi:10.1016/0022-5193(80)90358-6).
+const JAMMED: f64 = 0.547;
+
+/// The weight map of a layout.
+pub(super) fn weight_map(layout: &Layout, given: Option<&WeightMap>, view: View, field: &FieldNumbers) -> Result<WeightMap, String> {
+    let [width_um, height_um] = view.size_um();
+    let pixels = |length: f64| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS);
+    let (width, height) = (pixels(width_um), pixels(height_um));
+    let place = move |[x, y]: [f64; 2]| [x * width_um, y * height_um];
+    match layout {
+        Layout::Uniform {} => Ok(WeightMap { width: 1, weights: vec![1.0] }),
+        Layout::Clusters { count, radius_um, outside } => {
+            let count = field.count("layout.count", count).max(1);
+            let outside = field.draw("layout.outside", outside);
+            let clusters: Vec<[f64; 3]> = (0..count as u64)
+                .map(|cluster| {
+                    let mut rng = field.key.stream("field", cluster, "layout.cluster");
+                    let radius = radius_um.draw(&mut rng);
+                    [random::between(0.0, width_um, &mut rng), random::between(0.0, height_um, &mut rng), radius]
+                })
+                .collect();
+            Ok(WeightMap::from_fn(width, height, |at| {
+                let [x, y] = place(at);
+                let nearest = clusters.iter().fold(0.0_f64, |most, [cx, cy, radius]| {
+                    let (dx, dy) = ((x - cx) / radius, (y - cy) / radius);
+                    most.max(libm::exp(-0.5 * (dx * dx + dy * dy)))
+                });
+                outside + (1.0 - outside) * nearest
+            }))
+        }
+        Layout::Swath { width_um: band, outside } => {
+            let band = field.draw("layout.width_um", band);
+            let outside = field.draw("layout.outside", outside);
+            let mut rng = field.key.stream("field", 0, "layout.swath");
+            let angle = random::direction(&mut rng);
+            let (nx, ny) = (libm::cos(angle), libm::sin(angle));
+            let through = place([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
+            Ok(WeightMap::from_fn(width, height, |at| {
+                let [x, y] = place(at);
+                let distance = ((x - through[0]) * nx + (y - through[1]) * ny) / band;
+                outside + (1.0 - outside) * libm::exp(-0.5 * distance * distance)
+            }))
+        }
+        Layout::Map { path } => {
+            given.cloned().ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))
+        }
+        Layout::Labels { path, smooth_um } => {
+            let map = given.ok_or_else(|| format!("`layout.path` = \"{path}\" names a label image that was not given"))?;
+            let smooth = field.draw("layout.smooth_um", smooth_um);
+            smoothed(map, smooth * map.width as f64 / width_um)
+        }
+    }
+}
+
+/// What is wrong with what a layout names, before anything is drawn.
+pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), String> {
+    let (Layout::Map { path } | Layout::Labels { path, .. }) = layout else { return Ok(()) };
+    let map = given.ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))?;
+    map.sampler().map(|_| ()).map_err(|message| format!("\"{path}\": {message}"))
+}
+
+/// A map blurred by a Gaussian, since a cell's middle may lie beside a given label.
+fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, String> {
+    map.sampler()?;
+    let kernel = optics_psf::Gaussian::new(sigma_px).map_err(|e| format!("layout.smooth_um: {e}"))?;
+    Ok(WeightMap { width: map.width, weights: kernel.blur(&map.weights, map.width, optics_psf::Border::Reflect) })
+}
+
+/// Places cells one after the other, none nearer to another than a given distance.
+pub(super) struct Places {
+    sampler: Sampler,
+    size_um: [f64; 2],
+    spacing_um: f64,
+    taken: Vec<[f64; 2]>,
+    /// Indices of `taken` by square of the field, squares as wide as the spacing.
+    squares: std::collections::BTreeMap<(i64, i64), Vec<usize>>,
+}
+
+impl Places {
+    /// Prepares to place `count` cells, or says why they will not fit: before the search starts.
+    pub(super) fn new(map: &WeightMap, count: usize, spacing_um: f64, view: View) -> Result<Self, String> {
+        let sampler = map.sampler()?;
+        let size_um = view.size_um();
+        let area = size_um[0] * size_um[1] * sampler.possible_share();
+        let disc = core::f64::consts::FRAC_PI_4 * spacing_um * spacing_um;
+        // A cell at the edge of what is possible takes only part of its disc from it.
+        let margin = 1.0 + spacing_um / area.sqrt();
+        let room = JAMMED * area * margin * margin / disc;
+        if count > 1 && disc > 0.0 && count as f64 > room {
+            return Err(format!(
+                "{count} cells at least {spacing_um} µm apart do not fit where the layout lets them lie ({area:.0} µm²): \
+                 at most about {room:.0} do; ask for fewer `cells`, a smaller `slide.spacing_um` or a larger field"
+            ));
+        }
+        let tries = sampler.expected_tries() * count as f64;
+        if tries > MOST_TRIES {
+            return Err(format!(
+                "the weight map is so uneven that {count} cells would take about {tries:.0e} tries; \
+                 expected at most {MOST_TRIES:.0e}: raise its dark parts, or ask for fewer `cells`"
+            ));
+        }
+        Ok(Self { sampler, size_um, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
+    }
+
+    /// The next place, µm.
+    pub(super) fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<[f64; 2], String> {
+        /// Accepted candidates that may turn out too near to others before the search is given up.
+        const CROWDED: usize = 20_000;
+        let mut crowded = 0;
+        while crowded < CROWDED {
+            let Some([x, y]) = self.sampler.try_place(rng) else { continue };
+            let place = [x * self.size_um[0], y * self.size_um[1]];
+            if self.is_free(place) {
+                let square = self.square(place);
+                self.squares.entry(square).or_default().push(self.taken.len());
+                self.taken.push(place);
+                return Ok(place);
+            }
+            crowded += 1;
+        }
+        Err(format!(
+            "after {} cells no place is left that is {} µm from all others; ask for fewer `cells`, a smaller \
+             `slide.spacing_um` or a larger field",
+            self.taken.len(),
+            self.spacing_um
+        ))
+    }
+
+    fn square(&self, place: [f64; 2]) -> (i64, i64) {
+        #[expect(clippy::cast_possible_truncation, reason = "a field is far smaller than 2⁶³ squares")]
+        let cell = |value: f64| (value / self.spacing_um.max(1.0)).floor() as i64;
+        (cell(place[0]), cell(place[1]))
+    }
+
+    fn is_free(&self, place: [f64; 2]) -> bool {
+        let (column, row) = self.square(place);
+        for x in column - 1..=column + 1 {
+            for y in row - 1..=row + 1 {
+                for &other in self.squares.get(&(x, y)).map_or(&[][..], Vec::as_slice) {
+                    let (dx, dy) = (self.taken[other][0] - place[0], self.taken[other][1] - place[1]);
+                    if dx * dx + dy * dy < self.spacing_um * self.spacing_um {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+}

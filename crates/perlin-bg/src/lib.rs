@@ -1,0 +1,19 @@
+#![doc = include_str!("../README.md")]
+
+mod background;
+mod error;
+mod fractal;
+mod hash;
+mod illumination;
+mod kernel;
+mod perlin;
+mod rows;
+mod unit;
+
+pub use background::{Background, BackgroundParams, Scatter};
+pub use error::Error;
+pub use fractal::{Fractal, FractalParams};
+pub use illumination::Illumination;
+pub use perlin::{Fade, Perlin, PerlinParams};
+pub use rows::Window;
+pub use unit::{UnitRange, stretch_to_unit};

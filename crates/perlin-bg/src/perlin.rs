@@ -1,0 +1,154 @@
+use crate::error::{Error, require};
+use crate::hash;
+use crate::kernel::{Profile, lattice_line, point, single};
+use crate::rows::{Rows, Window, for_each_row};
+
+/// How the four corners of a lattice cell are blended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fade {
+    /// 3t² − 2t³: Perlin's noise of 1985 (the paper's reference 32). Its second derivative jumps at the lattice lines.
+    Cubic,
+    /// 6t⁵ − 15t⁴ + 10t³: Perlin's improvement of 2002 ([doi:10.1145/566654.566636]), with two continuous derivatives.
+    ///
+    /// [doi:10.1145/566654.566636]: https://doi.org/10.1145/566654.566636
+    #[default]
+    Quintic,
+}
+
+impl Fade {
+    #[inline(always)]
+    fn at(self, t: f32) -> f32 {
+        match self {
+            Self::Cubic => t * t * (3.0 - 2.0 * t),
+            Self::Quintic => t * t * t * (t * (t * 6.0 - 15.0) + 10.0),
+        }
+    }
+}
+
+/// Parameters of [`Perlin`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct PerlinParams {
+    /// Blending of a cell's corners. Default: [`Fade::Quintic`] (ours; the paper names the noise of 1985, which is
+    /// [`Fade::Cubic`]).
+    pub fade: Fade,
+    /// Number of directions, evenly spaced, that a lattice point's unit gradient may take: 3 to 65536.
+    /// Default: 256 (ours; the power spectrum is the same from 3 on, but few directions show as slopes that come
+    /// again and again).
+    pub gradients: usize,
+}
+
+impl Default for PerlinParams {
+    fn default() -> Self {
+        Self {
+            fade: Fade::default(),
+            gradients: 256,
+        }
+    }
+}
+
+/// Perlin's gradient noise in the plane, as a pure function of position.
+///
+/// Lattice points are the integers; the noise is zero on them and varies within ±[`Perlin::BOUND`] between.
+/// A point's gradient is a hash of the key and its 64-bit coordinates, so there is no period, and windows cut anywhere
+/// agree bit for bit.
+#[derive(Debug, Clone)]
+pub struct Perlin {
+    fade: Fade,
+    directions: Vec<[f32; 2]>,
+    key: u64,
+}
+
+impl Perlin {
+    /// No value is larger in magnitude: √2/2, rounded up by more than the rounding of `f32` can add.
+    pub const BOUND: f64 = core::f64::consts::FRAC_1_SQRT_2 * (1.0 + 1e-6);
+
+    /// The noise of one `key`.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if `gradients` is not between 3 and 65536.
+    pub fn new(params: &PerlinParams, key: u64) -> Result<Self, Error> {
+        // Two directions cannot span the plane; more than 2^16 serve nobody and would only cost memory.
+        let count = params.gradients as f64;
+        require(
+            "gradients",
+            count,
+            (3..=1 << 16).contains(&params.gradients),
+            "between 3 and 65536",
+        )?;
+        let directions = (0..params.gradients)
+            .map(|i| {
+                let (sin, cos) = libm::sincos(core::f64::consts::TAU * i as f64 / count);
+                [single(cos), single(sin)]
+            })
+            .collect();
+        Ok(Self {
+            fade: params.fade,
+            directions,
+            key,
+        })
+    }
+
+    /// The same noise under another key.
+    pub(crate) fn with_key(&self, key: u64) -> Self {
+        Self {
+            key,
+            ..self.clone()
+        }
+    }
+
+    /// The noise at one point, in lattice cells. A position that is not finite gives NaN.
+    pub fn at(&self, x: f64, y: f64) -> f32 {
+        let (column, row) = (self.profile(x), self.profile(y));
+        let line = |j: i64| {
+            lattice_line(
+                column.offset,
+                column.fade,
+                self.gradient([column.cell, j]),
+                self.gradient([column.cell.wrapping_add(1), j]),
+            )
+        };
+        point(line(row.cell), line(row.cell.wrapping_add(1)), row)
+    }
+
+    /// Adds `amplitude` times the noise to every pixel of `image`: the value added is exactly
+    /// `amplitude * self.at(x, y)` at the positions that `window` gives to the pixels.
+    ///
+    /// # Panics
+    /// If `width` is zero or does not divide the length of `image`.
+    pub fn add_into(&self, image: &mut [f32], width: usize, window: &Window, amplitude: f32) {
+        let mut rows = self.rows(width, window, amplitude);
+        for_each_row(image, width, |r, row| rows.add_row(row, window.y(r)));
+    }
+
+    /// The sampler behind [`Perlin::add_into`], one row at a time.
+    pub(crate) fn rows(&self, width: usize, window: &Window, amplitude: f32) -> Rows<'_> {
+        Rows::new(self, (0..width).map(|c| window.x(c)), amplitude)
+    }
+
+    /// Splits a coordinate into its cell and the offset in it.
+    #[inline]
+    pub(crate) fn profile(&self, position: f64) -> Profile {
+        let floor = position.floor();
+        let offset = single(position - floor);
+        Profile {
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "`as` saturates, and beyond 2^63 cells every position is a lattice point"
+            )]
+            cell: floor as i64,
+            offset,
+            fade: self.fade.at(offset),
+        }
+    }
+
+    /// The unit gradient at a lattice point.
+    #[inline]
+    pub(crate) fn gradient(&self, cell: [i64; 2]) -> [f32; 2] {
+        let hash = hash::lattice(self.key, cell) >> 32;
+        // Multiply-shift maps 32 random bits evenly onto the table without a division.
+        self.directions[((hash * self.directions.len() as u64) >> 32) as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,261 @@
+use crate::quilter::Origin;
+use crate::seam::{feather, min_cut};
+use crate::source::ROW_PADDING;
+use crate::{QuiltParams, Seam, Source, Texture};
+
+/// The texture while it is being stitched: whole patches, cut to size at the end.
+pub(crate) struct Canvas {
+    patch: usize,
+    overlap: usize,
+    /// Number of patches across and down.
+    pub(crate) patches: [usize; 2],
+    width: usize,
+    pixels: Vec<f32>,
+    /// Which source pixel each came from; `None` where nothing lies yet.
+    origins: Vec<Option<Origin>>,
+    /// Whether a pixel will be seen.
+    wanted: Vec<bool>,
+    joint: Joint,
+}
+
+/// Scratch for one patch.
+#[derive(Default)]
+struct Joint {
+    /// Weight of the new patch for each of its pixels.
+    weights: Vec<f32>,
+    sharp: Vec<f32>,
+    errors: Vec<f32>,
+    path: Vec<usize>,
+}
+
+impl Canvas {
+    pub(crate) fn new(target_mask: &[f32], target_width: usize, params: &QuiltParams) -> Self {
+        let (patch, overlap) = (params.patch_px, params.overlap_px);
+        let target_height = target_mask.len() / target_width;
+        let step = patch - overlap;
+        let patches =
+            [target_width, target_height].map(|n| n.saturating_sub(overlap).div_ceil(step).max(1));
+        let [width, height] = patches.map(|n| n * step + overlap);
+        let mut wanted = vec![false; width * height];
+        for (row, mask) in wanted
+            .chunks_mut(width)
+            .zip(target_mask.chunks(target_width))
+        {
+            row.iter_mut()
+                .zip(mask)
+                .for_each(|(wanted, &m)| *wanted = m > 0.0);
+        }
+        Self {
+            patch,
+            overlap,
+            patches,
+            width,
+            pixels: vec![0.0; width * height],
+            origins: vec![None; width * height],
+            wanted,
+            joint: Joint::default(),
+        }
+    }
+
+    /// Column and row of the upper left pixel of a patch.
+    pub(crate) fn corner(&self, patch: [usize; 2]) -> [usize; 2] {
+        patch.map(|n| n * (self.patch - self.overlap))
+    }
+
+    /// Whether a patch would show a pixel that is not there yet.
+    pub(crate) fn needs(&self, corner: [usize; 2]) -> bool {
+        (0..self.patch).any(|y| {
+            let start = self.index(corner, [0, y]);
+            let row = start..start + self.patch;
+            let unseen = self.wanted[row.clone()].iter().zip(&self.origins[row]);
+            unseen
+                .into_iter()
+                .any(|(&wanted, origin)| wanted && origin.is_none())
+        })
+    }
+
+    /// Collects the pixels under the overlaps of a patch that are there and will be seen.
+    pub(crate) fn overlaps(&self, corner: [usize; 2], pixels: &mut Vec<([usize; 2], f32)>) {
+        pixels.clear();
+        for y in 0..self.patch {
+            let breadth = if y < self.overlap {
+                self.patch
+            } else {
+                self.overlap
+            };
+            for x in 0..breadth {
+                let i = self.index(corner, [x, y]);
+                if self.wanted[i] && self.origins[i].is_some() {
+                    pixels.push(([x, y], self.pixels[i]));
+                }
+            }
+        }
+    }
+
+    /// Joins the patch at `place` of a source to what is there.
+    pub(crate) fn paste(
+        &mut self,
+        corner: [usize; 2],
+        number: usize,
+        source: &Source,
+        place: usize,
+        seam: Seam,
+    ) {
+        let mut joint = core::mem::take(&mut self.joint);
+        self.weigh(corner, source, place, seam, &mut joint);
+        for y in 0..self.patch {
+            for x in 0..self.patch {
+                let i = self.index(corner, [x, y]);
+                let from = place + y * source.stride() + x;
+                let new = source.pixels[from];
+                let weight = match self.origins[i] {
+                    Some(_) => joint.weights[y * self.patch + x],
+                    None => 1.0,
+                };
+                if weight >= 0.5 {
+                    let row = from / (source.width + ROW_PADDING);
+                    self.origins[i] = Some(Origin {
+                        source: number,
+                        pixel: from - row * ROW_PADDING,
+                    });
+                }
+                self.pixels[i] = if weight == 1.0 {
+                    new
+                } else {
+                    self.pixels[i] + weight * (new - self.pixels[i])
+                };
+            }
+        }
+        self.joint = joint;
+    }
+
+    /// What the target shows.
+    pub(crate) fn finish(self, target_width: usize, target_height: usize) -> Texture {
+        let mut texture = Texture {
+            pixels: Vec::with_capacity(target_width * target_height),
+            origins: Vec::with_capacity(target_width * target_height),
+            width: target_width,
+        };
+        for y in 0..target_height {
+            let row = y * self.width..y * self.width + target_width;
+            let wanted = &self.wanted[row.clone()];
+            let pixels = self.pixels[row.clone()].iter().zip(wanted);
+            texture
+                .pixels
+                .extend(pixels.map(|(&v, &wanted)| if wanted { v } else { 0.0 }));
+            let origins = self.origins[row].iter().zip(wanted);
+            texture
+                .origins
+                .extend(origins.map(|(origin, &wanted)| origin.filter(|_| wanted)));
+        }
+        texture
+    }
+
+    fn index(&self, corner: [usize; 2], [x, y]: [usize; 2]) -> usize {
+        (corner[1] + y) * self.width + corner[0] + x
+    }
+
+    /// Sets the weights of the new patch where it covers old pixels.
+    fn weigh(
+        &self,
+        corner: [usize; 2],
+        source: &Source,
+        place: usize,
+        seam: Seam,
+        joint: &mut Joint,
+    ) {
+        let (patch, overlap) = (self.patch, self.overlap);
+        let old = |x, y| self.origins[self.index(corner, [x, y])].is_some();
+        let rows = |mut columns: core::ops::Range<usize>, y| columns.any(|x| old(x, y));
+        let left = (overlap..patch).any(|y| rows(0..overlap, y));
+        let above = (0..overlap).any(|y| rows(if left { overlap } else { 0 }..patch, y));
+        let weights = &mut joint.weights;
+        weights.clear();
+        weights.resize(patch * patch, 1.0);
+        match seam {
+            Seam::Feather => {
+                for (i, weight) in weights.iter_mut().enumerate() {
+                    let across = if left {
+                        feather(i % patch, overlap)
+                    } else {
+                        1.0
+                    };
+                    let down = if above {
+                        feather(i / patch, overlap)
+                    } else {
+                        1.0
+                    };
+                    *weight = across.min(down);
+                }
+            }
+            Seam::MinCut { feather_px } => {
+                joint.path.resize(patch, 0);
+                // Unseen pixels and those with nothing under them are free to cut through.
+                let error = |x, y| {
+                    let i = self.index(corner, [x, y]);
+                    let d = self.pixels[i] - source.pixels[place + y * source.stride() + x];
+                    if self.wanted[i] && self.origins[i].is_some() {
+                        d * d
+                    } else {
+                        0.0
+                    }
+                };
+                let strip =
+                    || (0..patch).flat_map(|along| (0..overlap).map(move |across| (along, across)));
+                if left {
+                    joint.errors.clear();
+                    joint.errors.extend(strip().map(|(y, x)| error(x, y)));
+                    min_cut(&mut joint.errors, overlap, &mut joint.path);
+                    for (y, &cut) in joint.path.iter().enumerate() {
+                        weights[y * patch..][..cut].fill(0.0);
+                    }
+                }
+                if above {
+                    joint.errors.clear();
+                    joint.errors.extend(strip().map(|(x, y)| error(x, y)));
+                    min_cut(&mut joint.errors, overlap, &mut joint.path);
+                    for (x, &cut) in joint.path.iter().enumerate() {
+                        (0..cut).for_each(|y| weights[y * patch + x] = 0.0);
+                    }
+                }
+                if feather_px > 0 {
+                    for (i, weight) in weights.iter_mut().enumerate() {
+                        if !old(i % patch, i / patch) {
+                            *weight = 1.0;
+                        }
+                    }
+                    joint.sharp.clone_from(weights);
+                    for y in 0..patch {
+                        let breadth = if y < overlap { patch } else { overlap };
+                        for x in 0..breadth {
+                            weights[y * patch + x] =
+                                blurred(&joint.sharp, patch, [x, y], feather_px, [left, above]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The mean weight in a box around a pixel of a patch. Beyond the edges at which it meets a
+/// neighbour the old texture goes on, with weight 0; the others end the box.
+fn blurred(weights: &[f32], patch: usize, at: [usize; 2], radius: usize, meets: [bool; 2]) -> f32 {
+    let [(x0, x1, wide), (y0, y1, high)] = [0, 1].map(|axis| {
+        let first = at[axis].saturating_sub(radius);
+        let end = (at[axis] + radius + 1).min(patch);
+        let beyond = if meets[axis] {
+            radius.saturating_sub(at[axis])
+        } else {
+            0
+        };
+        (first, end, end - first + beyond)
+    });
+    let sum: f32 = (y0..y1)
+        .map(|y| weights[y * patch + x0..y * patch + x1].iter().sum::<f32>())
+        .sum();
+    #[expect(clippy::cast_precision_loss, reason = "at most 513 squared")]
+    {
+        sum / (wide * high) as f32
+    }
+}

@@ -1,0 +1,19 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+mod candidates;
+mod canvas;
+mod distance;
+mod error;
+mod params;
+mod quilter;
+mod scan;
+mod seam;
+mod source;
+mod spectral;
+
+pub use error::Error;
+pub use params::{Acceptance, CentreBias, Fft, QuiltParams, Seam, Search};
+pub use quilter::{Origin, Quilter, Texture};
+pub use rand_core::Rng;
+pub use source::Source;

@@ -1,0 +1,397 @@
+use rand_core::Rng;
+
+use crate::candidates::Candidates;
+use crate::canvas::Canvas;
+use crate::distance::centrality;
+use crate::scan::{LANES, Laid, Template, Tolerance, scan};
+use crate::source::COVERED;
+use crate::spectral::Spectral;
+use crate::{Acceptance, CentreBias, Error, QuiltParams, Search, Source};
+
+/// Places drawn before one is taken although the weighting is against it: enough for a weight of
+/// a tenth to be obeyed nineteen times in twenty.
+const REDRAWS: usize = 30;
+
+/// Stitches textures from patches of sources ("Texture synthesis", Figs. 4 and 5).
+///
+/// Patches are placed row by row from the upper left. Each is chosen by how well its overlaps
+/// match what is there, then joined to it.
+#[derive(Debug, Clone)]
+pub struct Quilter<'a> {
+    params: QuiltParams,
+    donors: Vec<Donor<'a>>,
+    /// Number of places for a patch in all sources.
+    places: usize,
+    /// Variance of the pixels about the mean of their source.
+    variance: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Donor<'a> {
+    source: &'a Source,
+    candidates: Candidates,
+    spectral: Option<Spectral>,
+}
+
+/// A synthesised texture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// Row by row from the top, in units of the sources; 0 outside the target.
+    pub pixels: Vec<f32>,
+    /// Where each pixel came from, or most of it where a seam is feathered; `None` outside the
+    /// target.
+    pub origins: Vec<Option<Origin>>,
+    /// Width, px.
+    pub width: usize,
+}
+
+/// A pixel of a source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Origin {
+    /// Which of the sources given to [`Quilter::new`].
+    pub source: usize,
+    /// Index into the pixels given to [`Source::new`].
+    pub pixel: usize,
+}
+
+/// A place for the upper left pixel of a patch.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    donor: usize,
+    place: usize,
+}
+
+/// Scratch for one texture.
+#[derive(Default)]
+struct Work {
+    template: Template,
+    /// The template laid over each source.
+    laid: Vec<Laid>,
+    /// Costs of all candidates, source after source.
+    costs: Vec<f32>,
+    near: Vec<usize>,
+}
+
+impl<'a> Quilter<'a> {
+    /// Finds the places for patches in each source.
+    ///
+    /// # Errors
+    ///
+    /// If a parameter is out of range, there is no source, or one has no room for a patch.
+    pub fn new(sources: &[&'a Source], params: &QuiltParams) -> Result<Self, Error> {
+        params.check()?;
+        if sources.is_empty() {
+            return Err(Error::NoSource);
+        }
+        let donor = |(index, &source): (usize, &&'a Source)| {
+            let candidates = Candidates::new(source, params.patch_px);
+            if candidates.places.is_empty() {
+                return Err(Error::SourceTooSmall {
+                    index,
+                    patch_px: params.patch_px,
+                });
+            }
+            let spectral = match params.search {
+                Search::Direct => false,
+                Search::Fft => true,
+                Search::Auto => spectral_is_faster(source, &candidates, params),
+            };
+            Ok(Donor {
+                source,
+                candidates,
+                spectral: spectral.then(|| Spectral::new(source, params.fft)),
+            })
+        };
+        let donors = sources
+            .iter()
+            .enumerate()
+            .map(donor)
+            .collect::<Result<Vec<_>, _>>()?;
+        let count: usize = sources.iter().map(|s| s.count).sum();
+        let squares: f64 = sources.iter().map(|s| s.squares).sum();
+        #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
+        let variance = squares / count as f64;
+        Ok(Self {
+            params: params.clone(),
+            places: donors.iter().map(|d| d.candidates.places.len()).sum(),
+            donors,
+            variance,
+        })
+    }
+
+    /// A new texture for every pixel with a `target_mask` (coverage, 0 to 1) above 0.
+    ///
+    /// # Panics
+    ///
+    /// If `target_mask` is not made of whole rows of `width` pixels.
+    #[must_use]
+    pub fn synthesise<R: Rng + ?Sized>(
+        &self,
+        target_mask: &[f32],
+        width: usize,
+        rng: &mut R,
+    ) -> Texture {
+        assert!(
+            width > 0 && target_mask.len().is_multiple_of(width),
+            "target_mask must have whole rows of {width} pixels, has {} values",
+            target_mask.len()
+        );
+        let height = target_mask.len() / width;
+        let depths = match self.params.centre_bias {
+            CentreBias::Off => Vec::new(),
+            CentreBias::Weighted { .. } => {
+                let inside: Vec<bool> = target_mask.iter().map(|&m| m >= COVERED).collect();
+                centrality(&inside, width)
+            }
+        };
+        let mut canvas = Canvas::new(target_mask, width, &self.params);
+        let mut work = Work::default();
+        let [across, down] = canvas.patches;
+        let mut above: Vec<Option<Candidate>> = vec![None; across];
+        for row in 0..down {
+            let mut left = None;
+            for (column, above) in above.iter_mut().enumerate() {
+                let corner = canvas.corner([column, row]);
+                let before = [left.take(), above.take()];
+                if !canvas.needs(corner) {
+                    continue;
+                }
+                let [x, y] = corner.map(|c| c + self.params.patch_px / 2);
+                let centre = y.min(height - 1) * width + x.min(width - 1);
+                work.template.centrality = depths.get(centre).copied().unwrap_or(0.0);
+                canvas.overlaps(corner, &mut work.template.pixels);
+                let chosen = self.choose(before, &mut work, rng);
+                let source = self.donors[chosen.donor].source;
+                canvas.paste(corner, chosen.donor, source, chosen.place, self.params.seam);
+                left = Some(chosen);
+                *above = left;
+            }
+        }
+        canvas.finish(width, height)
+    }
+
+    fn choose<R: Rng + ?Sized>(
+        &self,
+        before: [Option<Candidate>; 2],
+        work: &mut Work,
+        rng: &mut R,
+    ) -> Candidate {
+        if work.template.pixels.is_empty() {
+            return self.weighted(work.template.centrality, rng);
+        }
+        match self.params.acceptance {
+            Acceptance::Threshold { d_max, max_tries } => {
+                self.first_below(d_max, max_tries, work, rng)
+            }
+            Acceptance::Near { factor, floor } => self.one_near(factor, floor, before, work, rng),
+        }
+    }
+
+    /// The paper's acceptance: the first random candidate with d(E_B(x,y), E_B0) < d_max, d the
+    /// root of the mean squared error over the overlaps.
+    fn first_below<R: Rng + ?Sized>(
+        &self,
+        d_max: f64,
+        max_tries: usize,
+        work: &mut Work,
+        rng: &mut R,
+    ) -> Candidate {
+        let template = &mut work.template;
+        template.weight = 0.0;
+        self.lay(template, &mut work.laid);
+        #[expect(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            reason = "at most 256 squared; costs are single precision"
+        )]
+        let enough = (d_max * d_max * template.pixels.len() as f64) as f32;
+        let mut best = (f32::INFINITY, None);
+        for _ in 0..max_tries {
+            let candidate = self.weighted(template.centrality, rng);
+            let source = self.donors[candidate.donor].source;
+            let cost = work.laid[candidate.donor].cost(source, candidate.place);
+            if cost < best.0 {
+                best = (cost, Some(candidate));
+            }
+            if cost <= enough {
+                break;
+            }
+        }
+        // Only an overflow of every cost leaves none.
+        best.1
+            .unwrap_or_else(|| self.weighted(template.centrality, rng))
+    }
+
+    /// Ours: one of the candidates whose cost is near the smallest.
+    fn one_near<R: Rng + ?Sized>(
+        &self,
+        factor: f64,
+        floor: f64,
+        before: [Option<Candidate>; 2],
+        work: &mut Work,
+        rng: &mut R,
+    ) -> Candidate {
+        #[expect(clippy::cast_precision_loss, reason = "at most 256 squared")]
+        let scale = self.variance * work.template.pixels.len() as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "costs are single precision"
+        )]
+        let tolerance = Tolerance {
+            factor: factor as f32,
+            floor: (floor * scale) as f32,
+        };
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "costs are single precision"
+        )]
+        {
+            work.template.weight = (self.params.centre_bias.strength() * scale) as f32;
+        }
+        self.lay(&work.template, &mut work.laid);
+        // What continues a neighbour usually fits well, and lets the search reject early.
+        let mut least = f32::INFINITY;
+        for candidate in self.continuations(before).into_iter().flatten() {
+            let source = self.donors[candidate.donor].source;
+            least = least.min(work.laid[candidate.donor].cost(source, candidate.place));
+        }
+        work.costs
+            .resize(self.donors.iter().map(|d| d.candidates.slots).sum(), 0.0);
+        let mut rest = &mut work.costs[..];
+        for (donor, laid) in self.donors.iter().zip(&work.laid) {
+            let (costs, others) = rest.split_at_mut(donor.candidates.slots);
+            rest = others;
+            match &donor.spectral {
+                None => scan(
+                    donor.source,
+                    &donor.candidates,
+                    laid,
+                    tolerance,
+                    &mut least,
+                    costs,
+                ),
+                Some(spectral) => {
+                    let patch = self.params.patch_px;
+                    spectral.costs(
+                        donor.source,
+                        &donor.candidates,
+                        patch,
+                        &work.template,
+                        &mut least,
+                        costs,
+                    );
+                }
+            }
+        }
+        let bound = tolerance.bound(least);
+        work.near.clear();
+        for (block, costs) in work.costs.as_chunks::<LANES>().0.iter().enumerate() {
+            // Nearly all blocks are passed over, and this test is a few vector instructions.
+            if costs.iter().fold(false, |any, &cost| any | (cost <= bound)) {
+                let near = (0..LANES).filter(|&lane| costs[lane] <= bound);
+                work.near.extend(near.map(|lane| block * LANES + lane));
+            }
+        }
+        if work.near.is_empty() {
+            // Only an overflow of every cost leaves none.
+            return self.weighted(work.template.centrality, rng);
+        }
+        self.candidate_of_slot(work.near[below(work.near.len(), rng)])
+    }
+
+    fn lay(&self, template: &Template, laid: &mut Vec<Laid>) {
+        laid.resize_with(self.donors.len(), Laid::default);
+        for (laid, donor) in laid.iter_mut().zip(&self.donors) {
+            laid.over(donor.source, self.params.patch_px, template);
+        }
+    }
+
+    /// The candidates that continue the left neighbour to the right and the upper one downwards.
+    fn continuations(&self, [left, above]: [Option<Candidate>; 2]) -> [Option<Candidate>; 2] {
+        let step = self.params.patch_px - self.params.overlap_px;
+        let shift = |from: Option<Candidate>, down: bool| {
+            let Candidate { donor, place } = from?;
+            let Donor {
+                source, candidates, ..
+            } = &self.donors[donor];
+            let place = place + if down { step * source.stride() } else { step };
+            let open = candidates.barrier.get(place).is_some_and(|&b| b == 0.0);
+            open.then_some(Candidate { donor, place })
+        };
+        [shift(left, false), shift(above, true)]
+    }
+
+    fn candidate_of_slot(&self, mut slot: usize) -> Candidate {
+        let mut donor = 0;
+        while slot >= self.donors[donor].candidates.slots {
+            slot -= self.donors[donor].candidates.slots;
+            donor += 1;
+        }
+        let place = self.donors[donor].candidates.place_of_slot(slot);
+        Candidate { donor, place }
+    }
+
+    /// A random candidate, with probability in proportion to exp(-strength · Δ²).
+    fn weighted<R: Rng + ?Sized>(&self, depth: f32, rng: &mut R) -> Candidate {
+        let strength = self.params.centre_bias.strength();
+        let mut candidate = self.any(rng);
+        for _ in 0..REDRAWS {
+            if strength == 0.0 {
+                break;
+            }
+            let source = self.donors[candidate.donor].source;
+            let centre = candidate.place + (self.params.patch_px / 2) * (source.stride() + 1);
+            let away = f64::from(source.centrality[centre] - depth);
+            if uniform(rng) < libm::exp(-strength * away * away) {
+                break;
+            }
+            candidate = self.any(rng);
+        }
+        candidate
+    }
+
+    fn any<R: Rng + ?Sized>(&self, rng: &mut R) -> Candidate {
+        let mut n = below(self.places, rng);
+        let mut donor = 0;
+        while n >= self.donors[donor].candidates.places.len() {
+            n -= self.donors[donor].candidates.places.len();
+            donor += 1;
+        }
+        let place = self.donors[donor].candidates.places[n];
+        Candidate { donor, place }
+    }
+}
+
+/// Whether the Fourier transform beats the scan on one source, by operation counts: the scan does
+/// one difference for a candidate and pixel of the overlaps, `LANES` at a time, the transforms
+/// some log N for a pixel of the grid.
+fn spectral_is_faster(source: &Source, candidates: &Candidates, params: &QuiltParams) -> bool {
+    /// Time of one difference, and of one step of a transform, measured.
+    const DIFFERENCE_NS: f64 = 0.04;
+    const STEP_NS: f64 = 3.0;
+    let overlaps = params.overlap_px * (2 * params.patch_px - params.overlap_px);
+    let pixels: usize = Spectral::grid(source).iter().product();
+    #[expect(clippy::cast_precision_loss, reason = "an estimate")]
+    {
+        let scan = DIFFERENCE_NS * (candidates.slots * overlaps) as f64;
+        scan > STEP_NS * pixels as f64 * f64::from(pixels.ilog2() + 1)
+    }
+}
+
+/// A uniform number in 0..1.
+fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    /// 2^-53.
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
+    {
+        (rng.next_u64() >> 11) as f64 * STEP
+    }
+}
+
+/// A uniform whole number below `n`, by multiplication: uneven by less than n / 2^64.
+fn below<R: Rng + ?Sized>(n: usize, rng: &mut R) -> usize {
+    #[expect(clippy::cast_possible_truncation, reason = "below n")]
+    {
+        ((u128::from(rng.next_u64()) * n as u128) >> 64) as usize
+    }
+}

@@ -1,0 +1,266 @@
+use multiversion::multiversion;
+
+use crate::Source;
+use crate::candidates::Candidates;
+
+/// Candidates compared at once: one vector of AVX-512, two of AVX, four of NEON.
+pub(crate) const LANES: usize = 32;
+
+/// The order in which the pixels of a template are compared, modulo its length: spread over the
+/// whole template first, so that a quarter or half of them suffices to reject most candidates.
+const PHASES: [usize; 4] = [0, 2, 1, 3];
+
+/// What a candidate must resemble.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Template {
+    /// The pixels under the overlaps that will be seen: column and row in the patch, and value.
+    pub(crate) pixels: Vec<([usize; 2], f32)>,
+    /// Relative distance of the centre of the patch from the edge of the target.
+    pub(crate) centrality: f32,
+    /// What a squared difference of that distance costs.
+    pub(crate) weight: f32,
+}
+
+/// Costs up to which a candidate may be chosen, once the smallest is known.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tolerance {
+    pub(crate) factor: f32,
+    pub(crate) floor: f32,
+}
+
+impl Tolerance {
+    #[inline(always)]
+    pub(crate) fn bound(self, least: f32) -> f32 {
+        self.factor * least + self.floor
+    }
+}
+
+/// A template laid out over one source.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Laid {
+    /// Offset from the place of a candidate, and value.
+    pixels: Vec<(usize, f32)>,
+    /// Offset of the centre of the patch.
+    centre: usize,
+    centrality: f32,
+    weight: f32,
+}
+
+impl Laid {
+    pub(crate) fn over(&mut self, source: &Source, patch: usize, template: &Template) {
+        let stride = source.stride();
+        self.pixels.clear();
+        for phase in PHASES {
+            let pixels = template.pixels.iter().skip(phase).step_by(PHASES.len());
+            let lay = |&([x, y], v): &([usize; 2], f32)| (y * stride + x, v);
+            self.pixels.extend(pixels.map(lay));
+        }
+        self.centre = (patch / 2) * (stride + 1);
+        self.centrality = template.centrality;
+        self.weight = template.weight;
+    }
+
+    /// The cost of one candidate, with the same bits as [`scan`] gives it.
+    pub(crate) fn cost(&self, source: &Source, place: usize) -> f32 {
+        let mut cost = [0.0];
+        self.add_distance(&mut cost, source, place);
+        for stage in self.stages() {
+            add_squares(&mut cost, &source.pixels, place, stage);
+        }
+        cost[0]
+    }
+
+    /// The pixels in parts, after each of which a candidate may be given up.
+    #[inline(always)]
+    fn stages(&self) -> core::slice::Chunks<'_, (usize, f32)> {
+        self.pixels.chunks(self.pixels.len().div_ceil(PHASES.len()).max(1))
+    }
+
+    /// weight · Δ² of candidates side by side.
+    #[inline(always)]
+    fn add_distance<const N: usize>(&self, costs: &mut [f32; N], source: &Source, place: usize) {
+        let depth = lanes::<N>(&source.centrality, place + self.centre);
+        for lane in 0..N {
+            let away = depth[lane] - self.centrality;
+            costs[lane] += self.weight * (away * away);
+        }
+    }
+}
+
+/// Writes the cost of every candidate of a source, weight · Δ² + Σ (s - t)², or infinity once it
+/// is sure that it lies beyond the tolerance of the smallest cost. `least` is the smallest cost
+/// known before, and after.
+#[multiversion(targets = "simd")]
+pub(crate) fn scan(
+    source: &Source,
+    candidates: &Candidates,
+    laid: &Laid,
+    tolerance: Tolerance,
+    least: &mut f32,
+    costs: &mut [f32],
+) {
+    for run in &candidates.runs {
+        let costs = &mut costs[run.slot..][..run.blocks * LANES];
+        'block: for (block, out) in costs.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let place = run.place + block * LANES;
+            let mut sum = *lanes(&candidates.barrier, place);
+            laid.add_distance(&mut sum, source, place);
+            for stage in laid.stages() {
+                let bound = tolerance.bound(*least);
+                if !sum.iter().fold(false, |any, &cost| any | (cost <= bound)) {
+                    *out = [f32::INFINITY; LANES];
+                    continue 'block;
+                }
+                add_squares(&mut sum, &source.pixels, place, stage);
+            }
+            *out = sum;
+            *least = least.min(smallest(&sum));
+        }
+    }
+}
+
+/// Σ (s - t)² of candidates side by side. Two sums at once hide the latency of an addition.
+#[inline(always)]
+fn add_squares<const N: usize>(sums: &mut [f32; N], pixels: &[f32], place: usize, template: &[(usize, f32)]) {
+    let mut others = [0.0; N];
+    let (pairs, last) = template.as_chunks::<2>();
+    for [(offset, v), (other_offset, other_v)] in pairs {
+        let s = lanes::<N>(pixels, place + offset);
+        let other_s = lanes::<N>(pixels, place + other_offset);
+        for lane in 0..N {
+            let d = s[lane] - v;
+            let other_d = other_s[lane] - other_v;
+            sums[lane] += d * d;
+            others[lane] += other_d * other_d;
+        }
+    }
+    for (offset, v) in last {
+        let s = lanes::<N>(pixels, place + offset);
+        for lane in 0..N {
+            let d = s[lane] - v;
+            others[lane] += d * d;
+        }
+    }
+    for lane in 0..N {
+        sums[lane] += others[lane];
+    }
+}
+
+#[inline(always)]
+fn lanes<const N: usize>(values: &[f32], at: usize) -> &[f32; N] {
+    let (block, _) = values[at..].split_first_chunk().expect("rows are padded by LANES");
+    block
+}
+
+#[inline(always)]
+fn smallest(values: &[f32; LANES]) -> f32 {
+    let mut halves = *values;
+    let mut width = LANES / 2;
+    while width > 0 {
+        for lane in 0..width {
+            halves[lane] = if halves[lane + width] < halves[lane] {
+                halves[lane + width]
+            } else {
+                halves[lane]
+            };
+        }
+        width /= 2;
+    }
+    halves[0]
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use rand_core::Rng;
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+    const SEED: u64 = 0x5ca2;
+
+    /// A disc of white noise, uniform in 0..1.
+    pub(crate) fn disc(width: usize, height: usize, rng: &mut impl Rng) -> Source {
+        let pixels: Vec<f32> = (0..width * height)
+            .map(|_| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32)
+            .collect();
+        let mask: Vec<f32> = (0..width * height)
+            .map(|i| {
+                let x = 2.0 * ((i % width) as f32 + 0.5) / width as f32 - 1.0;
+                let y = 2.0 * ((i / width) as f32 + 0.5) / height as f32 - 1.0;
+                if x * x + y * y < 1.0 { 1.0 } else { 0.0 }
+            })
+            .collect();
+        Source::new(&pixels, &mask, width).unwrap()
+    }
+
+    /// An L of random values, as two neighbours leave it.
+    pub(crate) fn template(patch: usize, overlap: usize, rng: &mut impl Rng) -> Template {
+        let all = (0..patch).flat_map(|y| (0..patch).map(move |x| [x, y]));
+        Template {
+            pixels: all
+                .filter(|&[x, y]| x < overlap || y < overlap)
+                .map(|at| (at, (rng.next_u32() >> 8) as f32 / (1 << 24) as f32))
+                .collect(),
+            centrality: 0.4,
+            weight: 0.7,
+        }
+    }
+
+    /// Σ (s - t)² + weight · Δ² in double precision.
+    pub(crate) fn slow_cost(
+        source: &Source,
+        patch: usize,
+        template: &Template,
+        place: usize,
+    ) -> f64 {
+        let at = |[x, y]: [usize; 2]| place + y * source.stride() + x;
+        let depth = source.centrality[at([patch / 2, patch / 2])];
+        let away = f64::from(depth) - f64::from(template.centrality);
+        let squares = template.pixels.iter().map(|&(p, v)| {
+            let d = f64::from(source.pixels[at(p)]) - f64::from(v);
+            d * d
+        });
+        squares.sum::<f64>() + f64::from(template.weight) * away * away
+    }
+
+    #[test]
+    fn scan_equals_brute_force() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        for (width, height, patch, overlap) in [(40, 40, 7, 2), (61, 23, 9, 3), (7, 7, 3, 1)] {
+            let source = disc(width, height, &mut rng);
+            let candidates = Candidates::new(&source, patch);
+            let template = template(patch, overlap, &mut rng);
+            let mut laid = Laid::default();
+            laid.over(&source, patch, &template);
+            for (factor, floor) in [(1e9, 0.0), (1.1, 0.02)] {
+                let tolerance = Tolerance { factor, floor };
+                let mut costs = vec![f32::NAN; candidates.slots];
+                let mut least = f32::INFINITY;
+                scan(
+                    &source,
+                    &candidates,
+                    &laid,
+                    tolerance,
+                    &mut least,
+                    &mut costs,
+                );
+                let smallest = costs.iter().copied().fold(f32::INFINITY, f32::min);
+                assert_eq!(least, smallest);
+                for (slot, &cost) in costs.iter().enumerate() {
+                    let place = candidates.place_of_slot(slot);
+                    if candidates.barrier[place] > 0.0 {
+                        assert_eq!(cost, f32::INFINITY);
+                        continue;
+                    }
+                    let slow = slow_cost(&source, patch, &template, place);
+                    if cost.is_finite() {
+                        assert_eq!(cost, laid.cost(&source, place));
+                        // A sum of n terms in single precision errs by n ε / 2 at most.
+                        assert!((f64::from(cost) / slow - 1.0).abs() < 4e-6);
+                    } else {
+                        assert!(slow > f64::from(tolerance.bound(least)) * (1.0 - 4e-6));
+                    }
+                }
+            }
+        }
+    }
+}

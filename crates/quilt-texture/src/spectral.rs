@@ -1,0 +1,267 @@
+use core::fmt;
+use std::sync::Arc;
+
+use rustfft::num_complex::Complex64;
+use rustfft::{Fft as Transform, FftPlanner, FftPlannerScalar};
+
+use crate::candidates::Candidates;
+use crate::scan::{LANES, Template};
+use crate::{Fft, Source};
+
+/// Compares a template with all places of one source at once by Fourier transforms:
+/// Σ m (s - t)² = Σ m t² - 2 (s ⋆ m t) + (s² ⋆ m), ⋆ a correlation.
+#[derive(Clone)]
+pub(crate) struct Spectral {
+    /// Sides of the transform: those of the source, rounded up.
+    grid: [usize; 2],
+    /// The mean of the source, taken off source and template against cancellation.
+    mean: f64,
+    /// Transforms of s and s², columns of frequencies contiguous.
+    plain: Vec<Complex64>,
+    squared: Vec<Complex64>,
+    plans: [Plan; 2],
+}
+
+/// Forward and inverse transform of one length.
+#[derive(Clone)]
+struct Plan {
+    forward: Arc<dyn Transform<f64>>,
+    inverse: Arc<dyn Transform<f64>>,
+}
+
+impl Spectral {
+    pub(crate) fn new(source: &Source, fft: Fft) -> Self {
+        let grid = Self::grid(source);
+        let plans = match fft {
+            Fft::Fastest => {
+                let mut planner = FftPlanner::new();
+                grid.map(|n| Plan {
+                    forward: planner.plan_fft_forward(n),
+                    inverse: planner.plan_fft_inverse(n),
+                })
+            }
+            Fft::Portable => {
+                let mut planner = FftPlannerScalar::new();
+                grid.map(|n| Plan {
+                    forward: planner.plan_fft_forward(n),
+                    inverse: planner.plan_fft_inverse(n),
+                })
+            }
+        };
+        let known = || {
+            (0..)
+                .zip(&source.known)
+                .filter(|&(_, &known)| known)
+                .map(|(i, _): (usize, _)| i)
+        };
+        let [x, y] = [|i: usize, w: usize| i % w, |i: usize, w: usize| i / w];
+        let value = |i| {
+            let place = y(i, source.width) * source.stride() + x(i, source.width);
+            f64::from(source.pixels[place])
+        };
+        #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
+        let mean = known().map(value).sum::<f64>() / source.count as f64;
+        let mut spectral = Self {
+            grid,
+            mean,
+            plain: Vec::new(),
+            squared: Vec::new(),
+            plans,
+        };
+        let transform = |of: &dyn Fn(f64) -> f64| {
+            let mut image = vec![Complex64::ZERO; grid[0] * grid[1]];
+            for i in known() {
+                image[y(i, source.width) * grid[0] + x(i, source.width)].re = of(value(i) - mean);
+            }
+            spectral.forward(image)
+        };
+        let (plain, squared) = (transform(&|v| v), transform(&|v| v * v));
+        spectral.plain = plain;
+        spectral.squared = squared;
+        spectral
+    }
+
+    /// Sides of the transform over a source.
+    pub(crate) fn grid(source: &Source) -> [usize; 2] {
+        [source.width, source.height].map(fast_length)
+    }
+
+    /// What [`scan`](crate::scan::scan) writes, without early rejection.
+    pub(crate) fn costs(
+        &self,
+        source: &Source,
+        candidates: &Candidates,
+        patch: usize,
+        template: &Template,
+        least: &mut f32,
+        costs: &mut [f32],
+    ) {
+        let squares = self.squares(template);
+        let stride = source.stride();
+        let centre = (patch / 2) * (stride + 1);
+        costs.fill(f32::INFINITY);
+        for run in &candidates.runs {
+            for (i, cost) in costs[run.slot..][..run.blocks * LANES]
+                .iter_mut()
+                .enumerate()
+            {
+                let place = run.place + i;
+                if candidates.barrier[place] > 0.0 {
+                    continue;
+                }
+                let away = source.centrality[place + centre] - template.centrality;
+                let sum = squares[place / stride * self.grid[0] + place % stride].max(0.0);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "costs are single precision"
+                )]
+                {
+                    *cost = template.weight * (away * away) + sum as f32;
+                }
+                *least = least.min(*cost);
+            }
+        }
+    }
+
+    /// Σ m (s - t)² for the upper left corner of the template at every pixel of the grid.
+    fn squares(&self, template: &Template) -> Vec<f64> {
+        let [width, height] = self.grid;
+        let mut constant = 0.0;
+        // Both templates, m t and m, are real and share a transform.
+        let mut image = vec![Complex64::ZERO; width * height];
+        for &([x, y], v) in &template.pixels {
+            let t = f64::from(v) - self.mean;
+            image[y * width + x] = Complex64::new(t, 1.0);
+            constant += t * t;
+        }
+        let both = self.forward(image);
+        let mut product = vec![Complex64::ZERO; width * height];
+        for kx in 0..width {
+            for ky in 0..height {
+                let k = kx * height + ky;
+                let z = both[k];
+                let mirrored = both[(width - kx) % width * height + (height - ky) % height].conj();
+                let values = 0.5 * (z + mirrored);
+                let mask = Complex64::new(0.0, -0.5) * (z - mirrored);
+                product[k] = self.squared[k] * mask.conj() - 2.0 * self.plain[k] * values.conj();
+            }
+        }
+        #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
+        let scale = 1.0 / (width * height) as f64;
+        self.inverse(product)
+            .iter()
+            .map(|z| constant + scale * z.re)
+            .collect()
+    }
+
+    fn forward(&self, mut image: Vec<Complex64>) -> Vec<Complex64> {
+        let [width, height] = self.grid;
+        self.plans[0].forward.process(&mut image);
+        let mut columns = transposed(&image, width, height);
+        self.plans[1].forward.process(&mut columns);
+        columns
+    }
+
+    fn inverse(&self, mut columns: Vec<Complex64>) -> Vec<Complex64> {
+        let [width, height] = self.grid;
+        self.plans[1].inverse.process(&mut columns);
+        let mut image = transposed(&columns, height, width);
+        self.plans[0].inverse.process(&mut image);
+        image
+    }
+}
+
+impl fmt::Debug for Spectral {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Spectral")
+            .field("grid", &self.grid)
+            .finish_non_exhaustive()
+    }
+}
+
+/// An image of `width` x `height`, its columns laid out as rows; in blocks, for the cache.
+fn transposed(image: &[Complex64], width: usize, height: usize) -> Vec<Complex64> {
+    const BLOCK: usize = 8;
+    let mut out = vec![Complex64::ZERO; image.len()];
+    for y0 in (0..height).step_by(BLOCK) {
+        for x0 in (0..width).step_by(BLOCK) {
+            for x in x0..(x0 + BLOCK).min(width) {
+                for y in y0..(y0 + BLOCK).min(height) {
+                    out[x * height + y] = image[y * width + x];
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The next length of the form 2^a 3^b.
+fn fast_length(least: usize) -> usize {
+    let mut best = least.next_power_of_two();
+    let mut threes = 3;
+    while threes < best {
+        best = best.min(threes * least.div_ceil(threes).next_power_of_two());
+        threes *= 3;
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::tests::{disc, slow_cost, template};
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+    const SEED: u64 = 0xff7;
+
+    #[test]
+    fn squares_equal_brute_force() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        for fft in [Fft::Fastest, Fft::Portable] {
+            for (width, height, patch, overlap) in [(40, 40, 7, 2), (61, 23, 9, 3), (7, 7, 3, 1)] {
+                let source = disc(width, height, &mut rng);
+                let spectral = Spectral::new(&source, fft);
+                let candidates = Candidates::new(&source, patch);
+                let mut template = template(patch, overlap, &mut rng);
+                template.weight = 0.0;
+                let squares = spectral.squares(&template);
+                let largest = squares.iter().copied().fold(0.0, f64::max);
+                for &place in &candidates.places {
+                    let (x, y) = (place % source.stride(), place / source.stride());
+                    let fast = squares[y * spectral.grid[0] + x];
+                    let slow = slow_cost(&source, patch, &template, place);
+                    assert!((fast - slow).abs() < 1e-10 * largest, "{fast}, {slow}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn costs_equal_brute_force() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        let source = disc(50, 34, &mut rng);
+        let candidates = Candidates::new(&source, 8);
+        let template = template(8, 3, &mut rng);
+        let mut costs = vec![f32::NAN; candidates.slots];
+        let mut least = f32::INFINITY;
+        Spectral::new(&source, Fft::Fastest).costs(
+            &source,
+            &candidates,
+            8,
+            &template,
+            &mut least,
+            &mut costs,
+        );
+        assert_eq!(least, costs.iter().copied().fold(f32::INFINITY, f32::min));
+        for (slot, &cost) in costs.iter().enumerate() {
+            let place = candidates.place_of_slot(slot);
+            if candidates.barrier[place] > 0.0 {
+                assert_eq!(cost, f32::INFINITY);
+            } else {
+                let slow = slow_cost(&source, 8, &template, place);
+                // Rounded to single precision.
+                assert!((f64::from(cost) / slow - 1.0).abs() < 2e-7);
+            }
+        }
+    }
+}

@@ -1,0 +1,14 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+mod error;
+mod field;
+mod normal;
+mod params;
+mod spectrum;
+
+pub use error::Error;
+pub use field::SpectralField;
+pub use params::{Fft, FieldParams, Padding};
+pub use rand_core::Rng;
+pub use spectrum::Spectrum;

@@ -1,0 +1,304 @@
+use core::f64::consts::{PI, TAU};
+
+use crate::Error;
+
+/// Orders of aliases summed on each side of the base band. Beyond them the folded spectrum is
+/// level, and what is left of the variance is added as a constant.
+const MATERN_ALIASES: i32 = 2;
+
+/// A Gaussian falls so fast that one order serves even for a blur of half a pixel.
+const GAUSSIAN_ALIASES: i32 = 1;
+
+/// How the variance of a field is spread over spatial frequencies f (cycles per pixel).
+///
+/// All are isotropic, and all fields have mean 0 and variance 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Spectrum {
+    /// S(f) ∝ f^-exponent up to the Nyquist frequency, without a constant part.
+    ///
+    /// Most of the variance sits in the longest waves, so a single draw of a steep spectrum may
+    /// have a mean square far from 1: the average over draws has not.
+    PowerLaw {
+        /// 0 (white) to 8; the paper's Brownian noise has 2, a Brownian surface 3 to 4.
+        exponent: f64,
+    },
+    /// S(f) ∝ (1 + (2π f l)² / 2ν)^-(ν + 1), the Matérn family: rough at small distances, and
+    /// forgetful beyond a few l.
+    Matern {
+        /// Smoothness, above 0 and at most 20: 0.5 has an exponential autocorrelation, infinity
+        /// would be Gaussian.
+        nu: f64,
+        /// Correlation length l, px, above 0.
+        length_px: f64,
+    },
+    /// White noise blurred by a Gaussian, the paper's "low frequency Gaussian noise":
+    /// S(f) ∝ exp(-(2π f σ)²).
+    Gaussian {
+        /// Standard deviation σ of the blur, px, above 0.
+        sigma_px: f64,
+    },
+}
+
+impl Spectrum {
+    /// The paper's Brownian noise, "whose power spectrum decreases as a function of f²"
+    /// ("Texture synthesis").
+    pub const BROWNIAN: Self = Self::PowerLaw { exponent: 2.0 };
+
+    /// S at a frequency in cycles per pixel, of the continuous field.
+    ///
+    /// Matérn and Gaussian densities integrate to 1 over the plane; a power law cannot and is
+    /// given as f^-exponent.
+    #[must_use]
+    pub fn density(&self, frequency: f64) -> f64 {
+        self.density_of_square(frequency * frequency)
+    }
+
+    /// The autocorrelation of the continuous field at a distance in pixels, 1 at distance 0.
+    ///
+    /// `None` for a power law, whose autocorrelation depends on the size of its grid: ask
+    /// [`SpectralField::autocorrelation`](crate::SpectralField::autocorrelation).
+    #[must_use]
+    pub fn autocorrelation(&self, lag_px: f64) -> Option<f64> {
+        match *self {
+            Self::PowerLaw { .. } => None,
+            // C(r) = 2^(1 - ν) / Γ(ν) x^ν K_ν(x), x = √(2ν) r / l.
+            Self::Matern { nu, length_px } => {
+                let x = (2.0 * nu).sqrt() * lag_px.abs() / length_px;
+                let scale = libm::exp2(1.0 - nu) / libm::tgamma(nu) * libm::pow(x, nu);
+                Some(if scale < f64::MIN_POSITIVE {
+                    1.0
+                } else {
+                    scale * bessel_k(nu, x)
+                })
+            }
+            Self::Gaussian { sigma_px } => {
+                let x = lag_px / (2.0 * sigma_px);
+                Some(libm::exp(-x * x))
+            }
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let within = |field, value: f64, accepted, inside: bool| {
+            if inside && value.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::Spectrum {
+                    field,
+                    value,
+                    accepted,
+                })
+            }
+        };
+        match *self {
+            Self::PowerLaw { exponent } => {
+                let inside = (0.0..=8.0).contains(&exponent);
+                within("spectrum.exponent", exponent, "0 to 8", inside)
+            }
+            Self::Matern { nu, length_px } => {
+                let smooth = nu > 0.0 && nu <= 20.0;
+                within("spectrum.nu", nu, "above 0, at most 20", smooth)?;
+                let long = (1e-3..=1e6).contains(&length_px);
+                within("spectrum.length_px", length_px, "0.001 to 1000000", long)
+            }
+            Self::Gaussian { sigma_px } => {
+                let wide = (1e-3..=1e6).contains(&sigma_px);
+                within("spectrum.sigma_px", sigma_px, "0.001 to 1000000", wide)
+            }
+        }
+    }
+
+    /// The density of the field sampled at pixels: S folded into the base band, so that the
+    /// samples have exactly the continuous autocorrelation at whole-pixel distances.
+    pub(crate) fn folded_density(&self, frequency: [f64; 2]) -> f64 {
+        let orders = match self {
+            // Has no scale of its own: it is defined by its grid and ends at Nyquist.
+            Self::PowerLaw { .. } => 0,
+            Self::Matern { .. } => MATERN_ALIASES,
+            Self::Gaussian { .. } => GAUSSIAN_ALIASES,
+        };
+        let mut sum = 0.0;
+        for j in -orders..=orders {
+            let fy = frequency[1] + f64::from(j);
+            for i in -orders..=orders {
+                let fx = frequency[0] + f64::from(i);
+                sum += self.density_of_square(fx * fx + fy * fy);
+            }
+        }
+        let side = f64::from(2 * orders + 1);
+        sum + self.variance_beyond_square(side * side / PI)
+    }
+
+    /// The least distance in pixels at which the autocorrelation is below `level`, at most `most`.
+    pub(crate) fn reach_px(&self, level: f64, most: usize) -> usize {
+        #[expect(clippy::cast_precision_loss, reason = "at most 2^14")]
+        let remembers = |lag: usize| self.autocorrelation(lag as f64).is_none_or(|c| c >= level);
+        let (mut near, mut far) = (0, most);
+        while far - near > 1 {
+            let middle = usize::midpoint(near, far);
+            if remembers(middle) {
+                near = middle;
+            } else {
+                far = middle;
+            }
+        }
+        far
+    }
+
+    fn density_of_square(&self, square: f64) -> f64 {
+        match *self {
+            Self::PowerLaw { exponent } => inverse_power(square, 0.5 * exponent),
+            Self::Matern { nu, length_px } => {
+                let a = TAU * TAU * length_px * length_px / (2.0 * nu);
+                a * nu / PI * inverse_power(1.0 + a * square, nu + 1.0)
+            }
+            Self::Gaussian { sigma_px } => {
+                let a = TAU * TAU * sigma_px * sigma_px;
+                a / PI * libm::exp(-a * square)
+            }
+        }
+    }
+
+    /// The part of the variance at frequencies whose square exceeds `square`.
+    fn variance_beyond_square(&self, square: f64) -> f64 {
+        match *self {
+            Self::PowerLaw { .. } => 0.0,
+            Self::Matern { nu, length_px } => {
+                let a = TAU * TAU * length_px * length_px / (2.0 * nu);
+                inverse_power(1.0 + a * square, nu)
+            }
+            Self::Gaussian { sigma_px } => libm::exp(-TAU * TAU * sigma_px * sigma_px * square),
+        }
+    }
+}
+
+/// x^-p, multiplied out for whole and half p, which are the common ones and make a table of
+/// amplitudes ten times cheaper.
+fn inverse_power(x: f64, p: f64) -> f64 {
+    let halves = 2.0 * p;
+    if halves != libm::floor(halves) {
+        return libm::pow(x, -p);
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whole, 0 to 42"
+    )]
+    let mut exponent = halves as u32;
+    let (mut base, mut power) = (1.0 / x.sqrt(), 1.0);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            power *= base;
+        }
+        base *= base;
+        exponent >>= 1;
+    }
+    power
+}
+
+/// The modified Bessel function of the second kind, K_ν(x) = ∫₀^∞ exp(-x cosh t) cosh(ν t) dt.
+///
+/// The trapezoidal rule converges exponentially on this integrand, which falls doubly
+/// exponentially (Trefethen and Weideman, doi:10.1137/130932132).
+fn bessel_k(nu: f64, x: f64) -> f64 {
+    // Error about exp(-2π · π/2 / STEP).
+    const STEP: f64 = 0.125;
+    let term = |t: f64| {
+        let fall = x * libm::cosh(t);
+        0.5 * (libm::exp(nu * t - fall) + libm::exp(-nu * t - fall))
+    };
+    let mut sum = 0.5 * term(0.0);
+    let mut t = STEP;
+    loop {
+        let next = term(t);
+        sum += next;
+        // Past the peak at sinh t = ν / x the terms only fall.
+        if x * libm::sinh(t) > nu && next <= f64::EPSILON * sum {
+            return STEP * sum;
+        }
+        t += STEP;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_integer_bessel_has_closed_forms() {
+        for x in [0.01, 0.3, 1.0, 4.0, 30.0] {
+            let half = (PI / (2.0 * x)).sqrt() * libm::exp(-x);
+            assert!((bessel_k(0.5, x) / half - 1.0).abs() < 1e-13);
+            let three_halves = half * (1.0 + 1.0 / x);
+            assert!((bessel_k(1.5, x) / three_halves - 1.0).abs() < 1e-13);
+        }
+        // Abramowitz and Stegun, table 9.8.
+        assert!((bessel_k(1.0, 1.0) - 0.601_907_230_197_234_6).abs() < 1e-14);
+        assert!((bessel_k(0.0, 2.0) - 0.113_893_872_749_533_44).abs() < 1e-14);
+    }
+
+    #[test]
+    fn matern_of_one_half_is_exponential() {
+        let spectrum = Spectrum::Matern {
+            nu: 0.5,
+            length_px: 3.0,
+        };
+        for r in [0.0, 1e-200, 0.5, 1.0, 7.0, 40.0] {
+            let c = spectrum.autocorrelation(r).unwrap();
+            assert!((c - libm::exp(-r / 3.0)).abs() < 1e-13, "{r}: {c}");
+        }
+    }
+
+    #[test]
+    fn whole_and_half_powers_are_powers() {
+        for p in [0.5, 1.0, 1.5, 2.0, 3.5, 21.0, 1.3] {
+            for x in [1.0, 1.7, 100.0] {
+                let expected = libm::pow(x, -p);
+                assert!((inverse_power(x, p) / expected - 1.0).abs() < 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn densities_integrate_to_one() {
+        for spectrum in [
+            Spectrum::Gaussian { sigma_px: 0.4 },
+            Spectrum::Matern {
+                nu: 0.8,
+                length_px: 1.5,
+            },
+        ] {
+            let step = 1e-3;
+            let inside: f64 = (0..3000)
+                .map(|i| (f64::from(i) + 0.5) * step)
+                .map(|f| TAU * f * spectrum.density(f) * step)
+                .sum();
+            let beyond = spectrum.variance_beyond_square(9.0);
+            assert!((inside + beyond - 1.0).abs() < 1e-5, "{spectrum:?}");
+        }
+    }
+
+    #[test]
+    fn impossible_numbers_are_errors() {
+        for bad in [f64::NAN, f64::INFINITY, -1.0] {
+            assert!(Spectrum::PowerLaw { exponent: bad }.check().is_err());
+            assert!(Spectrum::Gaussian { sigma_px: bad }.check().is_err());
+            let rough = Spectrum::Matern {
+                nu: bad,
+                length_px: 1.0,
+            };
+            assert!(rough.check().is_err());
+            let short = Spectrum::Matern {
+                nu: 1.0,
+                length_px: bad,
+            };
+            assert!(short.check().is_err());
+        }
+        assert!(Spectrum::Gaussian { sigma_px: 0.0 }.check().is_err());
+        let message = Spectrum::PowerLaw { exponent: 9.0 }.check().unwrap_err();
+        assert_eq!(
+            message.to_string(),
+            "spectrum.exponent is 9; accepted: 0 to 8"
+        );
+    }
+}

@@ -1,0 +1,286 @@
+//! From sites to a clipped Voronoi diagram.
+//!
+//! Every Voronoi edge is clipped once, against the window, and kept under the number of its Delaunay edge. A cell is
+//! then a walk around its site: neighbouring edges share a vertex, or the walk goes along the border in between.
+
+use crate::diagram::{Diagram, Edge};
+use crate::error::Error;
+use crate::geometry::{Point, along, dot, sub};
+use crate::window::Window;
+use spade::handles::DirectedEdgeHandle;
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+
+/// A site under its number: the triangulation sorts its vertices.
+#[derive(Debug, Clone, Copy)]
+struct Numbered {
+    position: Point2<f64>,
+    site: usize,
+}
+
+impl HasPosition for Numbered {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        self.position
+    }
+}
+
+type Delaunay = DelaunayTriangulation<Numbered>;
+type Directed<'a> = DirectedEdgeHandle<'a, Numbered, (), (), ()>;
+
+/// Coordinates that spade refuses as too small, and that are zero for every purpose.
+const NEGLIGIBLE: f64 = 1e-40;
+
+/// Share of the border below which a step back is taken for the rounding that it is.
+const ROUNDING: f64 = 1e-9;
+
+/// Builds the diagram of sites that lie in the window.
+pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error> {
+    let flushed = |c: f64| if c.abs() < NEGLIGIBLE { 0.0 } else { c };
+    let numbered = sites
+        .iter()
+        .enumerate()
+        .map(|(site, &[x, y])| Numbered {
+            position: Point2::new(flushed(x), flushed(y)),
+            site,
+        })
+        .collect();
+    let refused = |distinct: usize| Error::Sites {
+        given: sites.len(),
+        distinct,
+    };
+    let delaunay = Delaunay::bulk_load(numbered).map_err(|_| refused(0))?;
+    if sites.is_empty() || delaunay.num_vertices() != sites.len() {
+        return Err(refused(delaunay.num_vertices()));
+    }
+    let mut builder = Builder::new(&window, &delaunay);
+    builder.clip_edges();
+    builder.walk_cells();
+    let Builder {
+        vertices,
+        inner,
+        edges,
+        cell_ends,
+        cell_vertices,
+        ..
+    } = builder;
+    Ok(Diagram {
+        window,
+        sites,
+        vertices,
+        inner,
+        edges,
+        cell_ends,
+        cell_vertices,
+    })
+}
+
+struct Builder<'a> {
+    window: &'a Window,
+    delaunay: &'a Delaunay,
+    /// Vertex of each Delaunay triangle whose circumcentre lies inside.
+    centres: Vec<Option<usize>>,
+    vertices: Vec<Point>,
+    /// Number of vertices inside; those on the border follow.
+    inner: usize,
+    /// How far along the border each vertex on it lies.
+    reaches: Vec<f64>,
+    /// Vertices of the window's corners that are in use.
+    corners: Vec<Option<usize>>,
+    edges: Vec<Edge>,
+    /// Number of the Voronoi edge dual to each Delaunay edge, where any of it lies inside.
+    duals: Vec<Option<usize>>,
+    /// Sites of the cells, in the order of the walk, are those of the triangulation; their ends are by site.
+    cell_ends: Vec<usize>,
+    cell_vertices: Vec<usize>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(window: &'a Window, delaunay: &'a Delaunay) -> Self {
+        let mut centres = vec![None; delaunay.num_all_faces()];
+        let mut vertices = Vec::with_capacity(delaunay.num_all_faces() + delaunay.num_vertices());
+        for face in delaunay.inner_faces() {
+            let Point2 { x, y } = face.circumcenter();
+            if window.contains([x, y]) {
+                centres[face.fix().index()] = Some(vertices.len());
+                vertices.push([x, y]);
+            }
+        }
+        Self {
+            window,
+            delaunay,
+            centres,
+            inner: vertices.len(),
+            vertices,
+            reaches: Vec::new(),
+            corners: vec![None; window.corners().len()],
+            edges: Vec::with_capacity(delaunay.num_undirected_edges() + delaunay.num_vertices()),
+            duals: Vec::with_capacity(delaunay.num_undirected_edges()),
+            cell_ends: Vec::with_capacity(delaunay.num_vertices()),
+            cell_vertices: Vec::with_capacity(7 * delaunay.num_vertices()),
+        }
+    }
+
+    /// The Voronoi edges, each from its triangle on the right to its triangle on the left of the Delaunay edge.
+    fn clip_edges(&mut self) {
+        for edge in self.delaunay.undirected_edges() {
+            let edge = edge.as_directed();
+            let dual = self.clip_edge(edge).map(|ends| {
+                self.edges.push(Edge {
+                    ends,
+                    cell: edge.from().data().site,
+                    neighbour: Some(edge.to().data().site),
+                });
+                self.edges.len() - 1
+            });
+            self.duals.push(dual);
+        }
+    }
+
+    fn clip_edge(&mut self, edge: Directed<'_>) -> Option<[usize; 2]> {
+        let inside = |face: Directed<'_>| self.centres[face.face().fix().index()];
+        let (start, end) = (inside(edge.rev()), inside(edge));
+        if let (Some(start), Some(end)) = (start, end) {
+            return Some([start, end]);
+        }
+        let [a, b] = edge.positions().map(|p| [p.x, p.y]);
+        // A quarter turn from a → b: around a, triangles follow each other in this direction.
+        let direction = [a[1] - b[1], b[0] - a[0]];
+        match (start, end) {
+            (Some(start), None) => Some([start, self.exit(start, direction)]),
+            (None, Some(end)) => Some([self.exit(end, [-direction[0], -direction[1]]), end]),
+            _ => {
+                let middle = [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0];
+                let place = |face: Directed<'_>, outer: f64| {
+                    face.face().as_inner().map_or(outer, |face| {
+                        let Point2 { x, y } = face.circumcenter();
+                        dot(sub([x, y], middle), direction) / dot(direction, direction)
+                    })
+                };
+                let range = [
+                    place(edge.rev(), f64::NEG_INFINITY),
+                    place(edge, f64::INFINITY),
+                ];
+                let cuts = self.window.clip(middle, direction, range)?;
+                Some(cuts.map(|t| self.border_at(along(middle, direction, t))))
+            }
+        }
+    }
+
+    /// Where the way from a vertex inside leaves the window.
+    fn exit(&mut self, from: usize, direction: Point) -> usize {
+        let origin = self.vertices[from];
+        let point = along(origin, direction, self.window.exit(origin, direction));
+        self.border_at(point)
+    }
+
+    /// A new vertex on the border.
+    fn border_at(&mut self, point: Point) -> usize {
+        self.reaches.push(self.window.reach_of(point));
+        self.vertices.push(point);
+        self.vertices.len() - 1
+    }
+
+    /// The vertex of a corner of the window.
+    fn corner(&mut self, corner: usize) -> usize {
+        if let Some(vertex) = self.corners[corner] {
+            return vertex;
+        }
+        self.reaches.push(self.window.reach_of_corner(corner));
+        self.vertices.push(self.window.corners()[corner]);
+        let vertex = self.vertices.len() - 1;
+        self.corners[corner] = Some(vertex);
+        vertex
+    }
+
+    fn walk_cells(&mut self) {
+        // Cells are stored by site, the triangulation's vertices come in its own order.
+        let mut by_site = vec![None; self.delaunay.num_vertices()];
+        for vertex in self.delaunay.vertices() {
+            by_site[vertex.data().site] = Some(vertex.fix());
+        }
+        for (site, vertex) in by_site.into_iter().enumerate() {
+            let Some(vertex) = vertex else { continue };
+            let start = self.cell_vertices.len();
+            let delaunay = self.delaunay;
+            for edge in delaunay.vertex(vertex).out_edges() {
+                let Some(dual) = self.duals[edge.as_undirected().fix().index()] else {
+                    continue;
+                };
+                let [mut from, mut to] = self.edges[dual].ends;
+                if self.edges[dual].cell != site {
+                    (from, to) = (to, from);
+                }
+                match self.cell_vertices[start..].last() {
+                    Some(&last) if last == from => {}
+                    Some(&last) => {
+                        self.walk_border(site, last, from);
+                        self.cell_vertices.push(from);
+                    }
+                    None => self.cell_vertices.push(from),
+                }
+                self.cell_vertices.push(to);
+            }
+            self.close(site, start);
+            self.cell_ends.push(self.cell_vertices.len());
+        }
+    }
+
+    /// Joins the end of a walk to its start.
+    fn close(&mut self, site: usize, start: usize) {
+        match self.cell_vertices[start..] {
+            [] => {
+                // A single site: the cell is the window.
+                let corners: Vec<usize> = (0..self.corners.len()).map(|c| self.corner(c)).collect();
+                self.cell_vertices.extend_from_slice(&corners);
+                for i in 0..corners.len() {
+                    self.add_border_edge(site, corners[i], corners[(i + 1) % corners.len()]);
+                }
+            }
+            [first, .., last] if first == last => {
+                self.cell_vertices.pop();
+            }
+            [first, .., last] => self.walk_border(site, last, first),
+            [_] => {}
+        }
+    }
+
+    /// Adds the corners between two vertices on the border to the cell, and the pieces of the border to the edges.
+    fn walk_border(&mut self, site: usize, from: usize, to: usize) {
+        let perimeter = self.window.perimeter();
+        let [start, end] = [from, to].map(|vertex| self.reaches[vertex - self.inner]);
+        let ahead = |reach: f64| {
+            let way = reach - start;
+            if way < 0.0 { way + perimeter } else { way }
+        };
+        let way = ahead(end);
+        let mut last = from;
+        if way < perimeter * (1.0 - ROUNDING) {
+            let count = self.corners.len();
+            let next = (0..count)
+                .find(|&corner| self.window.reach_of_corner(corner) > start)
+                .unwrap_or(0);
+            for corner in (next..count).chain(0..next) {
+                let distance = ahead(self.window.reach_of_corner(corner));
+                if distance >= way {
+                    break;
+                }
+                if distance > 0.0 {
+                    let vertex = self.corner(corner);
+                    self.cell_vertices.push(vertex);
+                    self.add_border_edge(site, last, vertex);
+                    last = vertex;
+                }
+            }
+        }
+        self.add_border_edge(site, last, to);
+    }
+
+    fn add_border_edge(&mut self, site: usize, from: usize, to: usize) {
+        self.edges.push(Edge {
+            ends: [from, to],
+            cell: site,
+            neighbour: None,
+        });
+    }
+}

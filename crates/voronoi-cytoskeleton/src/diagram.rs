@@ -1,0 +1,140 @@
+use crate::build::build;
+use crate::error::{Error, require_coordinates};
+use crate::geometry::{Moments, Point};
+use crate::window::Window;
+
+/// A piece of the boundary of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Edge {
+    /// Its two vertices, such that `cell` lies on the side of positive turns (from x towards y).
+    pub ends: [usize; 2],
+    /// The cell on that side.
+    pub cell: usize,
+    /// The cell on the other side; none where the edge lies on the border of the window.
+    pub neighbour: Option<usize>,
+}
+
+/// The Voronoi diagram of some sites in a convex window.
+///
+/// Cells have the numbers of their sites. Cells, edges and vertices together fill the window: areas sum to its area, and
+/// vertices − edges + cells = 1.
+#[derive(Debug, Clone)]
+pub struct Diagram {
+    pub(crate) window: Window,
+    pub(crate) sites: Vec<Point>,
+    pub(crate) vertices: Vec<Point>,
+    pub(crate) inner: usize,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) cell_ends: Vec<usize>,
+    pub(crate) cell_vertices: Vec<usize>,
+}
+
+impl Diagram {
+    /// The diagram of `sites` in `window`.
+    ///
+    /// # Errors
+    /// [`Error::Sites`] for no sites or two in one place, [`Error::SiteOutside`], [`Error::Coordinate`].
+    pub fn new(sites: &[Point], window: &Window) -> Result<Self, Error> {
+        require_coordinates("site", sites)?;
+        if let Some(index) = sites.iter().position(|&site| !window.contains(site)) {
+            return Err(Error::SiteOutside {
+                index,
+                point: sites[index],
+            });
+        }
+        build(sites.to_vec(), window.clone())
+    }
+
+    /// The window.
+    pub fn window(&self) -> &Window {
+        &self.window
+    }
+
+    /// The sites, as given or as relaxed.
+    pub fn sites(&self) -> &[Point] {
+        &self.sites
+    }
+
+    /// The vertices: first those inside the window, in which three cells meet, then those on its border.
+    pub fn vertices(&self) -> &[Point] {
+        &self.vertices
+    }
+
+    /// Whether a vertex lies on the border of the window.
+    pub fn is_on_border(&self, vertex: usize) -> bool {
+        vertex >= self.inner
+    }
+
+    /// The edges: first those between two cells, then those on the border of the window.
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges
+    }
+
+    /// The vertices around a cell, from x towards y.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn cell(&self, cell: usize) -> &[usize] {
+        let start = cell.checked_sub(1).map_or(0, |last| self.cell_ends[last]);
+        &self.cell_vertices[start..self.cell_ends[cell]]
+    }
+
+    /// The corners of a cell, from x towards y.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn corners(
+        &self,
+        cell: usize,
+    ) -> impl DoubleEndedIterator<Item = Point> + ExactSizeIterator + Clone {
+        self.cell(cell).iter().map(|&vertex| self.vertices[vertex])
+    }
+
+    /// The area of a cell.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn area(&self, cell: usize) -> f64 {
+        self.moments(cell).area
+    }
+
+    /// Moves every site to the centroid of its cell: one pass of Lloyd's algorithm
+    /// ([doi:10.1137/S0036144599352836](https://doi.org/10.1137/S0036144599352836), the paper's reference 27).
+    ///
+    /// # Differences from the paper
+    /// The centroids are those of the polygons, exact; the released program estimates them from 2000 random points.
+    pub fn relax(&mut self) {
+        let centroids = (0..self.sites.len())
+            .map(|cell| {
+                let site = self.sites[cell];
+                let Moments { area, first, .. } = self.moments(cell);
+                let centroid = [site[0] + first[0] / area, site[1] + first[1] / area];
+                // A cell too thin to have a centroid in floating point keeps its site.
+                if self.window.contains(centroid) {
+                    centroid
+                } else {
+                    site
+                }
+            })
+            .collect();
+        // Cells are disjoint and convex, so their centroids differ; where rounding makes two of them one, the diagram
+        // is as relaxed as it can be.
+        if let Ok(relaxed) = build(centroids, self.window.clone()) {
+            *self = relaxed;
+        }
+    }
+
+    /// The energy that relaxing lowers: the squared distance to the nearest site, integrated over the window.
+    pub fn energy(&self) -> f64 {
+        (0..self.sites.len())
+            .map(|cell| self.moments(cell).second)
+            .sum()
+    }
+
+    fn moments(&self, cell: usize) -> Moments {
+        Moments::of(self.corners(cell), self.sites[cell])
+    }
+}
+
+#[cfg(test)]
+mod tests;

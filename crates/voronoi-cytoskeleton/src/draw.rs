@@ -1,0 +1,205 @@
+use crate::error::{Error, require};
+use crate::geometry::Point;
+use crate::river::River;
+
+/// Brightness across a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Profile {
+    /// Even, with edges softened over one pixel: the share of a pixel that a band of this width covers.
+    Flat,
+    /// (1 − d²/r²)² with its full width at half maximum equal to the width: close to a Gaussian, but of finite reach.
+    #[default]
+    Smooth,
+}
+
+/// How [`draw_into`] draws rivers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineParams {
+    /// Width of a line at the largest height, in pixels: above 0, at most 1000. A line thinner than a pixel is drawn
+    /// fainter. Default: 1.7 (ours; about that of the paper's lines, one pixel wide and softened).
+    pub width_px: f64,
+    /// Brightness across. Default: [`Profile::Smooth`] (ours).
+    pub profile: Profile,
+    /// How much thinner a line is at height zero: from 0 (as wide as at the top) to 1 (it vanishes). Default: 0.5
+    /// (ours).
+    pub taper: f64,
+    /// Value on the axis of a line: above 0. Default: 1.
+    pub peak: f32,
+}
+
+impl Default for LineParams {
+    fn default() -> Self {
+        Self {
+            width_px: 1.7,
+            profile: Profile::default(),
+            taper: 0.5,
+            peak: 1.0,
+        }
+    }
+}
+
+/// Draws rivers into an image: a pixel becomes the largest of what it holds and what the lines are there, 0 to
+/// [`LineParams::peak`], so that confluences and bends are no brighter than the lines. Parts outside the image are left out.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for a parameter outside the range its field states.
+///
+/// # Panics
+/// If `width` is zero or does not divide the length of `image`.
+pub fn draw_into(
+    image: &mut [f32],
+    width: usize,
+    rivers: &[River],
+    params: &LineParams,
+) -> Result<(), Error> {
+    let LineParams {
+        width_px,
+        profile: _,
+        taper,
+        peak,
+    } = *params;
+    require(
+        "width_px",
+        width_px,
+        width_px > 0.0 && width_px <= 1000.0,
+        "above 0, at most 1000",
+    )?;
+    require(
+        "taper",
+        taper,
+        (0.0..=1.0).contains(&taper),
+        "between 0 and 1",
+    )?;
+    require("peak", f64::from(peak), peak > 0.0, "above 0")?;
+    assert!(
+        width > 0 && image.len().is_multiple_of(width),
+        "width {width} must divide the image's {} pixels",
+        image.len()
+    );
+    for river in rivers {
+        draw(image, width, river, params);
+    }
+    Ok(())
+}
+
+#[multiversion::multiversion(targets = "simd")]
+fn draw(image: &mut [f32], width: usize, river: &River, params: &LineParams) {
+    let LineParams {
+        width_px,
+        profile,
+        taper,
+        peak,
+    } = *params;
+    let half = |height: f64| width_px / 2.0 * (1.0 - taper * (1.0 - height));
+    for (points, heights) in river.points.windows(2).zip(river.heights.windows(2)) {
+        let halves = [half(heights[0]), half(heights[1])];
+        match profile {
+            Profile::Flat => splat(image, width, points, halves, 0.5, |distance2, half| {
+                let distance = distance2.sqrt();
+                peak * larger(
+                    smaller(distance + 0.5, half) - larger(distance - 0.5, -half),
+                    0.0,
+                )
+            }),
+            Profile::Smooth => {
+                let narrowest = single(NARROWEST);
+                let radii = halves.map(|half| half * REACH);
+                splat(
+                    image,
+                    width,
+                    points,
+                    radii,
+                    NARROWEST,
+                    |distance2, radius| {
+                        let drawn = larger(radius, narrowest);
+                        let rest = larger(1.0 - distance2 / (drawn * drawn), 0.0);
+                        peak * (radius / drawn) * rest * rest
+                    },
+                );
+            }
+        }
+    }
+}
+
+/// Where (1 − d²/r²)² ends over where it is one half: r / d = 1 / √(1 − √½).
+const REACH: f64 = 1.847_759_065_022_573_5;
+
+/// Smallest radius of a smooth line, in pixels: with less, a line would come and go between pixel centres.
+const NARROWEST: f64 = 1.0;
+
+/// Takes the largest of the image and `value(distance², half width)` around a segment. Lines reach their half width, or
+/// `least` if that is more, and half a pixel.
+#[inline(always)]
+fn splat(
+    image: &mut [f32],
+    width: usize,
+    ends: &[Point],
+    halves: [f64; 2],
+    least: f64,
+    value: impl Fn(f32, f32) -> f32,
+) {
+    let height = image.len() / width;
+    let reach = halves[0].max(halves[1]).max(least) + 0.5;
+    let (a, b) = (ends[0], ends[1]);
+    let d = [b[0] - a[0], b[1] - a[1]];
+    let square = d[0] * d[0] + d[1] * d[1];
+    let inverse = if square > 0.0 {
+        single(1.0 / square)
+    } else {
+        0.0
+    };
+    let (dx, dy) = (single(d[0]), single(d[1]));
+    let (from, growth) = (single(halves[0]), single(halves[1] - halves[0]));
+
+    for row in pixels(a[1].min(b[1]) - reach, a[1].max(b[1]) + reach, height) {
+        // The stretch of the segment within reach of this row bounds the pixels within reach of it.
+        let y = row as f64;
+        let stretch = [y - reach, y + reach].map(|edge| ((edge - a[1]) / d[1]).clamp(0.0, 1.0));
+        let [s, t] = if d[1] == 0.0 { [0.0, 1.0] } else { stretch };
+        let (left, right) = (a[0] + s * d[0], a[0] + t * d[0]);
+        let columns = pixels(left.min(right) - reach, left.max(right) + reach, width);
+
+        let py = single(y - a[1]);
+        let offset = single(columns.start as f64 - a[0]);
+        let line = &mut image[row * width..][columns];
+        for (i, pixel) in line.iter_mut().enumerate() {
+            let px = offset + i as f32;
+            let along = smaller(larger((px * dx + py * dy) * inverse, 0.0), 1.0);
+            let (ex, ey) = (px - along * dx, py - along * dy);
+            *pixel = larger(*pixel, value(ex * ex + ey * ey, from + along * growth));
+        }
+    }
+}
+
+// Plain choices, which are one instruction a vector; the standard ones do more for NaN.
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The pixels of a row or column whose centres lie between two positions.
+#[inline(always)]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "`as` saturates, which clips to the image"
+)]
+fn pixels(from: f64, to: f64, count: usize) -> core::ops::Range<usize> {
+    let start = (from.ceil() as usize).min(count);
+    let end = ((to.floor() + 1.0) as usize).min(count);
+    start..end.max(start)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+#[cfg(test)]
+mod tests;

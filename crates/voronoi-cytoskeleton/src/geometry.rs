@@ -1,0 +1,76 @@
+//! Points, vectors and polygons.
+
+use rand_core::Rng;
+
+/// A point [x, y], x right and y down, in pixels or any other unit.
+pub type Point = [f64; 2];
+
+#[inline]
+pub(crate) fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+#[inline]
+pub(crate) fn along(origin: Point, direction: Point, t: f64) -> Point {
+    [origin[0] + direction[0] * t, origin[1] + direction[1] * t]
+}
+
+#[inline]
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+#[inline]
+pub(crate) fn cross(a: Point, b: Point) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+pub(crate) fn length(a: Point) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// Moments of a polygon about a point.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Moments {
+    /// Signed area: positive where the corners go from x towards y.
+    pub(crate) area: f64,
+    /// Integrals of x and of y.
+    pub(crate) first: Point,
+    /// Integral of x² + y².
+    pub(crate) second: f64,
+}
+
+impl Moments {
+    /// Exact, by the triangles between `about` and each side.
+    pub(crate) fn of(
+        corners: impl DoubleEndedIterator<Item = Point> + Clone,
+        about: Point,
+    ) -> Self {
+        let mut moments = Self::default();
+        let mut a = sub(corners.clone().next_back().unwrap_or(about), about);
+        for corner in corners {
+            let b = sub(corner, about);
+            let double_area = cross(a, b);
+            moments.area += double_area / 2.0;
+            for axis in 0..2 {
+                moments.first[axis] += double_area * (a[axis] + b[axis]) / 6.0;
+            }
+            moments.second += double_area * (dot(a, a) + dot(a, b) + dot(b, b)) / 12.0;
+            a = b;
+        }
+        moments
+    }
+}
+
+/// A number in [0, 1) with 53 random bits.
+pub(crate) fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    const SCALE: f64 = 1.0 / (1u64 << 53) as f64;
+    (rng.next_u64() >> 11) as f64 * SCALE
+}
+
+/// A whole number below `bound`.
+pub(crate) fn below<R: Rng + ?Sized>(rng: &mut R, bound: usize) -> usize {
+    // Multiply-shift: the bias is below bound / 2^64.
+    let scaled = (u128::from(rng.next_u64()) * bound as u128) >> 64;
+    usize::try_from(scaled).expect("smaller than bound")
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+
+mod build;
+mod diagram;
+mod draw;
+mod error;
+mod geometry;
+mod outline;
+mod river;
+mod skeleton;
+mod window;
+
+pub use diagram::{Diagram, Edge};
+pub use draw::{LineParams, Profile, draw_into};
+pub use error::Error;
+pub use geometry::Point;
+pub use rand_core::Rng;
+pub use river::{Mouth, River};
+pub use skeleton::{Skeleton, SkeletonParams};
+pub use window::Window;

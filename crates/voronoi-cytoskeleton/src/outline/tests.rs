@@ -1,0 +1,86 @@
+use super::*;
+use crate::Window;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+
+/// A star with notches: concave, and with level and upright sides.
+fn star(count: u32) -> Vec<Point> {
+    (0..count)
+        .map(|k| {
+            let angle = core::f64::consts::TAU * f64::from(k) / f64::from(count);
+            let radius = 50.0 + 15.0 * libm::cos(5.0 * angle);
+            [
+                100.0 + radius * libm::cos(angle),
+                80.0 + radius * libm::sin(angle),
+            ]
+        })
+        .collect()
+}
+
+fn oracle(points: &[Point], p: Point) -> f64 {
+    let (mut nearest, mut inside) = (f64::INFINITY, false);
+    for (i, &a) in points.iter().enumerate() {
+        let b = points[(i + 1) % points.len()];
+        let d = sub(b, a);
+        let t = (dot(sub(p, a), d) / dot(d, d).max(1e-300)).clamp(0.0, 1.0);
+        nearest = nearest.min(length([p[0] - a[0] - t * d[0], p[1] - a[1] - t * d[1]]));
+        if (a[1] <= p[1]) != (b[1] <= p[1]) && p[0] < a[0] + (p[1] - a[1]) * d[0] / d[1] {
+            inside = !inside;
+        }
+    }
+    if inside { nearest } else { -nearest }
+}
+
+#[test]
+fn agrees_with_a_look_at_every_segment() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x006f_7574_6c69_6e65);
+    let square = vec![
+        [40.0, 40.0],
+        [140.0, 40.0],
+        [140.0, 40.0],
+        [140.0, 120.0],
+        [40.0, 120.0],
+    ];
+    let outlines = [
+        star(3),
+        star(7),
+        star(8),
+        star(9),
+        star(64),
+        star(65),
+        star(421),
+        square,
+    ];
+    let around = Window::rectangle([0.0, 0.0], [200.0, 160.0]).unwrap();
+    for points in outlines {
+        let outline = Outline::new(&points).unwrap();
+        let random = (0..500).map(|_| around.draw(&mut rng));
+        // Random points, and points level with corners.
+        let level: Vec<Point> = points.iter().map(|p| [p[0] - 7.25, p[1]]).collect();
+        for point in random.chain(level) {
+            let (found, expected) = (outline.height(point), oracle(&points, point));
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{point:?}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn height_in_a_square() {
+    let outline = Outline::new(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]).unwrap();
+    assert_eq!(outline.height([5.0, 5.0]), 5.0);
+    assert_eq!(outline.height([1.0, 4.0]), 1.0);
+    assert_eq!(outline.height([-3.0, 14.0]), -5.0);
+    assert_eq!(outline.height([10.0, 3.0]), 0.0);
+}
+
+#[test]
+fn refused_outlines_say_why() {
+    let message = |points: &[Point]| Outline::new(points).unwrap_err().to_string();
+    assert!(message(&[]).starts_with("the outline of 0 points"));
+    assert!(message(&[[0.0, 0.0], [1.0, 0.0]]).starts_with("the outline of 2 points"));
+    assert!(message(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).starts_with("the outline of 3 points"));
+    assert!(message(&[[0.0, 0.0], [1.0, f64::NAN], [2.0, 2.0]]).starts_with("outline point 1"));
+}

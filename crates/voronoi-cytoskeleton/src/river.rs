@@ -1,0 +1,238 @@
+use crate::diagram::Diagram;
+use crate::geometry::{Point, length, sub};
+
+/// Where a river ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mouth {
+    /// On the border of the window, or where the height reaches zero: the outline.
+    Border,
+    /// In a river of another tree, of which it becomes part.
+    Confluence,
+}
+
+/// A line that runs down along the edges of a diagram, from a spring or from a branching to its mouth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct River {
+    /// Its points, from the highest to the lowest: two or more.
+    pub points: Vec<Point>,
+    /// The height of each point over the largest height of the diagram: strictly falling, 1 to 0.
+    pub heights: Vec<f64>,
+    /// Where it ends.
+    pub mouth: Mouth,
+}
+
+impl River {
+    /// Its length.
+    pub fn length(&self) -> f64 {
+        self.points
+            .windows(2)
+            .map(|pair| length(sub(pair[1], pair[0])))
+            .sum()
+    }
+}
+
+/// Edges that leave a vertex of the diagram: three cells meet in it.
+const DEGREE: usize = 3;
+
+/// The landscape in which rivers run: heights at vertices, ways between them, and which tree holds which vertex.
+pub(crate) struct Landscape<'a, H> {
+    diagram: &'a Diagram,
+    height: H,
+    pub(crate) heights: Vec<f64>,
+    pub(crate) highest: f64,
+    /// Neighbours of each vertex along the edges inside the window; filled from the front.
+    ways: Vec<[Option<u32>; DEGREE]>,
+    trees: Trees,
+}
+
+/// A way down that is not yet a river.
+struct Course {
+    vertices: Vec<usize>,
+    mouth: Mouth,
+}
+
+impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
+    pub(crate) fn new(diagram: &'a Diagram, height: H) -> Self {
+        let count = diagram.vertices().len();
+        let heights: Vec<f64> = diagram.vertices().iter().map(|&p| height(p)).collect();
+        let highest = heights.iter().copied().fold(0.0, f64::max);
+        let mut ways = vec![[None; DEGREE]; count];
+        for edge in diagram.edges() {
+            if edge.neighbour.is_none() {
+                continue;
+            }
+            let [a, b] = edge.ends;
+            for (from, to) in [(a, b), (b, a)] {
+                if let Some(free) = ways[from].iter_mut().find(|way| way.is_none()) {
+                    *free = u32::try_from(to).ok();
+                }
+            }
+        }
+        Self {
+            diagram,
+            height,
+            heights,
+            highest,
+            ways,
+            trees: Trees::new(count),
+        }
+    }
+
+    /// Runs a river from a spring, and its branches. `branches` is asked once for every vertex of a river but its last.
+    pub(crate) fn run(
+        &mut self,
+        spring: usize,
+        branches: &mut impl FnMut() -> bool,
+        rivers: &mut Vec<River>,
+    ) {
+        if self.trees.is_taken(spring) {
+            return;
+        }
+        let mut starts = vec![(spring, None)];
+        while let Some((start, first)) = starts.pop() {
+            let Some(course) = self.descend(start, first) else {
+                continue;
+            };
+            for pair in course.vertices.windows(2) {
+                self.trees.join(pair[0], pair[1]);
+            }
+            for pair in course.vertices.windows(2) {
+                if branches() {
+                    let others = self.below(pair[0]).filter(|&way| way != pair[1]);
+                    starts.extend(others.map(|way| (pair[0], Some(way))));
+                }
+            }
+            rivers.push(self.river(&course));
+        }
+    }
+
+    /// Neighbours lower than a vertex.
+    fn below(&self, vertex: usize) -> impl Iterator<Item = usize> + '_ {
+        self.ways[vertex]
+            .iter()
+            .flatten()
+            .map(|&way| way as usize)
+            .filter(move |&way| self.heights[way] < self.heights[vertex])
+    }
+
+    /// The way of steepest descent from `start`, by way of `first` if there is one. None if it ends in a pit or cannot
+    /// but run back into its own tree.
+    fn descend(&self, start: usize, first: Option<usize>) -> Option<Course> {
+        let tree = self.trees.root(start);
+        let open = |way: usize| self.trees.root(way) != tree;
+        let mut vertices = vec![start];
+        let mut vertex = start;
+        let mut next = first.filter(|&way| open(way));
+        loop {
+            let way = match next.take() {
+                Some(way) => way,
+                None if vertex == start && first.is_some() => return None,
+                None => self
+                    .below(vertex)
+                    .filter(|&way| open(way))
+                    .max_by(|&a, &b| self.slope(vertex, a).total_cmp(&self.slope(vertex, b)))?,
+            };
+            vertices.push(way);
+            if self.heights[way] <= 0.0 || self.diagram.is_on_border(way) {
+                let mouth = Mouth::Border;
+                return Some(Course { vertices, mouth });
+            }
+            if self.trees.is_taken(way) {
+                let mouth = Mouth::Confluence;
+                return Some(Course { vertices, mouth });
+            }
+            vertex = way;
+        }
+    }
+
+    fn slope(&self, from: usize, to: usize) -> f64 {
+        let [a, b] = [from, to].map(|vertex| self.diagram.vertices()[vertex]);
+        (self.heights[from] - self.heights[to]) / length(sub(b, a))
+    }
+
+    fn river(&self, course: &Course) -> River {
+        let mut points: Vec<Point> = Vec::with_capacity(course.vertices.len());
+        let mut heights: Vec<f64> = Vec::with_capacity(course.vertices.len());
+        for &vertex in &course.vertices {
+            points.push(self.diagram.vertices()[vertex]);
+            heights.push(self.heights[vertex] / self.highest);
+        }
+        // The last edge ends where the height does.
+        if let ([.., above, below], [.., from, to]) = (&mut points[..], &mut heights[..])
+            && *to < 0.0
+        {
+            *below = self.shore(*above, *below, *from * self.highest, *to * self.highest);
+            *to = 0.0;
+        }
+        River {
+            points,
+            heights,
+            mouth: course.mouth,
+        }
+    }
+
+    /// The point of height zero between one above and one below it: false position with the Illinois rule.
+    fn shore(&self, above: Point, below: Point, mut from: f64, mut to: f64) -> Point {
+        /// Enough for full precision where the height is smooth; each at least halves the range every other time.
+        const STEPS: usize = 40;
+        let at = |t: f64| [0, 1].map(|axis| above[axis] + t * (below[axis] - above[axis]));
+        let precision = self.highest * f64::EPSILON * 16.0;
+        let (mut high, mut low) = (0.0, 1.0);
+        let mut last = 0.0;
+        for _ in 0..STEPS {
+            let t = high + (low - high) * from / (from - to);
+            let height = (self.height)(at(t));
+            if height.abs() <= precision {
+                return at(t);
+            }
+            if height > 0.0 {
+                (high, from) = (t, height);
+                if last > 0.0 {
+                    to /= 2.0;
+                }
+            } else {
+                (low, to) = (t, height);
+                if last < 0.0 {
+                    from /= 2.0;
+                }
+            }
+            last = height;
+        }
+        at(low)
+    }
+}
+
+/// Which vertices hang together: union-find.
+struct Trees {
+    parents: Vec<usize>,
+    taken: Vec<bool>,
+}
+
+impl Trees {
+    fn new(count: usize) -> Self {
+        Self {
+            parents: (0..count).collect(),
+            taken: vec![false; count],
+        }
+    }
+
+    fn is_taken(&self, vertex: usize) -> bool {
+        self.taken[vertex]
+    }
+
+    fn root(&self, mut vertex: usize) -> usize {
+        while self.parents[vertex] != vertex {
+            vertex = self.parents[vertex];
+        }
+        vertex
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a_root, b_root) = (self.root(a), self.root(b));
+        // Every vertex that joins finds its root at once: chains stay short.
+        self.parents[b_root] = a_root;
+        self.parents[b] = a_root;
+        self.taken[a] = true;
+        self.taken[b] = true;
+    }
+}

@@ -1,0 +1,206 @@
+use crate::error::{Error, require_coordinates};
+use crate::geometry::{Moments, Point, along, cross, dot, length, sub, unit};
+use rand_core::Rng;
+
+/// The convex polygon that a diagram fills.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    /// In the order in which the area is positive: from x towards y.
+    corners: Vec<Point>,
+    /// From each corner to the next.
+    sides: Vec<Point>,
+    /// Length of the border up to each corner, and all of it.
+    reach: Vec<f64>,
+    area: f64,
+}
+
+impl Window {
+    /// The rectangle between two opposite corners.
+    ///
+    /// # Errors
+    /// [`Error::Coordinate`] or [`Error::Flat`].
+    pub fn rectangle(a: Point, b: Point) -> Result<Self, Error> {
+        Self::convex(&[a, [b[0], a[1]], b, [a[0], b[1]]])
+    }
+
+    /// The upright rectangle around some points.
+    ///
+    /// # Errors
+    /// [`Error::Coordinate`], or [`Error::Flat`] if all points lie on one upright or level line.
+    pub fn around(points: &[Point]) -> Result<Self, Error> {
+        require_coordinates("outline point", points)?;
+        let bound = |of: fn(f64, f64) -> f64, from: f64| {
+            points.iter().fold([from; 2], |bound, point| {
+                [of(bound[0], point[0]), of(bound[1], point[1])]
+            })
+        };
+        if points.is_empty() {
+            return Err(Error::Flat {
+                what: "outline",
+                count: 0,
+                area: 0.0,
+            });
+        }
+        Self::rectangle(
+            bound(f64::min, f64::INFINITY),
+            bound(f64::max, f64::NEG_INFINITY),
+        )
+    }
+
+    /// A convex polygon, its corners in either order.
+    ///
+    /// # Errors
+    /// [`Error::Coordinate`], [`Error::Flat`] or [`Error::NotConvex`].
+    pub fn convex(corners: &[Point]) -> Result<Self, Error> {
+        require_coordinates("window corner", corners)?;
+        let mut corners = corners.to_vec();
+        corners.dedup();
+        while corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        let about = corners.first().copied().unwrap_or_default();
+        let mut area = Moments::of(corners.iter().copied(), about).area;
+        if area < 0.0 {
+            corners.reverse();
+            area = -area;
+        }
+        if corners.len() < 3 || area == 0.0 {
+            return Err(Error::Flat {
+                what: "window",
+                count: corners.len(),
+                area,
+            });
+        }
+        // What rounding may push a corner on a straight run to the wrong side of it.
+        let slack = area * 1e-12;
+        let count = corners.len();
+        let sides: Vec<Point> = (0..count)
+            .map(|side| sub(corners[(side + 1) % count], corners[side]))
+            .collect();
+        for side in 0..count {
+            for (corner, &point) in corners.iter().enumerate() {
+                if cross(sides[side], sub(point, corners[side])) < -slack {
+                    return Err(Error::NotConvex { corner, side });
+                }
+            }
+        }
+        let mut reach = vec![0.0];
+        for &side in &sides {
+            reach.push(reach[reach.len() - 1] + length(side));
+        }
+        Ok(Self {
+            corners,
+            sides,
+            reach,
+            area,
+        })
+    }
+
+    /// The corners, in the order in which the area is positive with x right and y down.
+    pub fn corners(&self) -> &[Point] {
+        &self.corners
+    }
+
+    /// The area.
+    pub fn area(&self) -> f64 {
+        self.area
+    }
+
+    /// Whether a point lies in the window or on its border.
+    pub fn contains(&self, point: Point) -> bool {
+        self.sides()
+            .all(|(from, side)| cross(side, sub(point, from)) >= 0.0)
+    }
+
+    /// A point drawn uniformly.
+    pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> Point {
+        let apex = self.corners[0];
+        // A triangle of the fan around the first corner, by its area, then a point in it.
+        let mut rest = unit(rng) * self.area;
+        let fan = self.corners[1..].windows(2);
+        let mut triangle = [apex; 2];
+        for pair in fan {
+            triangle = [sub(pair[0], apex), sub(pair[1], apex)];
+            rest -= cross(triangle[0], triangle[1]) / 2.0;
+            if rest < 0.0 {
+                break;
+            }
+        }
+        let (mut u, mut v) = (unit(rng), unit(rng));
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        along(along(apex, triangle[0], u), triangle[1], v)
+    }
+
+    /// The part of the line `origin + t · direction` inside the window and within a range of t.
+    pub(crate) fn clip(
+        &self,
+        origin: Point,
+        direction: Point,
+        range: [f64; 2],
+    ) -> Option<[f64; 2]> {
+        let [mut from, mut to] = range;
+        for (corner, side) in self.sides() {
+            let inside = cross(side, sub(origin, corner));
+            let growth = cross(side, direction);
+            if growth > 0.0 {
+                from = from.max(-inside / growth);
+            } else if growth < 0.0 {
+                to = to.min(-inside / growth);
+            } else if inside < 0.0 {
+                return None;
+            }
+        }
+        (from < to).then_some([from, to])
+    }
+
+    /// The t at which `origin + t · direction` leaves the window; `origin` lies inside.
+    pub(crate) fn exit(&self, origin: Point, direction: Point) -> f64 {
+        let leaves = |(corner, side): (Point, Point)| {
+            let growth = cross(side, direction);
+            (growth < 0.0).then(|| -cross(side, sub(origin, corner)) / growth)
+        };
+        self.sides()
+            .filter_map(leaves)
+            .fold(f64::INFINITY, f64::min)
+            .max(0.0)
+    }
+
+    /// How far along the border a point on it lies.
+    pub(crate) fn reach_of(&self, point: Point) -> f64 {
+        let distance = |&(_, (corner, side)): &(usize, (Point, Point))| {
+            let way = sub(point, corner);
+            let beside = cross(side, way) * cross(side, way) / dot(side, side);
+            // Beyond an end of the side, the distance to that end counts.
+            let beyond = (dot(side, way) - dot(side, side))
+                .max(-dot(side, way))
+                .max(0.0);
+            beside + beyond * beyond / dot(side, side)
+        };
+        self.sides()
+            .enumerate()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .map_or(0.0, |(number, (corner, side))| {
+                self.reach[number] + dot(sub(point, corner), side) / length(side)
+            })
+    }
+
+    /// How far along the border a corner lies.
+    pub(crate) fn reach_of_corner(&self, corner: usize) -> f64 {
+        self.reach[corner]
+    }
+
+    /// The length of the border.
+    pub(crate) fn perimeter(&self) -> f64 {
+        self.reach[self.corners.len()]
+    }
+
+    /// Each side's first corner and its direction.
+    fn sides(&self) -> impl Iterator<Item = (Point, Point)> {
+        self.corners.iter().copied().zip(self.sides.iter().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests;

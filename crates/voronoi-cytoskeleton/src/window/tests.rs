@@ -1,0 +1,132 @@
+use super::*;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+
+fn pentagon() -> Window {
+    Window::convex(&[
+        [0.0, 0.0],
+        [10.0, -2.0],
+        [14.0, 6.0],
+        [6.0, 12.0],
+        [-1.0, 8.0],
+    ])
+    .unwrap()
+}
+
+#[test]
+fn either_order_of_corners_gives_the_same_window() {
+    let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+    let mut reversed = square;
+    reversed.reverse();
+    for corners in [square, reversed] {
+        let window = Window::convex(&corners).unwrap();
+        assert_eq!(window.area(), 4.0);
+        assert!(window.contains([1.0, 0.0]) && window.contains([1.9, 1.9]));
+        assert!(!window.contains([2.1, 1.0]) && !window.contains([1.0, -1e-9]));
+    }
+    assert_eq!(
+        Window::rectangle([2.0, 0.0], [0.0, 2.0]).unwrap().area(),
+        4.0
+    );
+}
+
+#[test]
+fn around_holds_all_points() {
+    let points = [[3.0, 4.0], [-1.0, 9.0], [2.0, -2.0]];
+    let window = Window::around(&points).unwrap();
+    assert_eq!(window.area(), 4.0 * 11.0);
+    assert!(points.iter().all(|&point| window.contains(point)));
+}
+
+#[test]
+fn repeated_and_straight_corners_are_welcome() {
+    let corners = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 0.0],
+        [2.0, 0.0],
+        [2.0, 1.0],
+        [0.0, 1.0],
+        [0.0, 0.0],
+    ];
+    let window = Window::convex(&corners).unwrap();
+    assert_eq!(window.corners().len(), 5);
+    assert_eq!(window.area(), 2.0);
+}
+
+#[test]
+fn draws_are_uniform() {
+    let window = pentagon();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0077_696e_646f_7700);
+    let count = 40_000;
+    let mut sum = [0.0; 2];
+    for _ in 0..count {
+        let point = window.draw(&mut rng);
+        assert!(window.contains(point));
+        sum = [sum[0] + point[0], sum[1] + point[1]];
+    }
+    let moments = Moments::of(window.corners().iter().copied(), [0.0, 0.0]);
+    for (sum, first) in sum.into_iter().zip(moments.first) {
+        let (mean, expected) = (sum / f64::from(count), first / moments.area);
+        // Standard deviation about 3.5, standard error 0.018; bound 4 standard errors.
+        assert!((mean - expected).abs() < 0.07, "{mean} {expected}");
+    }
+}
+
+#[test]
+fn clip_keeps_what_lies_inside() {
+    let window = pentagon();
+    for i in 0..200 {
+        let angle = f64::from(i) * 0.1;
+        let direction = [libm::cos(angle), libm::sin(angle)];
+        let origin = [f64::from(i % 17) - 0.63, f64::from(i % 13) + 0.21];
+        let inside = |t: f64| window.contains(along(origin, direction, t));
+        match window.clip(origin, direction, [f64::NEG_INFINITY, f64::INFINITY]) {
+            Some([from, to]) => {
+                assert!(inside((from + to) / 2.0));
+                assert!(!inside(from - 1e-6) && !inside(to + 1e-6));
+                if inside(0.0) {
+                    assert!((window.exit(origin, direction) - to).abs() < 1e-12);
+                }
+            }
+            None => assert!((-400..400).all(|t| !inside(f64::from(t) * 0.1))),
+        }
+    }
+}
+
+#[test]
+fn reach_grows_along_the_border() {
+    let window = pentagon();
+    let mut last = -1.0;
+    for side in 0..5 {
+        for step in 0..10 {
+            let (from, to) = (window.corners[side], window.corners[(side + 1) % 5]);
+            let point = along(from, sub(to, from), (f64::from(step) + 0.5) / 10.0);
+            let reach = window.reach_of(point);
+            assert!(reach > last && reach < window.perimeter());
+            last = reach;
+        }
+    }
+}
+
+#[test]
+fn refused_windows_say_why() {
+    let message = |corners: &[Point]| Window::convex(corners).unwrap_err().to_string();
+    assert!(message(&[[0.0, 0.0], [1.0, f64::NAN], [1.0, 1.0]]).starts_with("window corner 1"));
+    assert!(message(&[[0.0, 0.0], [1e10, 0.0], [1.0, 1.0]]).starts_with("window corner 1"));
+    assert!(message(&[]).starts_with("the window of 0 points"));
+    assert!(message(&[[0.0, 0.0], [1.0, 1.0]]).starts_with("the window of 2 points"));
+    assert!(message(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).starts_with("the window of 3 points"));
+    let notched = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 1.0], [0.0, 4.0]];
+    assert!(message(&notched).contains("not convex"));
+    let star: Vec<Point> = (0..5)
+        .map(|k| {
+            let angle = f64::from(2 * k) * core::f64::consts::TAU / 5.0;
+            [libm::cos(angle), libm::sin(angle)]
+        })
+        .collect();
+    assert!(message(&star).contains("not convex"));
+    assert!(Window::around(&[]).is_err());
+    assert!(Window::around(&[[1.0, 1.0], [1.0, 5.0]]).is_err());
+    assert!(Window::rectangle([0.0, 0.0], [f64::INFINITY, 1.0]).is_err());
+}

@@ -1,0 +1,6 @@
+#![no_main]
+
+#[path = "../../crates/papsynth-dataset/tests/parsers/recipe.rs"]
+mod recipe;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| recipe::check(bytes));

@@ -1,0 +1,91 @@
+//! A first data set to look at.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+use crate::arguments::Arguments;
+use crate::outcome::Outcome;
+use crate::workspace::Workspace;
+use crate::{Chore, shell};
+
+pub(crate) const CHORE: Chore = Chore {
+    name: "dataset",
+    usage: "",
+    about: "writes eight labelled fields and one focus stack of the default recipe, and says where to look",
+    details: "Builds the program `papsynth` in release and writes to target/dataset, anew each time: fields of 1376 x 1038 pixels, \
+              and a stack of 11 planes, 0.8 µm apart.",
+    run,
+};
+
+fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+    arguments.finish()?;
+    let folder = workspace.target.join("dataset");
+    let (fields, stack) = (folder.join("fields"), folder.join("stack"));
+    generate(workspace, &fields, ["--frames", "8"])?;
+    generate(
+        workspace,
+        &stack,
+        [
+            "--frames",
+            "1",
+            "--set",
+            "focus.planes=11",
+            "--set",
+            "focus.step_um=0.8",
+        ],
+    )?;
+    println!("\nEight labelled fields and a focus stack:");
+    for folder in [fields, stack] {
+        look_at(workspace, &folder)?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Runs `papsynth generate` in release into a folder that is empty before.
+pub(crate) fn generate<I: AsRef<OsStr>>(
+    workspace: &Workspace,
+    out: &Path,
+    arguments: impl IntoIterator<Item = I>,
+) -> Result<()> {
+    if out.exists() {
+        fs::remove_dir_all(out).with_context(|| format!("cannot empty {}", out.display()))?;
+    }
+    let mut command = workspace.cargo();
+    command
+        .args([
+            "run",
+            "--quiet",
+            "--release",
+            "--package",
+            "papsynth-cli",
+            "--",
+            "generate",
+            "--out",
+        ])
+        .arg(out)
+        .args(arguments);
+    shell::run(&mut command)
+}
+
+/// Prints what lies in a folder, a line for each folder in it and each file.
+fn look_at(workspace: &Workspace, folder: &Path) -> Result<()> {
+    println!("  {}", workspace.shown(folder));
+    let entries =
+        fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut paths = entries
+        .map(|entry| Ok(entry?.path()))
+        .collect::<Result<Vec<_>>>()?;
+    paths.sort();
+    for path in paths {
+        let name = path.file_name().unwrap_or_default().display().to_string();
+        if path.is_dir() {
+            println!("    {name}/ ({} files)", fs::read_dir(&path)?.count());
+        } else {
+            println!("    {name}");
+        }
+    }
+    Ok(())
+}

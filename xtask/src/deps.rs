@@ -1,0 +1,162 @@
+//! Who may know whom.
+
+use anyhow::{Result, bail};
+
+use crate::Chore;
+use crate::arguments::Arguments;
+use crate::outcome::Outcome;
+use crate::workspace::{Package, Workspace};
+
+pub(crate) const CHORE: Chore = Chore {
+    name: "deps",
+    usage: "",
+    about: "checks who depends on whom in the workspace, and draws it",
+    details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the program the \
+              engine and the data set, the chores nobody. Dependencies of tests count too, so that every crate can be \
+              taken, tested and published alone.",
+    run,
+};
+
+/// The place of a crate in the house.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Technique,
+    Engine,
+    Dataset,
+    Program,
+    Chores,
+}
+
+/// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
+const PLACES: [(&str, Role); 12] = [
+    ("fsd-shape", Role::Technique),
+    ("quilt-texture", Role::Technique),
+    ("cloth-verlet", Role::Technique),
+    ("voronoi-cytoskeleton", Role::Technique),
+    ("perlin-bg", Role::Technique),
+    ("spectral-field", Role::Technique),
+    ("optics-psf", Role::Technique),
+    ("ccd-noise", Role::Technique),
+    ("papsynth", Role::Engine),
+    ("papsynth-dataset", Role::Dataset),
+    ("papsynth-cli", Role::Program),
+    ("xtask", Role::Chores),
+];
+
+impl Role {
+    fn of(name: &str) -> Option<Self> {
+        PLACES
+            .iter()
+            .find(|(crate_name, _)| *crate_name == name)
+            .map(|(_, role)| *role)
+    }
+
+    /// Whom a crate in this place may depend on.
+    fn may_know(self) -> &'static [Self] {
+        match self {
+            Self::Technique | Self::Chores => &[],
+            Self::Engine => &[Self::Technique],
+            Self::Dataset => &[Self::Engine],
+            Self::Program => &[Self::Engine, Self::Dataset],
+        }
+    }
+}
+
+/// The crates that know techniques alone, for chores that build them without the rest.
+pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
+    let names = workspace
+        .packages
+        .iter()
+        .map(|package| package.name.as_str());
+    names.filter(|name| matches!(Role::of(name), Some(Role::Technique | Role::Engine)))
+}
+
+fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+    arguments.finish()?;
+    print!("{}", picture(&workspace.packages));
+    let faults = faults(&workspace.packages);
+    if !faults.is_empty() {
+        bail!("{}", faults.join("\n       "));
+    }
+    Ok(Outcome::Done)
+}
+
+/// Everything that is against the rules.
+fn faults(packages: &[Package]) -> Vec<String> {
+    let mut faults = Vec::new();
+    for package in packages {
+        let Some(role) = Role::of(&package.name) else {
+            faults.push(format!(
+                "crate `{}` has no place in the house yet: xtask/src/deps.rs",
+                package.name
+            ));
+            continue;
+        };
+        for member in &package.members {
+            if !Role::of(member).is_some_and(|known| role.may_know().contains(&known)) {
+                faults.push(format!(
+                    "`{}` ({role:?}) must not depend on `{member}`",
+                    package.name
+                ));
+            }
+        }
+    }
+    faults
+}
+
+/// The crates from the bottom up, each with those it depends on.
+fn picture(packages: &[Package]) -> String {
+    let mut lines = String::new();
+    for (name, _) in PLACES {
+        if let Some(package) = packages.iter().find(|package| package.name == name) {
+            let known = if package.members.is_empty() {
+                "-".to_owned()
+            } else {
+                package.members.join(", ")
+            };
+            lines.push_str(&format!("{name:<22} knows {known}\n"));
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn package(name: &str, members: &[&str]) -> Package {
+        let members = members.iter().map(|&member| member.to_owned()).collect();
+        Package {
+            name: name.to_owned(),
+            folder: "/".into(),
+            members,
+            targets: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_dependency_downwards_is_fine() {
+        let packages = [
+            package("ccd-noise", &[]),
+            package("papsynth", &["ccd-noise"]),
+            package("papsynth-dataset", &["papsynth"]),
+            package("papsynth-cli", &["papsynth", "papsynth-dataset"]),
+        ];
+        assert!(faults(&packages).is_empty());
+    }
+
+    #[test]
+    fn a_dependency_upwards_or_sideways_and_a_stranger_are_named() {
+        let packages = [
+            package("ccd-noise", &["optics-psf"]),
+            package("papsynth", &["papsynth-dataset"]),
+            package("papsynth-cli", &["ccd-noise"]),
+            package("xtask", &["papsynth"]),
+            package("papsynth-python", &[]),
+        ];
+        let faults = faults(&packages);
+        assert_eq!(faults.len(), 5, "{faults:?}");
+        assert!(faults[0].contains("`ccd-noise` (Technique) must not depend on `optics-psf`"));
+        assert!(faults[4].contains("`papsynth-python` has no place"));
+    }
+}

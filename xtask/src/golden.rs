@@ -1,0 +1,30 @@
+//! Golden images.
+
+use anyhow::Result;
+
+use crate::arguments::Arguments;
+use crate::outcome::Outcome;
+use crate::workspace::Workspace;
+use crate::{Chore, shell};
+
+pub(crate) const CHORE: Chore = Chore {
+    name: "golden",
+    usage: "[--bless]",
+    about: "compares the golden images of every stage, or writes them anew",
+    details: "The images stand in fixtures/golden, each with the recipe it was made from. --bless writes them: what they show \
+              is then what is right, so look at them, and give the change a line under Results in CHANGELOG.md.",
+    run,
+};
+
+fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
+    let bless = arguments.flag("--bless");
+    arguments.finish()?;
+    workspace.expect_target("papsynth", "test", "golden")?;
+    let mut command = workspace.cargo();
+    command.args(["test", "--package", "papsynth", "--test", "golden"]);
+    if bless {
+        command.env("PAPSYNTH_BLESS", "1");
+    }
+    shell::run(&mut command)?;
+    Ok(Outcome::Done)
+}
