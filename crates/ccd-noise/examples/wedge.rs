@@ -17,9 +17,7 @@ const EXPOSURES: [f32; 4] = [0.9, 0.09, 0.009, 0.0018];
 const PLOT: u32 = 240;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "target/wedge.png".to_owned());
+    let path = std::env::args().nth(1).unwrap_or_else(|| "target/wedge.png".to_owned());
     let params = CameraParams::orca_05g();
     let camera = Camera::new(&params)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
@@ -32,9 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (exposure, top) in EXPOSURES.into_iter().zip((0..).step_by(STEP[1] as usize)) {
         let brightest = exposure * single(params.full_well_e);
         let step = |x: u32| (x / STEP[0] + 1) as f32 / STEPS as f32;
-        let wedge: Vec<f32> = (0..width * height)
-            .map(|i| brightest * step(i % width))
-            .collect();
+        let wedge: Vec<f32> = (0..width * height).map(|i| brightest * step(i % width)).collect();
         let mut frame = vec![0; wedge.len()];
         camera.expose_into(&wedge, width as usize, &mut frame, &mut rng);
 
@@ -62,10 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "pixels are single precision"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
 fn single(value: f64) -> f32 {
     value as f32
 }
@@ -73,17 +66,10 @@ fn single(value: f64) -> f32 {
 /// Decades of either axis, from 0.1 on.
 const DECADES: f32 = 5.0;
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "within the plot"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the plot")]
 fn place(corner: [u32; 2], mean: f32, variance: f32) -> [u32; 2] {
     let along = |v: f32| ((libm::log10f(v.max(0.1)) + 1.0) / DECADES * PLOT as f32) as u32;
-    [
-        corner[0] + along(mean),
-        corner[1] - along(variance).min(PLOT - 2),
-    ]
+    [corner[0] + along(mean), corner[1] - along(variance).min(PLOT - 2)]
 }
 
 fn plot_axes(picture: &mut GrayImage, [left, bottom]: [u32; 2]) {
@@ -110,11 +96,7 @@ fn dot(picture: &mut GrayImage, corner: [u32; 2], mean: f32, variance: f32) {
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "0..=1 to 8 bits"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=1 to 8 bits")]
 fn grey(level: f32) -> u8 {
     (level.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }

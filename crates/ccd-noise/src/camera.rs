@@ -43,10 +43,7 @@ impl Camera {
     /// # Errors
     ///
     /// If a field lies outside its range.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "pixels are single precision"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
     pub fn new(params: &CameraParams) -> Result<Self, Error> {
         params.check()?;
         Ok(Self {
@@ -86,13 +83,7 @@ impl Camera {
     /// # Panics
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
-    pub fn expose_into<R: Rng + ?Sized>(
-        &self,
-        electrons: &[f32],
-        width: usize,
-        out: &mut [u16],
-        rng: &mut R,
-    ) -> usize {
+    pub fn expose_into<R: Rng + ?Sized>(&self, electrons: &[f32], width: usize, out: &mut [u16], rng: &mut R) -> usize {
         self.expose_window(electrons, width, [0, 0], rng.next_u64(), out)
     }
 
@@ -103,29 +94,14 @@ impl Camera {
     /// # Panics
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
-    pub fn expose_window(
-        &self,
-        electrons: &[f32],
-        width: usize,
-        origin: [u32; 2],
-        key: u64,
-        out: &mut [u16],
-    ) -> usize {
+    pub fn expose_window(&self, electrons: &[f32], width: usize, origin: [u32; 2], key: u64, out: &mut [u16]) -> usize {
         whole_rows(electrons.len(), width);
-        assert_eq!(
-            out.len(),
-            electrons.len(),
-            "out has the wrong number of pixels"
-        );
+        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
         let field = NoiseField::new(key);
-        let both = electrons
-            .chunks_exact(width)
-            .zip(out.chunks_exact_mut(width));
+        let both = electrons.chunks_exact(width).zip(out.chunks_exact_mut(width));
         rows(origin)
             .zip(both)
-            .map(|(y, (electrons, out))| {
-                expose_row(&self.chain, &field.row(y), origin[0], electrons, out)
-            })
+            .map(|(y, (electrons, out))| expose_row(&self.chain, &field.row(y), origin[0], electrons, out))
             .sum()
     }
 
@@ -135,17 +111,10 @@ impl Camera {
     ///
     /// If `out` is not as long as `electrons`.
     pub fn mean_dn_into(&self, electrons: &[f32], out: &mut [f32]) {
-        assert_eq!(
-            out.len(),
-            electrons.len(),
-            "out has the wrong number of pixels"
-        );
+        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
         let chain = &self.chain;
         for (dn, &mean) in out.iter_mut().zip(electrons) {
-            *dn = chain
-                .level(at_least_nothing(mean).min(chain.full_well))
-                .max(0.0)
-                .min(chain.highest);
+            *dn = chain.level(at_least_nothing(mean).min(chain.full_well)).max(0.0).min(chain.highest);
         }
     }
 
@@ -173,10 +142,7 @@ impl Chain {
 
     /// ⌊y + ½⌋ within the range of the converter.
     #[inline(always)]
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the lowest 16 bits are the level"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
     fn code(&self, dn: f32) -> u16 {
         /// Added to an integer below it, it leaves the integer in the lowest bits.
         const UNIT: f32 = 8_388_608.0;
@@ -185,12 +151,7 @@ impl Chain {
 
     /// Charges before and after reading, of a block of pixels.
     #[inline(always)]
-    fn charges(
-        &self,
-        electrons: &[f32; BLOCK],
-        row: &RowWords,
-        x: u32,
-    ) -> ([f32; BLOCK], [f32; BLOCK]) {
+    fn charges(&self, electrons: &[f32; BLOCK], row: &RowWords, x: u32) -> ([f32; BLOCK], [f32; BLOCK]) {
         let block = row.block(x);
         let read = normals(&block.words(Stream::Read));
         let mut means = *electrons;

@@ -17,19 +17,6 @@ pub enum Error {
 }
 
 /// `value`, if it is finite and `holds`.
-pub(crate) fn require(
-    field: &'static str,
-    value: f64,
-    holds: bool,
-    accepted: &'static str,
-) -> Result<f64, Error> {
-    if value.is_finite() && holds {
-        Ok(value)
-    } else {
-        Err(Error::OutOfRange {
-            field,
-            value,
-            accepted,
-        })
-    }
+pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
+    if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }

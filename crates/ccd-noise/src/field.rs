@@ -73,10 +73,7 @@ pub(crate) fn rows(origin: [u32; 2]) -> impl Iterator<Item = u32> {
 }
 
 pub(crate) fn whole_rows(len: usize, width: usize) {
-    assert!(
-        width > 0 && len.is_multiple_of(width),
-        "{len} pixels are not whole rows of {width}",
-    );
+    assert!(width > 0 && len.is_multiple_of(width), "{len} pixels are not whole rows of {width}",);
 }
 
 /// The positions of the blocks of a row that starts at `x`.

@@ -26,37 +26,23 @@ pub(crate) struct RowWords {
 }
 
 impl RowWords {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "upper and lower halves of words"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "upper and lower halves of words")]
     pub(crate) fn new(key: u64, y: u32) -> Self {
         let mut words = SplitMix(key ^ SplitMix(u64::from(y)).next());
         let (a, b) = (words.next(), words.next());
-        Self {
-            start: a as u32,
-            streams: [(a >> 32) as u32, b as u32, (b >> 32) as u32],
-            rare: words.next(),
-        }
+        Self { start: a as u32, streams: [(a >> 32) as u32, b as u32, (b >> 32) as u32], rare: words.next() }
     }
 
     /// The pixels from `x` on, hashed once for all streams.
     #[inline(always)]
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "an index below the block's length"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "an index below the block's length")]
     pub(crate) fn block(&self, x: u32) -> Block<'_> {
         let mut places = [0; BLOCK];
         for (i, place) in places.iter_mut().enumerate() {
             let x = x.wrapping_add(i as u32);
             *place = mix(x.wrapping_mul(SPREAD).wrapping_add(self.start));
         }
-        Block {
-            row: self,
-            x,
-            places,
-        }
+        Block { row: self, x, places }
     }
 }
 
@@ -80,10 +66,7 @@ impl Block<'_> {
     }
 
     /// As many further words as wanted for one pixel.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "an index below the block's length"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "an index below the block's length")]
     pub(crate) fn rare(&self, i: usize) -> SplitMix {
         let x = self.x.wrapping_add(i as u32);
         SplitMix(SplitMix(self.row.rare ^ u64::from(x)).next())
@@ -149,8 +132,7 @@ mod tests {
                 }
                 for flips in flips.iter().flatten() {
                     // 2016 counts are compared: five standard errors.
-                    let z = (f64::from(*flips) - f64::from(samples) / 2.0)
-                        / (f64::from(samples) / 4.0).sqrt();
+                    let z = (f64::from(*flips) - f64::from(samples) / 2.0) / (f64::from(samples) / 4.0).sqrt();
                     assert!(z.abs() < 5.0, "{stream:?}, bit {bit}: {z}");
                 }
             }
@@ -164,10 +146,7 @@ mod tests {
         for (i, word) in whole.into_iter().enumerate() {
             let alone = row.block((u32::MAX - 20).wrapping_add(u32::try_from(i).unwrap()));
             assert_eq!(alone.words(Stream::Shot)[0], word);
-            assert_eq!(
-                alone.rare(0).next(),
-                row.block(u32::MAX - 20).rare(i).next()
-            );
+            assert_eq!(alone.rare(0).next(), row.block(u32::MAX - 20).rare(i).next());
         }
     }
 }

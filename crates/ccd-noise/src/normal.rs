@@ -116,11 +116,7 @@ mod tests {
     fn quantiles_are_the_inverse_of_the_distribution() {
         for i in 0..2_000_000_u32 {
             // Every part of the range, and the ends closely.
-            let magnitude = if i % 2 == 0 {
-                i * 1073
-            } else {
-                0x7fff_ffff - i
-            };
+            let magnitude = if i % 2 == 0 { i * 1073 } else { 0x7fff_ffff - i };
             let x = normal(magnitude);
             let tail = (f64::from(0x7fff_ffff - magnitude) + 0.5) / 4_294_967_296.0;
             // An error dx changes the tail by φ(x) dx, and |x| φ(x) < 1.2 · tail · (1 + x²).
@@ -160,10 +156,7 @@ mod tests {
         for i in 1..1_000_000_u32 {
             let x = i as f32 * 1e-6;
             let exact = libm::log(f64::from(x));
-            assert!(
-                (f64::from(ln(x)) - exact).abs() < 1.2e-7 * exact.abs() + 1e-8,
-                "{x}"
-            );
+            assert!((f64::from(ln(x)) - exact).abs() < 1.2e-7 * exact.abs() + 1e-8, "{x}");
         }
     }
 }

@@ -70,51 +70,21 @@ impl CameraParams {
     /// are those of its chip family; the offset is ours.
     #[must_use]
     pub fn orca_05g() -> Self {
-        Self {
-            gain_dn_per_e: (4095.0 - 100.0) / 17_600.0,
-            offset_dn: 100.0,
-            bit_depth: 12,
-            ..Self::default()
-        }
+        Self { gain_dn_per_e: (4095.0 - 100.0) / 17_600.0, offset_dn: 100.0, bit_depth: 12, ..Self::default() }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         let well = self.full_well_e;
-        require(
-            "full_well_e",
-            well,
-            well > 0.0 && well <= 1e7,
-            "above 0 and at most 1e7",
-        )?;
+        require("full_well_e", well, well > 0.0 && well <= 1e7, "above 0 and at most 1e7")?;
         let gain = self.gain_dn_per_e;
-        require(
-            "gain_dn_per_e",
-            gain,
-            gain > 0.0 && gain <= 1e6,
-            "above 0 and at most 1e6",
-        )?;
+        require("gain_dn_per_e", gain, gain > 0.0 && gain <= 1e6, "above 0 and at most 1e6")?;
         let bits = self.bit_depth;
-        require(
-            "bit_depth",
-            f64::from(bits),
-            (8..=16).contains(&bits),
-            "from 8 to 16",
-        )?;
+        require("bit_depth", f64::from(bits), (8..=16).contains(&bits), "from 8 to 16")?;
         let offset = self.offset_dn;
         let code = offset >= 0.0 && offset <= f64::from(self.max_dn());
-        require(
-            "offset_dn",
-            offset,
-            code,
-            "from 0 to the highest grey level",
-        )?;
+        require("offset_dn", offset, code, "from 0 to the highest grey level")?;
         let read = self.read_noise_e;
-        require(
-            "read_noise_e",
-            read,
-            (0.0..=1e6).contains(&read),
-            "from 0 to 1e6",
-        )?;
+        require("read_noise_e", read, (0.0..=1e6).contains(&read), "from 0 to 1e6")?;
         if let PhotonNoise::NormalAbove { mean_e } = self.photon_noise {
             require("photon_noise.mean_e", mean_e, mean_e >= 0.0, "0 or more")?;
         }
@@ -156,68 +126,20 @@ mod tests {
         let good = CameraParams::default();
         let mut bad = Vec::new();
         for value in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
-            bad.push((
-                "full_well_e",
-                CameraParams {
-                    full_well_e: value,
-                    ..good.clone()
-                },
-            ));
-            bad.push((
-                "gain_dn_per_e",
-                CameraParams {
-                    gain_dn_per_e: value,
-                    ..good.clone()
-                },
-            ));
-            bad.push((
-                "offset_dn",
-                CameraParams {
-                    offset_dn: value,
-                    ..good.clone()
-                },
-            ));
-            bad.push((
-                "read_noise_e",
-                CameraParams {
-                    read_noise_e: value,
-                    ..good.clone()
-                },
-            ));
+            bad.push(("full_well_e", CameraParams { full_well_e: value, ..good.clone() }));
+            bad.push(("gain_dn_per_e", CameraParams { gain_dn_per_e: value, ..good.clone() }));
+            bad.push(("offset_dn", CameraParams { offset_dn: value, ..good.clone() }));
+            bad.push(("read_noise_e", CameraParams { read_noise_e: value, ..good.clone() }));
         }
         for bit_depth in [0, 7, 17, u32::MAX] {
-            bad.push((
-                "bit_depth",
-                CameraParams {
-                    bit_depth,
-                    ..good.clone()
-                },
-            ));
+            bad.push(("bit_depth", CameraParams { bit_depth, ..good.clone() }));
         }
         for mean_e in [f64::NAN, -1.0] {
             let photon_noise = PhotonNoise::NormalAbove { mean_e };
-            bad.push((
-                "photon_noise.mean_e",
-                CameraParams {
-                    photon_noise,
-                    ..good.clone()
-                },
-            ));
+            bad.push(("photon_noise.mean_e", CameraParams { photon_noise, ..good.clone() }));
         }
-        bad.push((
-            "full_well_e",
-            CameraParams {
-                full_well_e: 0.0,
-                ..good.clone()
-            },
-        ));
-        bad.push((
-            "gain_dn_per_e",
-            CameraParams {
-                gain_dn_per_e: 0.0,
-                ..good.clone()
-            },
-        ));
+        bad.push(("full_well_e", CameraParams { full_well_e: 0.0, ..good.clone() }));
+        bad.push(("gain_dn_per_e", CameraParams { gain_dn_per_e: 0.0, ..good.clone() }));
         for (field, params) in bad {
             let error = params.check().unwrap_err().to_string();
             assert!(error.starts_with(&format!("{field} is ")), "{error}");

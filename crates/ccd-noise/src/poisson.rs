@@ -34,11 +34,7 @@ pub(crate) fn poisson(means: &[f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
         }
         let summed = summed(&small, &first, &second);
         for i in 0..BLOCK {
-            counts[i] = if means[i] < SUMMED_BELOW {
-                summed[i]
-            } else {
-                counts[i]
-            };
+            counts[i] = if means[i] < SUMMED_BELOW { summed[i] } else { counts[i] };
         }
     }
     counts
@@ -111,13 +107,7 @@ fn exp(x: f64) -> f64 {
     // Taylor, as rest is at most ln 2 / 2: even and odd powers side by side.
     let square = rest * rest;
     let (mut even, mut odd) = (1.0 / 479_001_600.0, 1.0 / 39_916_800.0);
-    for (a, b) in [
-        (3_628_800.0, 362_880.0),
-        (40_320.0, 5_040.0),
-        (720.0, 120.0),
-        (24.0, 6.0),
-        (2.0, 1.0),
-    ] {
+    for (a, b) in [(3_628_800.0, 362_880.0), (40_320.0, 5_040.0), (720.0, 120.0), (24.0, 6.0), (2.0, 1.0)] {
         even = even * square + 1.0 / a;
         odd = odd * square + 1.0 / b;
     }
@@ -129,12 +119,7 @@ fn exp(x: f64) -> f64 {
 /// the lack of skewness. Where K falls short of µ it is given up with a probability of nearly
 /// (µ - K)³/6µ², 0.13/√µ on the whole, for a deviate from what is missing above µ.
 #[inline(always)]
-fn from_normals(
-    means: &[f32; BLOCK],
-    words: &[u32; BLOCK],
-    chances: &[u32; BLOCK],
-    block: &Block<'_>,
-) -> [f32; BLOCK] {
+fn from_normals(means: &[f32; BLOCK], words: &[u32; BLOCK], chances: &[u32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
     let normals = normals(words);
     let mut counts = [0.0; BLOCK];
     let mut open = [0_u32; BLOCK];
@@ -173,10 +158,7 @@ fn uniform(word: u32) -> f32 {
 /// from the excess of the Poisson distribution over that of the proposals.
 #[cold]
 #[inline(never)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "counts are exact in single precision"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "counts are exact in single precision")]
 fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix) -> f32 {
     let law = Law::new(mean);
     let count = f64::from(count);
@@ -188,12 +170,7 @@ fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix) -> f32 {
         let height = words.uniform();
         let side = 2.0 * words.uniform() - 1.0;
         let from_centre = -libm::log(height);
-        let t = EXCESS_CENTRE
-            + if side < 0.0 {
-                -from_centre
-            } else {
-                from_centre
-            };
+        let t = EXCESS_CENTRE + if side < 0.0 { -from_centre } else { from_centre };
         if t <= EXCESS_START {
             continue;
         }
@@ -221,10 +198,7 @@ struct Law {
 impl Law {
     fn new(mean: f32) -> Self {
         let mean = f64::from(mean);
-        Self {
-            mean,
-            root: mean.sqrt(),
-        }
+        Self { mean, root: mean.sqrt() }
     }
 
     /// The probability that ⌊µ + √µ·z⌋ = k for a normal z.
@@ -239,10 +213,7 @@ impl Law {
         let x = self.middle(count);
         let normal = 0.5 * x * x;
         if count < 10.0 {
-            let factorial = (1..=10)
-                .map(f64::from)
-                .take_while(|&k| k <= count)
-                .product::<f64>();
+            let factorial = (1..=10).map(f64::from).take_while(|&k| k <= count).product::<f64>();
             let poisson = exp(count * libm::log(self.mean) - self.mean + normal) / factorial;
             return poisson * (core::f64::consts::TAU * self.mean).sqrt() / self.bin(x);
         }
@@ -290,11 +261,8 @@ mod tests {
             for k in counts_around(&law, -6.0, 6.0) {
                 let [low, high] = [k, k + 1.0].map(|k| (k - law.mean) / law.root);
                 let tail = |x: f64| 0.5 * libm::erfc(x.abs() / core::f64::consts::SQRT_2);
-                let bin = if low < 0.0 && high > 0.0 {
-                    1.0 - tail(low) - tail(high)
-                } else {
-                    (tail(low) - tail(high)).abs()
-                };
+                let bin =
+                    if low < 0.0 && high > 0.0 { 1.0 - tail(low) - tail(high) } else { (tail(low) - tail(high)).abs() };
                 assert!((law.proposed(k) / bin - 1.0).abs() < 2e-7, "{mean}: {k}");
                 let wanted = libm::exp(k * libm::log(law.mean) - law.mean - libm::lgamma(k + 1.0));
                 let got = law.proposed(k) * law.ratio(k);
@@ -318,9 +286,7 @@ mod tests {
                 if low < EXCESS_START {
                     assert!(excess <= 1e-12, "{mean}: {k}");
                 } else {
-                    let farthest = (low - EXCESS_CENTRE)
-                        .abs()
-                        .max((high - EXCESS_CENTRE).abs());
+                    let farthest = (low - EXCESS_CENTRE).abs().max((high - EXCESS_CENTRE).abs());
                     let bound = EXCESS_BOUND / law.mean * libm::exp(-farthest);
                     assert!(excess <= bound, "{mean}: {k}");
                 }

@@ -33,9 +33,12 @@ fn variance(values: &[f64]) -> f64 {
     moment(values, mean(values), 2)
 }
 
-const MEANS: [f32; 13] = [
-    0.01, 0.1, 1.0, 3.7, 10.0, 19.99, 20.0, 30.0, 200.0, 1e3, 17_850.0, 1e5, 1e6,
-];
+const MEANS: [f32; 13] = [0.01, 0.1, 1.0, 3.7, 10.0, 19.99, 20.0, 30.0, 200.0, 1e3, 17_850.0, 1e5, 1e6];
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small counts")]
+fn index(count: f64) -> usize {
+    count as usize
+}
 
 #[test]
 fn poisson_deviates_follow_the_law() {
@@ -45,11 +48,11 @@ fn poisson_deviates_follow_the_law() {
         let mu = f64::from(mu);
         let probability = |k: f64| libm::exp(k * libm::log(mu) - mu - libm::lgamma(k + 1.0));
         let first = (mu - 8.0 * mu.sqrt()).floor().max(0.0);
-        let bins = (16.0 * mu.sqrt()) as usize + 20;
+        let bins = index(16.0 * mu.sqrt()) + 20;
         let mut observed = vec![0.0; bins];
         for k in &counts {
             assert!(k.fract() == 0.0 && *k >= 0.0);
-            observed[((k - first).max(0.0) as usize).min(bins - 1)] += 1.0;
+            observed[index((k - first).max(0.0)).min(bins - 1)] += 1.0;
         }
         // Counts are pooled until 20 are expected.
         let (mut chi2, mut pools, mut left) = (0.0, 0.0, [0.0, 0.0, n]);
@@ -65,10 +68,7 @@ fn poisson_deviates_follow_the_law() {
         let rest = left[1] + left[2];
         chi2 += (left[0] - rest) * (left[0] - rest) / rest;
         let z = (chi2 - pools) / f64::sqrt(2.0 * pools);
-        assert!(
-            z.abs() < 4.0,
-            "mean {mu}: chi² {chi2} in {pools}, {z} standard errors"
-        );
+        assert!(z.abs() < 4.0, "mean {mu}: chi² {chi2} in {pools}, {z} standard errors");
     }
 }
 
@@ -94,9 +94,7 @@ fn poisson_moments_are_the_laws() {
 #[test]
 fn a_deviate_depends_on_nothing_but_its_mean_and_place() {
     let (width, field) = (333, NoiseField::new(KEY));
-    let means: Vec<f32> = (0..width * 20)
-        .map(|i| [0.0, 3.0, 19.0, 25.0, 4e3][i * 7 % 5])
-        .collect();
+    let means: Vec<f32> = (0..width * 20).map(|i| [0.0, 3.0, 19.0, 25.0, 4e3][i * 7 % 5]).collect();
     let mut mixed = vec![0.0; means.len()];
     field.poisson_into(&means, width, [0, 0], &mut mixed);
     for mu in [0.0, 3.0, 19.0, 25.0, 4e3] {
@@ -110,36 +108,20 @@ fn a_deviate_depends_on_nothing_but_its_mean_and_place() {
 
 #[test]
 fn what_is_no_mean_counts_as_dark() {
-    let means = [
-        -0.0,
-        f32::NAN,
-        -5.0,
-        f32::NEG_INFINITY,
-        5e3,
-        f32::INFINITY,
-        0.0,
-    ];
+    let means = [-0.0, f32::NAN, -5.0, f32::NEG_INFINITY, 5e3, f32::INFINITY, 0.0];
     let mut counts = [1.0; 7];
     NoiseField::new(KEY).poisson_into(&means, 7, [0, 0], &mut counts);
-    assert_eq!(
-        [counts[0], counts[1], counts[2], counts[3], counts[6]],
-        [0.0; 5]
-    );
-    assert!(
-        (4500.0..5500.0).contains(&counts[4]) && counts[5] > 16e6,
-        "{counts:?}"
-    );
+    assert_eq!([counts[0], counts[1], counts[2], counts[3], counts[6]], [0.0; 5]);
+    assert!((4500.0..5500.0).contains(&counts[4]) && counts[5] > 16e6, "{counts:?}");
     let mut codes = [1; 7];
-    Camera::new(&CameraParams {
-        read_noise_e: 0.0,
-        ..CameraParams::default()
-    })
-    .unwrap()
-    .expose_window(&means, 7, [0, 0], KEY, &mut codes);
-    assert_eq!(
-        [codes[0], codes[1], codes[2], codes[3], codes[5]],
-        [0, 0, 0, 0, 255]
+    Camera::new(&CameraParams { read_noise_e: 0.0, ..CameraParams::default() }).unwrap().expose_window(
+        &means,
+        7,
+        [0, 0],
+        KEY,
+        &mut codes,
     );
+    assert_eq!([codes[0], codes[1], codes[2], codes[3], codes[5]], [0, 0, 0, 0, 255]);
 }
 
 #[test]
@@ -153,11 +135,8 @@ fn normal_deviates_are_normal() {
     }
     deviates.sort_by(f64::total_cmp);
     let below = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
-    let distance = deviates
-        .iter()
-        .enumerate()
-        .map(|(i, &x)| (below(x) - (i as f64 + 0.5) / n as f64).abs())
-        .fold(0.0, f64::max);
+    let distance =
+        deviates.iter().enumerate().map(|(i, &x)| (below(x) - (i as f64 + 0.5) / n as f64).abs()).fold(0.0, f64::max);
     // Kolmogorov and Smirnov, at the level of 0.1 %.
     assert!(distance < 1.95 / (n as f64).sqrt(), "{distance}");
 }
@@ -172,21 +151,13 @@ fn assert_uncorrelated(what: &str, a: &[f64], b: &[f64]) {
 fn frames_and_neighbours_are_independent() {
     let n = 1_000_000;
     let frame = normal(KEY, n);
-    for (other, name) in [
-        (KEY + 1, "next key"),
-        (KEY ^ 1 << 63, "far key"),
-        (!KEY, "inverse"),
-    ] {
+    for (other, name) in [(KEY + 1, "next key"), (KEY ^ 1 << 63, "far key"), (!KEY, "inverse")] {
         assert_uncorrelated(name, &frame, &normal(other, n));
     }
     for lag in [1, 2, 3, 16, 63, 64, 65, 128, 999, 1000, 1001, 2000, 64_000] {
         assert_uncorrelated(&format!("lag {lag}"), &frame[lag..], &frame[..n - lag]);
         let squares: Vec<f64> = frame.iter().map(|x| x * x).collect();
-        assert_uncorrelated(
-            &format!("squares, lag {lag}"),
-            &squares[lag..],
-            &squares[..n - lag],
-        );
+        assert_uncorrelated(&format!("squares, lag {lag}"), &squares[lag..], &squares[..n - lag]);
     }
     // Shot and read noise of the same pixel.
     for mu in [2.0, 19.0, 25.0, 9000.0] {
@@ -205,9 +176,7 @@ fn noises() -> [PhotonNoise; 4] {
 
 /// Dark to overexposed, with pixels of every size in each block.
 fn scene(width: usize, height: usize) -> Vec<f32> {
-    (0..width * height)
-        .map(|i| [0.0, 2.0, 19.0, 300.0, 500.0, 14e3, 3e4][i * i % 7])
-        .collect()
+    (0..width * height).map(|i| [0.0, 2.0, 19.0, 300.0, 500.0, 14e3, 3e4][i * i % 7]).collect()
 }
 
 #[test]
@@ -215,10 +184,7 @@ fn a_window_is_the_frame_seen_through_it() {
     let (width, height) = (301, 57);
     let electrons = scene(width, height);
     for photon_noise in noises() {
-        let params = CameraParams {
-            photon_noise,
-            ..CameraParams::orca_05g()
-        };
+        let params = CameraParams { photon_noise, ..CameraParams::orca_05g() };
         let camera = Camera::new(&params).unwrap();
         let mut frame = vec![0; electrons.len()];
         let saturated = camera.expose_window(&electrons, width, [40, 1000], KEY, &mut frame);
@@ -227,7 +193,7 @@ fn a_window_is_the_frame_seen_through_it() {
             for (left, columns) in [(0, 63), (63, 1), (64, 130), (194, 107)] {
                 let cut = |i: usize| (top + i / columns) * width + left + i % columns;
                 let tile: Vec<f32> = (0..rows * columns).map(|i| electrons[cut(i)]).collect();
-                let origin = [40 + left as u32, 1000 + top as u32];
+                let origin = [40 + left, 1000 + top].map(|at| u32::try_from(at).unwrap());
                 let mut out = vec![0; tile.len()];
                 tiled += camera.expose_window(&tile, columns, origin, KEY, &mut out);
                 for (i, code) in out.into_iter().enumerate() {
@@ -261,15 +227,8 @@ fn a_frame_takes_one_word_and_is_the_window_of_that_key() {
 fn the_photon_transfer_curve_gives_the_gain() {
     let params = CameraParams::orca_05g();
     let n = 256 * 320;
-    for photon_noise in [
-        PhotonNoise::Exact,
-        PhotonNoise::NormalAbove { mean_e: 300.0 },
-    ] {
-        let camera = Camera::new(&CameraParams {
-            photon_noise,
-            ..params.clone()
-        })
-        .unwrap();
+    for photon_noise in [PhotonNoise::Exact, PhotonNoise::NormalAbove { mean_e: 300.0 }] {
+        let camera = Camera::new(&CameraParams { photon_noise, ..params.clone() }).unwrap();
         let expose = |electrons: f32, key: u64| -> Vec<f64> {
             let mut out = vec![0; n];
             let saturated = camera.expose_window(&vec![electrons; n], 320, [0, 0], key, &mut out);
@@ -294,10 +253,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
         let gain = xy / xx;
         assert!((gain / params.gain_dn_per_e - 1.0).abs() < 0.01, "{gain}");
         let read_noise = (dark_variance - 1.0 / 12.0).sqrt() / gain;
-        assert!(
-            (read_noise / params.read_noise_e - 1.0).abs() < 0.02,
-            "{read_noise}"
-        );
+        assert!((read_noise / params.read_noise_e - 1.0).abs() < 0.02, "{read_noise}");
         // Shot-limited signal to noise ratio, read noise and rounding taken off.
         let (m, v) = points[40];
         let snr = (m - dark) / (v - dark_variance).sqrt();
@@ -322,10 +278,7 @@ fn rounding_adds_a_twelfth() {
         let (expected, z) = (sigma_dn * sigma_dn + 1.0 / 12.0, (2.0 / n as f64).sqrt());
         // At half a grey level the rounding is not yet independent of the noise: 1 %.
         let error = variance(&codes) / expected - 1.0;
-        assert!(
-            error.abs() < 4.0 * z + if sigma_dn < 1.0 { 0.01 } else { 0.0 },
-            "{error}"
-        );
+        assert!(error.abs() < 4.0 * z + if sigma_dn < 1.0 { 0.01 } else { 0.0 }, "{error}");
         // The mean of what is rounded keeps up to exp(-2π²σ²)/π: 0.0023 at half a grey level.
         let bound = 0.0023 + 4.0 * (expected / n as f64).sqrt();
         assert!((mean(&codes) - 100.3).abs() < bound, "{}", mean(&codes));
@@ -344,11 +297,7 @@ fn one_normal_deviate_has_the_summed_variance() {
         photon_noise: PhotonNoise::NormalAbove { mean_e: 50.0 },
     };
     let camera = Camera::new(&params).unwrap();
-    let exact = Camera::new(&CameraParams {
-        photon_noise: PhotonNoise::Exact,
-        ..params
-    })
-    .unwrap();
+    let exact = Camera::new(&CameraParams { photon_noise: PhotonNoise::Exact, ..params }).unwrap();
     for (mu, same) in [(49.9, true), (50.0, false), (900.0, false)] {
         let (mut codes, mut exact_codes) = (vec![0; n], vec![0; n]);
         camera.expose_window(&vec![mu; n], 1000, [0, 0], KEY, &mut codes);
@@ -381,28 +330,18 @@ fn levels_stay_in_range_and_saturation_is_counted() {
         let highest = codes.iter().filter(|&&c| c == camera.max_dn()).count();
         assert_eq!(u32::from(camera.max_dn()), (1 << bit_depth) - 1);
         assert!(codes.iter().all(|&c| c <= camera.max_dn()));
-        assert!(
-            codes.contains(&0) && highest >= 500 && saturated >= highest,
-            "{saturated}"
-        );
+        assert!(codes.contains(&0) && highest >= 500 && saturated >= highest, "{saturated}");
         assert!(saturated < 2000, "{saturated}");
     }
 }
 
 #[test]
 fn a_full_pixel_holds_no_more() {
-    let params = CameraParams {
-        full_well_e: 10_000.0,
-        gain_dn_per_e: 0.01,
-        read_noise_e: 0.0,
-        ..CameraParams::default()
-    };
+    let params =
+        CameraParams { full_well_e: 10_000.0, gain_dn_per_e: 0.01, read_noise_e: 0.0, ..CameraParams::default() };
     let camera = Camera::new(&params).unwrap();
     let mut codes = [0; 4];
-    assert_eq!(
-        camera.expose_window(&[5e3, 2e4, 1e6, 0.0], 4, [0, 0], KEY, &mut codes),
-        2
-    );
+    assert_eq!(camera.expose_window(&[5e3, 2e4, 1e6, 0.0], 4, [0, 0], KEY, &mut codes), 2);
     assert_eq!([codes[1], codes[2], codes[3]], [100, 100, 0]);
 }
 
@@ -414,7 +353,7 @@ fn noise_free_levels() {
     let electrons = [0.0, 35.0, 70.0, 105.0, 17_849.0, 18_000.0, -1.0];
     let mut dn = [0.0; 7];
     camera.mean_dn_into(&electrons, &mut dn);
-    for (dn, expected) in dn.iter().zip([0.0, 0.5, 1.0, 1.5, 254.985_71, 255.0, 0.0]) {
+    for (dn, expected) in dn.iter().zip([0.0, 0.5, 1.0, 1.5, 254.985_7, 255.0, 0.0]) {
         assert!((dn - expected).abs() < 1e-4, "{dn} for {expected}");
     }
     let mut codes = [0; 7];
@@ -427,23 +366,11 @@ fn noise_free_levels() {
 fn bits_are_pinned() {
     let electrons = scene(301, 57);
     let hashes = noises().map(|photon_noise| {
-        let params = CameraParams {
-            photon_noise,
-            ..CameraParams::orca_05g()
-        };
+        let params = CameraParams { photon_noise, ..CameraParams::orca_05g() };
         let mut out = vec![0; electrons.len()];
-        Camera::new(&params)
-            .unwrap()
-            .expose_window(&electrons, 301, [3, 5], KEY, &mut out);
-        out.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, &c| {
-            (h ^ u64::from(c)).wrapping_mul(0x100_0000_01b3)
-        })
+        Camera::new(&params).unwrap().expose_window(&electrons, 301, [3, 5], KEY, &mut out);
+        out.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, &c| (h ^ u64::from(c)).wrapping_mul(0x100_0000_01b3))
     });
-    let pinned = [
-        0xb147_c8c6_9fdb_62e3,
-        0xa588_7947_3884_f7e4,
-        0xd93f_0334_6dee_c91d,
-        0x236e_1d2c_5e4b_dbe3,
-    ];
+    let pinned = [0xb147_c8c6_9fdb_62e3, 0xa588_7947_3884_f7e4, 0xd93f_0334_6dee_c91d, 0x236e_1d2c_5e4b_dbe3];
     assert_eq!(hashes, pinned);
 }

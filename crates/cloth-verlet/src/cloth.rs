@@ -37,12 +37,7 @@ impl Cloth {
         let disc = Disc::new(params.vertices)?;
         let topology = Topology::new(&disc, rest::outline_points(&disc, params));
         let refinement = Refinement::new(&disc, params.smoothing);
-        Ok(Cloth {
-            params: params.clone(),
-            disc,
-            topology,
-            refinement,
-        })
+        Ok(Cloth { params: params.clone(), disc, topology, refinement })
     }
 
     /// Presses one sheet into an outline: a simple polygon, either way round, of any unit.
@@ -66,16 +61,8 @@ impl Cloth {
     /// # Panics
     ///
     /// If there are not as many sources as outlines.
-    pub fn crumple_many<R: Rng>(
-        &self,
-        outlines: &[&[Point]],
-        rngs: &mut [R],
-    ) -> Vec<Result<Sheet, Error>> {
-        assert_eq!(
-            outlines.len(),
-            rngs.len(),
-            "each outline needs its own source of random numbers"
-        );
+    pub fn crumple_many<R: Rng>(&self, outlines: &[&[Point]], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
+        assert_eq!(outlines.len(), rngs.len(), "each outline needs its own source of random numbers");
         let mut tasks = Vec::with_capacity(outlines.len());
         let mut errors = Vec::with_capacity(outlines.len());
         for (outline, rng) in outlines.iter().zip(rngs) {
@@ -89,20 +76,13 @@ impl Cloth {
         }
         let mut sheets = tasks.chunks(LANES).flat_map(|chunk| self.solved(chunk));
         let mut next = || sheets.next().ok_or(Error::TooFewPoints { points: 0 });
-        errors
-            .into_iter()
-            .map(|error| error.map_or_else(&mut next, Err))
-            .collect()
+        errors.into_iter().map(|error| error.map_or_else(&mut next, Err)).collect()
     }
 
     fn task<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Task, Error> {
         let outline = Outline::new(outline)?;
         let (start, offset) = rest::start(&self.disc, &outline, &self.params, rng);
-        Ok(Task {
-            outline,
-            start,
-            offset,
-        })
+        Ok(Task { outline, start, offset })
     }
 
     /// Up to [`LANES`] tasks.
@@ -110,21 +90,12 @@ impl Cloth {
         if tasks.len() <= FEW {
             tasks
                 .iter()
-                .map(|task| {
-                    self.finished(
-                        task,
-                        &self.run(std::slice::from_ref(&task.start), narrow).lane(0),
-                    )
-                })
+                .map(|task| self.finished(task, &self.run(std::slice::from_ref(&task.start), narrow).lane(0)))
                 .collect()
         } else {
             let starts: Vec<Start> = tasks.iter().map(|t| t.start.clone()).collect();
             let batch = self.run(&starts, wide);
-            tasks
-                .iter()
-                .enumerate()
-                .map(|(l, task)| self.finished(task, &batch.lane(l)))
-                .collect()
+            tasks.iter().enumerate().map(|(l, task)| self.finished(task, &batch.lane(l))).collect()
         }
     }
 
@@ -144,24 +115,12 @@ impl Cloth {
         if hemmed {
             self.refinement.hem(&mut parts, &task.outline, task.offset);
         }
-        let Outline {
-            points,
-            centre,
-            radius,
-        } = &task.outline;
+        let Outline { points, centre, radius } = &task.outline;
         let inside = Inside::new(points);
         for (v, &from_centre) in parts.vertices.iter_mut().zip(&parts.radius) {
             // The hem lies on the outline already.
-            let [x, y] = if hemmed && from_centre == 1.0 {
-                [v[0], v[1]]
-            } else {
-                inside.nearest([v[0], v[1]])
-            };
-            *v = [
-                centre[0] + radius * x,
-                centre[1] + radius * y,
-                radius * v[2],
-            ];
+            let [x, y] = if hemmed && from_centre == 1.0 { [v[0], v[1]] } else { inside.nearest([v[0], v[1]]) };
+            *v = [centre[0] + radius * x, centre[1] + radius * y, radius * v[2]];
         }
         for r in &mut parts.rest {
             *r = r.map(|c| c * radius);
@@ -187,22 +146,12 @@ fn wide(batch: &mut Batch<f32, LANES>, topology: &Topology, params: &ClothParams
 // The same plain loops, compiled for each instruction set; nothing is contracted, so that all give the same bits.
 
 #[multiversion(targets = "simd")]
-fn verlet_wide(
-    batch: &mut Batch<f32, LANES>,
-    topology: &Topology,
-    steps: usize,
-    params: &VerletParams,
-) {
+fn verlet_wide(batch: &mut Batch<f32, LANES>, topology: &Topology, steps: usize, params: &VerletParams) {
     batch.verlet(topology, steps, params);
 }
 
 #[multiversion(targets = "simd")]
-fn xpbd_wide(
-    batch: &mut Batch<f32, LANES>,
-    topology: &Topology,
-    steps: usize,
-    params: &XpbdParams,
-) {
+fn xpbd_wide(batch: &mut Batch<f32, LANES>, topology: &Topology, steps: usize, params: &XpbdParams) {
     batch.xpbd(topology, steps, params);
 }
 
@@ -215,20 +164,11 @@ mod tests {
     use crate::{Rest, Vertex};
 
     fn few() -> ClothParams {
-        ClothParams {
-            vertices: 300,
-            ..ClothParams::default()
-        }
+        ClothParams { vertices: 300, ..ClothParams::default() }
     }
 
     fn outlines() -> Vec<Vec<Point>> {
-        vec![
-            wavy(3.0, 0.2),
-            angular(),
-            wavy(7.0, 0.1),
-            vec![[0.0, 0.0], [3.0, 0.2], [1.0, 4.0]],
-            wavy(2.0, 0.5),
-        ]
+        vec![wavy(3.0, 0.2), angular(), wavy(7.0, 0.1), vec![[0.0, 0.0], [3.0, 0.2], [1.0, 4.0]], wavy(2.0, 0.5)]
     }
 
     /// How far outside the polygon a point is.
@@ -246,16 +186,8 @@ mod tests {
         let both = [
             few(),
             ClothParams::paper(),
-            ClothParams {
-                rest: Rest::Disc,
-                smoothing: crate::Smoothing::Loop,
-                ..few()
-            },
-            ClothParams {
-                rest: Rest::Outline,
-                excess: 1.3,
-                ..ClothParams::paper()
-            },
+            ClothParams { rest: Rest::Disc, smoothing: crate::Smoothing::Loop, ..few() },
+            ClothParams { rest: Rest::Outline, excess: 1.3, ..ClothParams::paper() },
         ];
         for params in both {
             let cloth = Cloth::new(&params).unwrap();
@@ -276,19 +208,11 @@ mod tests {
 
     #[test]
     fn law_24_a_sheet_is_hardly_stretched() {
-        let cloth = Cloth::new(&ClothParams {
-            excess: 1.12,
-            ..ClothParams::default()
-        })
-        .unwrap();
+        let cloth = Cloth::new(&ClothParams { excess: 1.12, ..ClothParams::default() }).unwrap();
         let outline = wavy(2.0, 0.08);
         for stream in 7..10 {
             let sheet = cloth.crumple(&outline, &mut rng(stream)).unwrap();
-            assert!(
-                sheet.edge_strain_rms() < 0.03,
-                "{}",
-                sheet.edge_strain_rms()
-            );
+            assert!(sheet.edge_strain_rms() < 0.03, "{}", sheet.edge_strain_rms());
             assert!(
                 (sheet.rest_area() / area(&outline) - 1.12).abs() < 0.005,
                 "{}",
@@ -307,27 +231,12 @@ mod tests {
                 let shadow: f64 = sheet
                     .triangles()
                     .iter()
-                    .map(|t| {
-                        t.map(|v| {
-                            [
-                                sheet.vertices()[v as usize][0],
-                                sheet.vertices()[v as usize][1],
-                            ]
-                        })
-                    })
+                    .map(|t| t.map(|v| [sheet.vertices()[v as usize][0], sheet.vertices()[v as usize][1]]))
                     .map(|[a, b, c]| cross(a, b, c) / 2.0)
                     .sum();
-                assert!(
-                    (shadow / area(&outline).abs() - 1.0).abs() < 1e-9,
-                    "{shadow}"
-                );
+                assert!((shadow / area(&outline).abs() - 1.0).abs() < 1e-9, "{shadow}");
                 for (a, _) in sides(&outline) {
-                    assert!(
-                        sheet
-                            .vertices()
-                            .iter()
-                            .any(|v| distance([v[0], v[1]], a) < 1e-6)
-                    );
+                    assert!(sheet.vertices().iter().any(|v| distance([v[0], v[1]], a) < 1e-6));
                 }
             }
         }
@@ -335,17 +244,10 @@ mod tests {
 
     #[test]
     fn a_sheets_bits_depend_on_itself_alone() {
-        for params in [
-            few(),
-            ClothParams {
-                vertices: 300,
-                ..ClothParams::paper()
-            },
-        ] {
+        for params in [few(), ClothParams { vertices: 300, ..ClothParams::paper() }] {
             let cloth = Cloth::new(&params).unwrap();
-            let outlines: Vec<Vec<Point>> = (0..18_u8)
-                .map(|k| wavy(2.0 + f64::from(k % 4), 0.02 * f64::from(k % 7)))
-                .collect();
+            let outlines: Vec<Vec<Point>> =
+                (0..18_u8).map(|k| wavy(2.0 + f64::from(k % 4), 0.02 * f64::from(k % 7))).collect();
             let borrowed: Vec<&[Point]> = outlines.iter().map(Vec::as_slice).collect();
             let mut rngs: Vec<_> = (0..18).map(rng).collect();
             let together = cloth.crumple_many(&borrowed, &mut rngs);
@@ -364,20 +266,10 @@ mod tests {
         let good = wavy(3.0, 0.1);
         let mut rngs: Vec<_> = (0..3).map(rng).collect();
         let results = cloth.crumple_many(&[&good, &good[..2], &good], &mut rngs);
-        assert_eq!(
-            results[0].as_ref().unwrap(),
-            &cloth.crumple(&good, &mut rng(0)).unwrap()
-        );
+        assert_eq!(results[0].as_ref().unwrap(), &cloth.crumple(&good, &mut rng(0)).unwrap());
         assert_eq!(results[1], Err(Error::TooFewPoints { points: 2 }));
-        assert_eq!(
-            results[2].as_ref().unwrap(),
-            &cloth.crumple(&good, &mut rng(2)).unwrap()
-        );
-        assert!(
-            cloth
-                .crumple_many::<rand_xoshiro::Xoshiro256PlusPlus>(&[], &mut [])
-                .is_empty()
-        );
+        assert_eq!(results[2].as_ref().unwrap(), &cloth.crumple(&good, &mut rng(2)).unwrap());
+        assert!(cloth.crumple_many::<rand_xoshiro::Xoshiro256PlusPlus>(&[], &mut []).is_empty());
     }
 
     #[test]
@@ -386,28 +278,15 @@ mod tests {
         let outline = wavy(3.0, 0.15);
         // Powers of two, so that rounding is the same too.
         let other: Vec<Point> = outline.iter().map(|p| p.map(|c| c / 64.0)).collect();
-        let (a, b) = (
-            cloth.crumple(&outline, &mut rng(11)).unwrap(),
-            cloth.crumple(&other, &mut rng(11)).unwrap(),
-        );
+        let (a, b) = (cloth.crumple(&outline, &mut rng(11)).unwrap(), cloth.crumple(&other, &mut rng(11)).unwrap());
         for (p, q) in a.vertices().iter().zip(b.vertices()) {
             assert!((0..3).all(|axis| (p[axis] - 64.0 * q[axis]).abs() < 1e-9));
         }
     }
 
     /// The paper's solver, one sheet in f64, every vertex against every side.
-    fn slow_verlet(
-        topology: &Topology,
-        start: &Start,
-        steps: usize,
-        p: &VerletParams,
-    ) -> Vec<Vertex> {
-        let mut now: Vec<Vertex> = start
-            .rest
-            .iter()
-            .zip(&start.heights)
-            .map(|(r, &h)| [r[0], r[1], h])
-            .collect();
+    fn slow_verlet(topology: &Topology, start: &Start, steps: usize, p: &VerletParams) -> Vec<Vertex> {
+        let mut now: Vec<Vertex> = start.rest.iter().zip(&start.heights).map(|(r, &h)| [r[0], r[1], h]).collect();
         let (mut before, mut ring) = (now.clone(), start.outline[0].clone());
         let mut ring_before = ring.clone();
         for _ in 0..steps {
@@ -425,15 +304,13 @@ mod tests {
             }
             for ((r, b), target) in ring.iter_mut().zip(&mut ring_before).zip(&start.outline[1]) {
                 let next: Point = std::array::from_fn(|i| {
-                    r[i] + (r[i] - b[i]) * (1.0 - p.damping)
-                        + (target[i] - r[i]) * p.attraction * p.dt_squared
+                    r[i] + (r[i] - b[i]) * (1.0 - p.damping) + (target[i] - r[i]) * p.attraction * p.dt_squared
                 });
                 (*b, *r) = (*r, next);
             }
             let inside = Inside::new(&ring);
             for (n, b) in now.iter_mut().zip(&mut before) {
-                let next: Vertex =
-                    std::array::from_fn(|i| n[i] + (n[i] - b[i]) * (1.0 - p.damping));
+                let next: Vertex = std::array::from_fn(|i| n[i] + (n[i] - b[i]) * (1.0 - p.damping));
                 let [x, y] = inside.nearest([next[0], next[1]]);
                 (*b, *n) = (*n, [x, y, (next[2] - p.gravity * p.dt_squared).max(0.0)]);
             }
@@ -445,16 +322,9 @@ mod tests {
     fn lanes_agree_with_the_slow_solver() {
         let params = ClothParams::paper();
         let cloth = Cloth::new(&params).unwrap();
-        let Solver::Verlet(verlet) = &params.solver else {
-            panic!("not the paper's solver")
-        };
-        let tasks: Vec<Task> = (0..4_u8)
-            .map(|k| {
-                cloth
-                    .task(&wavy(2.0 + f64::from(k), 0.08), &mut rng(u64::from(k)))
-                    .unwrap()
-            })
-            .collect();
+        let Solver::Verlet(verlet) = &params.solver else { panic!("not the paper's solver") };
+        let tasks: Vec<Task> =
+            (0..4_u8).map(|k| cloth.task(&wavy(2.0 + f64::from(k), 0.08), &mut rng(u64::from(k))).unwrap()).collect();
         let starts: Vec<Start> = tasks.iter().map(|t| t.start.clone()).collect();
         let batch = cloth.run(&starts, wide);
         for (l, start) in starts.iter().enumerate() {
@@ -474,9 +344,7 @@ mod tests {
     #[test]
     fn f32_lanes_agree_with_f64() {
         let params = ClothParams { steps: 12, ..few() };
-        let Solver::Xpbd(xpbd) = &params.solver else {
-            panic!("not the default solver")
-        };
+        let Solver::Xpbd(xpbd) = &params.solver else { panic!("not the default solver") };
         let cloth = Cloth::new(&params).unwrap();
         let task = cloth.task(&wavy(3.0, 0.1), &mut rng(12)).unwrap();
         let mut exact = Batch::<f64, 1>::new(&cloth.topology, std::slice::from_ref(&task.start));

@@ -46,29 +46,16 @@ impl Crease {
         range("point[0]", self.point[0], finite, "finite")?;
         range("point[1]", self.point[1], finite, "finite")?;
         range("direction_rad", self.direction_rad, finite, "finite")?;
-        range(
-            "radius",
-            self.radius,
-            (f64::MIN_POSITIVE, f64::MAX),
-            "above 0 and finite",
-        )?;
+        range("radius", self.radius, (f64::MIN_POSITIVE, f64::MAX), "above 0 and finite")?;
         match self.turn {
             Turn::Flap => Ok(()),
-            Turn::Roll { turns } => range(
-                "turns",
-                f64::from(turns),
-                (1.0, f64::from(MOST_TURNS)),
-                "1 to 100",
-            ),
+            Turn::Roll { turns } => range("turns", f64::from(turns), (1.0, f64::from(MOST_TURNS)), "1 to 100"),
         }
     }
 
     /// The direction that leads beyond the line.
     fn normal(&self) -> Point {
-        [
-            -libm::sin(self.direction_rad),
-            libm::cos(self.direction_rad),
-        ]
+        [-libm::sin(self.direction_rad), libm::cos(self.direction_rad)]
     }
 
     fn half_turns(&self) -> u32 {
@@ -95,9 +82,7 @@ impl Crease {
     /// Where the tube is divided into strips, as far as `end`.
     fn strips(&self, end: f64) -> impl Iterator<Item = f64> {
         let width = PI * self.radius / f64::from(STRIPS);
-        (0..=STRIPS * self.half_turns())
-            .map(move |k| f64::from(k) * width)
-            .take_while(move |&s| s < end)
+        (0..=STRIPS * self.half_turns()).map(move |k| f64::from(k) * width).take_while(move |&s| s < end)
     }
 }
 
@@ -111,9 +96,7 @@ impl Sheet {
     pub fn fold(&mut self, crease: &Crease) -> Result<(), Error> {
         crease.check()?;
         let normal = crease.normal();
-        let beyond = |v: &[f64; 3]| {
-            (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1]
-        };
+        let beyond = |v: &[f64; 3]| (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1];
         let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
         let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
         for line in crease.strips(end) {
@@ -122,11 +105,7 @@ impl Sheet {
         for (v, &s) in self.vertices.iter_mut().zip(&far) {
             if s > 0.0 {
                 let [x, z] = crease.bent(s);
-                *v = [
-                    v[0] + (x - s) * normal[0],
-                    v[1] + (x - s) * normal[1],
-                    v[2] + z,
-                ];
+                *v = [v[0] + (x - s) * normal[0], v[1] + (x - s) * normal[1], v[2] + z];
             }
         }
         self.edges = edges(&self.triangles, self.vertices.len());
@@ -154,9 +133,8 @@ impl Sheet {
                 continue;
             }
             // Turn the triangle so that its first corner is alone on its side, or on the line.
-            let alone = (0..3)
-                .find(|&k| places[k] == 0)
-                .or_else(|| (0..3).find(|&k| places.iter().sum::<i32>() == -places[k]));
+            let alone =
+                (0..3).find(|&k| places[k] == 0).or_else(|| (0..3).find(|&k| places.iter().sum::<i32>() == -places[k]));
             let Some(k) = alone else { continue };
             let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
             if places[k] == 0 {
@@ -164,10 +142,7 @@ impl Sheet {
                 self.triangles[t] = [a, b, m];
                 self.triangles.push([a, m, c]);
             } else {
-                let (m, n) = (
-                    self.divide(&mut made, far, line, a, b),
-                    self.divide(&mut made, far, line, c, a),
-                );
+                let (m, n) = (self.divide(&mut made, far, line, a, b), self.divide(&mut made, far, line, c, a));
                 self.triangles[t] = [a, m, n];
                 self.triangles.push([m, b, c]);
                 self.triangles.push([m, c, n]);
@@ -176,22 +151,14 @@ impl Sheet {
     }
 
     /// The vertex where edge a–b meets the line.
-    fn divide(
-        &mut self,
-        made: &mut BTreeMap<[u32; 2], u32>,
-        far: &mut Vec<f64>,
-        line: f64,
-        a: u32,
-        b: u32,
-    ) -> u32 {
+    fn divide(&mut self, made: &mut BTreeMap<[u32; 2], u32>, far: &mut Vec<f64>, line: f64, a: u32, b: u32) -> u32 {
         let key = [a.min(b), a.max(b)];
         *made.entry(key).or_insert_with(|| {
             let [i, j] = key.map(|v| v as usize);
             let part = (line - far[i]) / (far[j] - far[i]);
             let mix = |p: f64, q: f64| p + part * (q - p);
             let (p, q) = (self.vertices[i], self.vertices[j]);
-            self.vertices
-                .push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
+            self.vertices.push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
             let (p, q) = (self.rest[i], self.rest[j]);
             self.rest.push([mix(p[0], q[0]), mix(p[1], q[1])]);
             self.radius.push(mix(self.radius[i], self.radius[j]));
@@ -223,27 +190,19 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
     let end = polygon.iter().fold(0.0_f64, |m, p| m.max(p[1]));
     let lines: Vec<f64> = crease.strips(end).collect();
     let back = |[t, x]: Point| {
-        [
-            crease.point[0] + t * along[0] + x * normal[0],
-            crease.point[1] + t * along[1] + x * normal[1],
-        ]
+        [crease.point[0] + t * along[0] + x * normal[0], crease.point[1] + t * along[1] + x * normal[1]]
     };
     let mut pieces = Vec::new();
     let mut left = vec![polygon];
     // The sheet turns back where it has gone up, and down, a quarter: at π/2, 3π/2, …
     for half in 0..=crease.half_turns() {
-        let turn = if half < crease.half_turns() {
-            crease.radius * (FRAC_PI_2 + PI * f64::from(half))
-        } else {
-            f64::INFINITY
-        };
+        let turn =
+            if half < crease.half_turns() { crease.radius * (FRAC_PI_2 + PI * f64::from(half)) } else { f64::INFINITY };
         let mut later = Vec::new();
         for piece in &left {
             for part in clipped(piece, turn) {
-                let folded: Vec<Point> = divided(&part, &lines)
-                    .iter()
-                    .map(|&[t, s]| back([t, crease.bent(s)[0]]))
-                    .collect();
+                let folded: Vec<Point> =
+                    divided(&part, &lines).iter().map(|&[t, s]| back([t, crease.bent(s)[0]])).collect();
                 let area = moments(&folded).0;
                 if area > 0.0 {
                     pieces.push(folded);
@@ -252,11 +211,7 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
                 }
             }
             let mirrored: Vec<Point> = piece.iter().map(|p| [p[0], -p[1]]).collect();
-            later.extend(
-                clipped(&mirrored, -turn)
-                    .iter()
-                    .map(|part| part.iter().map(|p| [p[0], -p[1]]).collect()),
-            );
+            later.extend(clipped(&mirrored, -turn).iter().map(|part| part.iter().map(|p| [p[0], -p[1]]).collect()));
         }
         left = later;
     }
@@ -270,15 +225,8 @@ fn divided(polygon: &[Point], lines: &[f64]) -> Vec<Point> {
         points.push(a);
         let crossing = |line: f64| [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
         let (low, high) = (a[1].min(b[1]), a[1].max(b[1]));
-        let between = lines
-            .iter()
-            .copied()
-            .filter(|&line| line > low && line < high);
-        if a[1] < b[1] {
-            points.extend(between.map(crossing))
-        } else {
-            points.extend(between.rev().map(crossing))
-        }
+        let between = lines.iter().copied().filter(|&line| line > low && line < high);
+        if a[1] < b[1] { points.extend(between.map(crossing)) } else { points.extend(between.rev().map(crossing)) }
     }
     points
 }
@@ -291,12 +239,8 @@ fn clipped(polygon: &[Point], line: f64) -> Vec<Vec<Point>> {
     // Stretches below the line, each from where it comes down to where it goes up.
     let mut chains: Vec<Vec<Point>> = Vec::new();
     let mut below = false;
-    let around = (0..polygon.len()).map(|k| {
-        (
-            polygon[(start + k) % polygon.len()],
-            polygon[(start + k + 1) % polygon.len()],
-        )
-    });
+    let around =
+        (0..polygon.len()).map(|k| (polygon[(start + k) % polygon.len()], polygon[(start + k + 1) % polygon.len()]));
     for (a, b) in around {
         let crossing = || [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
         match (below, b[1] <= line) {
@@ -330,18 +274,13 @@ impl ExtendLast for Vec<Vec<Point>> {
 
 /// Closes chains along the line on which all of them start and end: of the crossings in order along it, each second gap is inside.
 fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
-    let ends = chains
-        .iter()
-        .enumerate()
-        .flat_map(|(k, c)| [(c[0][0], k, true), (c[c.len() - 1][0], k, false)]);
+    let ends = chains.iter().enumerate().flat_map(|(k, c)| [(c[0][0], k, true), (c[c.len() - 1][0], k, false)]);
     let mut ends: Vec<(f64, usize, bool)> = ends.collect();
     ends.sort_by(|p, q| p.0.total_cmp(&q.0));
     let mut next = vec![None; chains.len()];
     for pair in ends.chunks_exact(2) {
         match (pair[0], pair[1]) {
-            ((_, to, true), (_, from, false)) | ((_, from, false), (_, to, true)) => {
-                next[from] = Some(to)
-            }
+            ((_, to, true), (_, from, false)) | ((_, from, false), (_, to, true)) => next[from] = Some(to),
             // Only where the polygon crosses itself: one closed curve then serves as well.
             _ => return vec![chains.concat()],
         }
@@ -370,29 +309,12 @@ mod tests {
     use crate::testing::{angular, area, rng, wavy};
     use crate::{Cloth, ClothParams, View};
 
-    const CREASE: Crease = Crease {
-        point: [40.0, -10.0],
-        direction_rad: 2.0,
-        radius: 3.0,
-        turn: Turn::Flap,
-    };
+    const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, turn: Turn::Flap };
 
     fn flat() -> Sheet {
-        let sheet = Cloth::new(&ClothParams::default())
-            .unwrap()
-            .crumple(&wavy(2.0, 0.1), &mut rng(5))
-            .unwrap();
-        let vertices = sheet
-            .rest
-            .iter()
-            .map(|r| [30.0 + r[0], r[1] - 20.0, 0.0])
-            .collect();
-        Sheet::new(Parts {
-            vertices,
-            rest: sheet.rest,
-            radius: sheet.radius,
-            triangles: sheet.triangles,
-        })
+        let sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
+        let vertices = sheet.rest.iter().map(|r| [30.0 + r[0], r[1] - 20.0, 0.0]).collect();
+        Sheet::new(Parts { vertices, rest: sheet.rest, radius: sheet.radius, triangles: sheet.triangles })
     }
 
     #[test]
@@ -404,11 +326,7 @@ mod tests {
             assert!((sheet.volume(|r| 2.0 - r) / volume - 1.0).abs() < 1e-9);
             assert!(sheet.triangles().len() > count + 100);
             // A chord of 1/24 turn is shorter than its arc by 3 in 1000.
-            assert!(
-                sheet.edge_strain_rms() < 3e-3,
-                "{}",
-                sheet.edge_strain_rms()
-            );
+            assert!(sheet.edge_strain_rms() < 3e-3, "{}", sheet.edge_strain_rms());
             let top = sheet.vertices().iter().fold(0.0_f64, |m, v| m.max(v[2]));
             assert!((top - 6.0).abs() < 1e-9, "{top}");
         }
@@ -435,24 +353,14 @@ mod tests {
     fn folding_where_nothing_is_changes_nothing() {
         let mut sheet = flat();
         let before = sheet.clone();
-        sheet
-            .fold(&Crease {
-                point: [1e4, 0.0],
-                direction_rad: -FRAC_PI_2,
-                ..CREASE
-            })
-            .unwrap();
+        sheet.fold(&Crease { point: [1e4, 0.0], direction_rad: -FRAC_PI_2, ..CREASE }).unwrap();
         assert_eq!(sheet, before);
     }
 
     #[test]
     fn the_silhouette_covers_the_folded_sheet_and_no_more() {
         for (direction_rad, turn) in [(2.0, Turn::Flap), (0.3, Turn::Roll { turns: 1 })] {
-            let crease = Crease {
-                direction_rad,
-                turn,
-                ..CREASE
-            };
+            let crease = Crease { direction_rad, turn, ..CREASE };
             let mut sheet = flat();
             // The flat sheet's own rim.
             let rim: Vec<Point> = {
@@ -468,10 +376,7 @@ mod tests {
                 (0..next.len())
                     .map(|_| {
                         at = next[&at];
-                        [
-                            sheet.vertices[at as usize][0],
-                            sheet.vertices[at as usize][1],
-                        ]
+                        [sheet.vertices[at as usize][0], sheet.vertices[at as usize][1]]
                     })
                     .collect()
             };
@@ -481,34 +386,23 @@ mod tests {
             let shadow: f64 = sheet
                 .triangles()
                 .iter()
-                .map(|t| {
-                    t.map(|v| sheet.vertices()[v as usize])
-                        .map(|v| [v[0], v[1]])
-                })
+                .map(|t| t.map(|v| sheet.vertices()[v as usize]).map(|v| [v[0], v[1]]))
                 .map(|[a, b, c]| crate::mesh::cross(a, b, c).abs() / 2.0)
                 .sum();
             assert!((areas / shadow - 1.0).abs() < 1e-9, "{areas} {shadow}");
             // Where the sheet is thick there is a piece, and the other way round.
             let mut image = vec![0.0_f32; 250 * 250];
-            let view = View {
-                origin: [-100.0, -150.0],
-                pixel: 1.0,
-            };
+            let view = View { origin: [-100.0, -150.0], pixel: 1.0 };
             sheet.thickness_into(&mut image, 250, &view, |_| 1.0);
-            let insides: Vec<crate::outline::Inside> = pieces
-                .iter()
-                .map(|p| crate::outline::Inside::new(p))
-                .collect();
+            let insides: Vec<crate::outline::Inside> = pieces.iter().map(|p| crate::outline::Inside::new(p)).collect();
             let mut wrong = 0;
             for (k, &value) in image.iter().enumerate() {
                 #[expect(clippy::cast_precision_loss, reason = "pixel numbers")]
-                let p = [
-                    view.origin[0] + (k % 250) as f64,
-                    view.origin[1] + (k / 250) as f64,
-                ];
-                let covered = insides.iter().any(|i| i.contains(p));
-                wrong +=
-                    usize::from(covered && value == 0.0) + usize::from(!covered && value > 0.6);
+                let p = [view.origin[0] + (k % 250) as f64, view.origin[1] + (k / 250) as f64];
+                let covered = |x: f64, y: f64| insides.iter().any(|i| i.contains([p[0] + x, p[1] + y]));
+                // A pixel cut by the silhouette may be thick although its centre is free.
+                let near = [-1.0, 0.0, 1.0].iter().any(|&x| [-1.0, 0.0, 1.0].iter().any(|&y| covered(x, y)));
+                wrong += usize::from(covered(0.0, 0.0) && value == 0.0) + usize::from(!near && value > 0.0);
             }
             assert_eq!(wrong, 0);
         }
@@ -517,22 +411,8 @@ mod tests {
     #[test]
     fn a_concave_outline_falls_into_pieces() {
         // Both arms of a U lie beyond the line.
-        let u = [
-            [0.0, 0.0],
-            [9.0, 0.0],
-            [9.0, 9.0],
-            [6.0, 9.0],
-            [6.0, 3.0],
-            [3.0, 3.0],
-            [3.0, 9.0],
-            [0.0, 9.0],
-        ];
-        let crease = Crease {
-            point: [0.0, 5.0],
-            direction_rad: 0.0,
-            radius: 1e-6,
-            turn: Turn::Flap,
-        };
+        let u = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [6.0, 9.0], [6.0, 3.0], [3.0, 3.0], [3.0, 9.0], [0.0, 9.0]];
+        let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, turn: Turn::Flap };
         let pieces = crease_outline(&u, &crease).unwrap();
         let mut areas: Vec<f64> = pieces.iter().map(|p| area(p)).collect();
         areas.sort_by(f64::total_cmp);
@@ -540,14 +420,7 @@ mod tests {
         for (found, wanted) in areas.iter().zip([12.0, 12.0, 39.0]) {
             assert!((found - wanted).abs() < 1e-3, "{areas:?}");
         }
-        let whole = crease_outline(
-            &angular(),
-            &Crease {
-                point: [0.0, 100.0],
-                ..crease
-            },
-        )
-        .unwrap();
+        let whole = crease_outline(&angular(), &Crease { point: [0.0, 100.0], ..crease }).unwrap();
         assert!(whole.len() == 1 && (area(&whole[0]) - 54.0).abs() < 1e-9);
     }
 
@@ -555,26 +428,11 @@ mod tests {
     fn what_is_no_crease_is_an_error() {
         let mut sheet = flat();
         for crease in [
-            Crease {
-                radius: 0.0,
-                ..CREASE
-            },
-            Crease {
-                radius: f64::NAN,
-                ..CREASE
-            },
-            Crease {
-                direction_rad: f64::INFINITY,
-                ..CREASE
-            },
-            Crease {
-                point: [0.0, f64::NAN],
-                ..CREASE
-            },
-            Crease {
-                turn: Turn::Roll { turns: 0 },
-                ..CREASE
-            },
+            Crease { radius: 0.0, ..CREASE },
+            Crease { radius: f64::NAN, ..CREASE },
+            Crease { direction_rad: f64::INFINITY, ..CREASE },
+            Crease { point: [0.0, f64::NAN], ..CREASE },
+            Crease { turn: Turn::Roll { turns: 0 }, ..CREASE },
         ] {
             assert!(matches!(sheet.fold(&crease), Err(Error::Parameter { .. })));
             assert!(crease_outline(&angular(), &crease).is_err());

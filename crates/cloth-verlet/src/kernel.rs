@@ -34,10 +34,7 @@ impl Real for f32 {
     const ZERO: f32 = 0.0;
     const ONE: f32 = 1.0;
     const TINY: f32 = 1e-20;
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "rounding to the lanes' precision is the purpose"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to the lanes' precision is the purpose")]
     fn of(value: f64) -> f32 {
         value as f32
     }
@@ -102,28 +99,22 @@ mod tests {
         for w_dt in [0.01, 0.3, 1.0, 1.9] {
             let angle = 2.0 * libm::asin(0.5 * w_dt);
             let (_, now) = oscillate(w_dt, 1000);
-            assert!(
-                (now - libm::cos(1000.0 * angle)).abs() < 1e-5,
-                "{w_dt}: {now}"
-            );
+            assert!((now - libm::cos(1000.0 * angle)).abs() < 1e-5, "{w_dt}: {now}");
         }
     }
 
     #[test]
     fn law_22_verlet_conserves_its_energy() {
         let w_dt = 0.4;
-        let energy =
-            |(x0, x1): (f64, f64)| 0.5 * (x1 - x0) * (x1 - x0) / (w_dt * w_dt) + 0.5 * x0 * x1;
+        let energy = |(x0, x1): (f64, f64)| 0.5 * (x1 - x0) * (x1 - x0) / (w_dt * w_dt) + 0.5 * x0 * x1;
         let (first, last) = (energy(oscillate(w_dt, 1)), energy(oscillate(w_dt, 100_000)));
         assert!((last / first - 1.0).abs() < 1e-10, "{first} {last}");
     }
 
     #[test]
     fn law_22_verlet_is_stable_below_two_and_not_above() {
-        let bounded = (1..2000)
-            .map(|n| oscillate(1.999, n).1.abs())
-            .fold(0.0, f64::max);
-        let (mut before, mut now) = (1.0, 0.9);
+        let bounded = (1..2000).map(|n| oscillate(1.999, n).1.abs()).fold(0.0, f64::max);
+        let (mut before, mut now) = (1.0_f64, 0.9_f64);
         for _ in 0..2000 {
             (before, now) = (now, verlet(now, before, -2.001 * 2.001 * now, 1.0));
         }
@@ -169,16 +160,13 @@ mod tests {
         let size = |n: usize| ys[n] * ys[n] - ys[n - 1] * ys[n + 1];
         for n in 2..19 {
             let decay = (size(n + 1) / size(n)).sqrt();
-            assert!(
-                (decay - 1.0 / (1.0 + h * h / compliance).sqrt()).abs() < 1e-5,
-                "{decay}"
-            );
+            assert!((decay - 1.0 / (1.0 + h * h / compliance).sqrt()).abs() < 1e-5, "{decay}");
         }
     }
 
     #[test]
     fn a_rigid_distance_is_restored_at_once() {
-        let d = [3.0, 0.0, 4.0];
+        let d = [3.0_f64, 0.0, 4.0];
         let s = pull(d, 2.0, 0.5);
         let left = d.map(|c| c - 2.0 * s * c);
         assert!((left[0] * left[0] + left[2] * left[2] - 4.0).abs() < 1e-12);

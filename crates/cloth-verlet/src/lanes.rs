@@ -48,15 +48,8 @@ impl Topology {
     pub(crate) fn new(disc: &Disc, sides: usize) -> Topology {
         // Pairs hold the smaller index first, and the rim comes before all others.
         let on_rim = |p: &Pair| p.iter().filter(|&&v| (v as usize) < disc.rim).count();
-        let sorted = |pairs: &[Pair]| {
-            [2, 1, 0].map(|count| {
-                pairs
-                    .iter()
-                    .copied()
-                    .filter(|p| on_rim(p) == count)
-                    .collect()
-            })
-        };
+        let sorted =
+            |pairs: &[Pair]| [2, 1, 0].map(|count| pairs.iter().copied().filter(|p| on_rim(p) == count).collect());
         Topology {
             edges: sorted(&disc.edges),
             bends: sorted(&disc.bends),
@@ -96,24 +89,13 @@ impl<T: Real, const L: usize> Batch<T, L> {
         let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).unwrap_or(&starts[0]));
         let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| T::of(value(s))));
         let now: Vec<Node<T, L>> = (0..lanes[0].rest.len())
-            .map(|v| {
-                [
-                    row(&|s| s.rest[v][0]),
-                    row(&|s| s.rest[v][1]),
-                    row(&|s| s.heights[v]),
-                ]
-            })
+            .map(|v| [row(&|s| s.rest[v][0]), row(&|s| s.rest[v][1]), row(&|s| s.heights[v])])
             .collect();
         let ways = [0, 1].map(|way| -> Curve<T, L> {
-            (0..lanes[0].outline[way].len())
-                .map(|k| [0, 1].map(|axis| row(&|s| s.outline[way][k][axis])))
-                .collect()
+            (0..lanes[0].outline[way].len()).map(|k| [0, 1].map(|axis| row(&|s| s.outline[way][k][axis]))).collect()
         });
         let lengths = |pairs: &Vec<Pair>| {
-            pairs
-                .iter()
-                .map(|&[a, b]| row(&|s| distance(s.rest[a as usize], s.rest[b as usize])))
-                .collect()
+            pairs.iter().map(|&[a, b]| row(&|s| distance(s.rest[a as usize], s.rest[b as usize]))).collect()
         };
         Batch {
             before: now.clone(),
@@ -127,10 +109,7 @@ impl<T: Real, const L: usize> Batch<T, L> {
 
     /// The vertices of one lane.
     pub(crate) fn lane(&self, l: usize) -> Vec<Vertex> {
-        self.now
-            .iter()
-            .map(|n| [n[0][l].to_f64(), n[1][l].to_f64(), n[2][l].to_f64()])
-            .collect()
+        self.now.iter().map(|n| [n[0][l].to_f64(), n[1][l].to_f64(), n[2][l].to_f64()]).collect()
     }
 }
 
@@ -213,23 +192,12 @@ mod tests {
     #[test]
     fn law_23_distances_conserve_momentum() {
         let mut now = nodes(30);
-        let sum = |now: &[Node<f64, 1>]| {
-            [0, 1, 2].map(|axis| now.iter().map(|n| n[axis][0]).sum::<f64>())
-        };
+        let sum = |now: &[Node<f64, 1>]| [0, 1, 2].map(|axis| now.iter().map(|n| n[axis][0]).sum::<f64>());
         let before = sum(&now);
         let pairs: Vec<Pair> = (0..29).map(|k| [k, k + 1]).collect();
         let lengths = vec![Lane([0.3]); 29];
         for _ in 0..20 {
-            project(
-                &mut now,
-                &pairs,
-                &lengths,
-                Binding {
-                    weights: [1.0; 2],
-                    gain: 0.4,
-                    gives_way: 0.2,
-                },
-            );
+            project(&mut now, &pairs, &lengths, Binding { weights: [1.0; 2], gain: 0.4, gives_way: 0.2 });
         }
         for (a, b) in before.iter().zip(sum(&now)) {
             assert!((a - b).abs() < 1e-12);
@@ -255,16 +223,7 @@ mod tests {
     fn a_crease_gives_way() {
         let pull_by = |gives_way: f64| {
             let mut now = vec![[Lane([0.0]); 3], [Lane([0.5]), Lane([0.0]), Lane([0.0])]];
-            project(
-                &mut now,
-                &[[0, 1]],
-                &[Lane([1.0])],
-                Binding {
-                    weights: [1.0; 2],
-                    gain: 0.5,
-                    gives_way,
-                },
-            );
+            project(&mut now, &[[0, 1]], &[Lane([1.0])], Binding { weights: [1.0; 2], gain: 0.5, gives_way });
             now[1][0][0] - now[0][0][0]
         };
         assert!((pull_by(f64::MAX) - 1.0).abs() < 1e-12);

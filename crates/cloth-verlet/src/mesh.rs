@@ -82,34 +82,19 @@ fn split(vertices: usize) -> (usize, usize) {
 fn sunflower(rim: usize, inner: usize) -> Vec<Point> {
     let reach = 1.0 - PI / rim as f64;
     let on_rim = (0..rim).map(|k| (1.0, TAU * k as f64 / rim as f64));
-    let inside = (0..inner).map(|i| {
-        (
-            reach * ((i as f64 + 0.5) / inner as f64).sqrt(),
-            GOLDEN_ANGLE * i as f64,
-        )
-    });
-    on_rim
-        .chain(inside)
-        .map(|(r, angle)| [r * libm::cos(angle), r * libm::sin(angle)])
-        .collect()
+    let inside = (0..inner).map(|i| (reach * ((i as f64 + 0.5) / inner as f64).sqrt(), GOLDEN_ANGLE * i as f64));
+    on_rim.chain(inside).map(|(r, angle)| [r * libm::cos(angle), r * libm::sin(angle)]).collect()
 }
 
 fn delaunay(points: &[Point]) -> Result<Vec<[u32; 3]>, Error> {
-    let vertices = points
-        .iter()
-        .map(|p| spade::Point2::new(p[0], p[1]))
-        .collect();
-    let mesh =
-        DelaunayTriangulation::<_>::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
-            field: "vertices",
-            value: f64::NAN,
-            accepted: "a number whose sunflower can be triangulated",
-        })?;
+    let vertices = points.iter().map(|p| spade::Point2::new(p[0], p[1])).collect();
+    let mesh = DelaunayTriangulation::<_>::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
+        field: "vertices",
+        value: f64::NAN,
+        accepted: "a number whose sunflower can be triangulated",
+    })?;
     #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
-    Ok(mesh
-        .inner_faces()
-        .map(|face| face.vertices().map(|v| v.fix().index() as u32))
-        .collect())
+    Ok(mesh.inner_faces().map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect())
 }
 
 /// Moves each inner vertex to the centre of mass of the triangles around it.
@@ -138,11 +123,7 @@ fn pairs(triangles: &[[u32; 3]]) -> (Vec<Pair>, Vec<Pair>) {
             opposite.entry([i.min(j), i.max(j)]).or_default().push(k);
         }
     }
-    let bends = opposite
-        .values()
-        .filter(|o| o.len() == 2)
-        .map(|o| [o[0].min(o[1]), o[0].max(o[1])])
-        .collect();
+    let bends = opposite.values().filter(|o| o.len() == 2).map(|o| [o[0].min(o[1]), o[0].max(o[1])]).collect();
     (opposite.into_keys().collect(), bends)
 }
 
@@ -176,10 +157,7 @@ fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
                 let mut sum = 1.0;
                 for _ in 1..rim.div_ceil(2) {
                     sum += 2.0 * power[0];
-                    power = [
-                        power[0] * z[0] - power[1] * z[1],
-                        power[0] * z[1] + power[1] * z[0],
-                    ];
+                    power = [power[0] * z[0] - power[1] * z[1], power[0] * z[1] + power[1] * z[0]];
                 }
                 if rim.is_multiple_of(2) {
                     sum += power[0];
@@ -218,13 +196,9 @@ mod tests {
         let lengths: Vec<f64> = disc
             .edges
             .iter()
-            .map(|&[a, b]| {
-                crate::outline::distance(disc.points[a as usize], disc.points[b as usize])
-            })
+            .map(|&[a, b]| crate::outline::distance(disc.points[a as usize], disc.points[b as usize]))
             .collect();
-        let (least, most) = lengths
-            .iter()
-            .fold((f64::MAX, 0.0_f64), |(l, m), &d| (l.min(d), m.max(d)));
+        let (least, most) = lengths.iter().fold((f64::MAX, 0.0_f64), |(l, m), &d| (l.min(d), m.max(d)));
         assert!(most < 3.0 * least, "{least} {most}");
     }
 

@@ -15,40 +15,27 @@ pub(crate) struct Outline {
 impl Outline {
     pub(crate) fn new(points: &[Point]) -> Result<Outline, Error> {
         if points.len() < 3 {
-            return Err(Error::TooFewPoints {
-                points: points.len(),
-            });
+            return Err(Error::TooFewPoints { points: points.len() });
         }
-        if let Some((index, &[x, y])) = points
-            .iter()
-            .enumerate()
-            .find(|(_, p)| !(p[0].is_finite() && p[1].is_finite()))
+        if let Some((index, &[x, y])) = points.iter().enumerate().find(|(_, p)| !(p[0].is_finite() && p[1].is_finite()))
         {
             return Err(Error::NotFinite { index, x, y });
         }
         let [x0, y0] = points[0];
         let local: Vec<Point> = points.iter().map(|p| [p[0] - x0, p[1] - y0]).collect();
         let (area, centre) = moments(&local);
-        let span = local
-            .iter()
-            .fold(0.0_f64, |s, p| s.max(p[0].abs()).max(p[1].abs()));
+        let span = local.iter().fold(0.0_f64, |s, p| s.max(p[0].abs()).max(p[1].abs()));
         // Areas below the rounding of their own terms are those of a line.
         if !(area.abs() > f64::EPSILON * span * span * 64.0 && area.is_finite()) {
             return Err(Error::NoArea { area });
         }
         let radius = (area.abs() / PI).sqrt();
-        let mut points: Vec<Point> = local
-            .iter()
-            .map(|p| [(p[0] - centre[0]) / radius, (p[1] - centre[1]) / radius])
-            .collect();
+        let mut points: Vec<Point> =
+            local.iter().map(|p| [(p[0] - centre[0]) / radius, (p[1] - centre[1]) / radius]).collect();
         if area < 0.0 {
             points.reverse();
         }
-        Ok(Outline {
-            points,
-            centre: [x0 + centre[0], y0 + centre[1]],
-            radius,
-        })
+        Ok(Outline { points, centre: [x0 + centre[0], y0 + centre[1]], radius })
     }
 
     /// The point that stands `offset` in 0..1 of the way round, and `count - 1` more at equal arcs.
@@ -103,10 +90,7 @@ impl Outline {
 
 /// The sides of a closed polygon.
 pub(crate) fn sides(points: &[Point]) -> impl Iterator<Item = (Point, Point)> {
-    points
-        .iter()
-        .copied()
-        .zip(points.iter().copied().cycle().skip(1))
+    points.iter().copied().zip(points.iter().copied().cycle().skip(1))
 }
 
 /// Signed area (positive where +x turns into +y) and centre of mass of a polygon.
@@ -160,21 +144,11 @@ impl Inside {
                 band.push(side as u32);
             }
         }
-        Inside {
-            sides,
-            low,
-            bands_per_unit,
-            bands,
-            boxes,
-        }
+        Inside { sides, low, bands_per_unit, bands, boxes }
     }
 
     /// Even-odd rule.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a band number, looked up"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a band number, looked up")]
     pub(crate) fn contains(&self, p: Point) -> bool {
         let band = (p[1] - self.low) * self.bands_per_unit;
         let Some(list) = self.bands.get(band as usize).filter(|_| band >= 0.0) else {
@@ -182,8 +156,7 @@ impl Inside {
         };
         let crossed = |&&side: &&u32| {
             let (a, b) = self.sides[side as usize];
-            (a[1] > p[1]) != (b[1] > p[1])
-                && p[0] < a[0] + (p[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
+            (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
         };
         list.iter().filter(crossed).count() % 2 == 1
     }
@@ -225,9 +198,7 @@ fn bounds(sides: &[(Point, Point)]) -> [Point; 2] {
     let ends = || sides.iter().flat_map(|&(a, b)| [a, b]);
     [
         ends().fold([f64::INFINITY; 2], |m, p| [m[0].min(p[0]), m[1].min(p[1])]),
-        ends().fold([f64::NEG_INFINITY; 2], |m, p| {
-            [m[0].max(p[0]), m[1].max(p[1])]
-        }),
+        ends().fold([f64::NEG_INFINITY; 2], |m, p| [m[0].max(p[0]), m[1].max(p[1])]),
     ]
 }
 
@@ -248,22 +219,10 @@ mod tests {
     #[test]
     fn what_is_no_outline_is_an_error() {
         let error = |points: &[Point]| Outline::new(points).unwrap_err();
-        assert_eq!(
-            error(&[[0.0, 0.0], [1.0, 0.0]]),
-            Error::TooFewPoints { points: 2 }
-        );
-        assert!(matches!(
-            error(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]),
-            Error::NotFinite { index: 1, .. }
-        ));
-        assert!(matches!(
-            error(&[[0.0, 0.0], [1.0, f64::INFINITY], [1.0, 1.0]]),
-            Error::NotFinite { .. }
-        ));
-        assert!(matches!(
-            error(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]]),
-            Error::NoArea { .. }
-        ));
+        assert_eq!(error(&[[0.0, 0.0], [1.0, 0.0]]), Error::TooFewPoints { points: 2 });
+        assert!(matches!(error(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]), Error::NotFinite { index: 1, .. }));
+        assert!(matches!(error(&[[0.0, 0.0], [1.0, f64::INFINITY], [1.0, 1.0]]), Error::NotFinite { .. }));
+        assert!(matches!(error(&[[0.0, 0.0], [1.0, 1.0], [3.0, 3.0]]), Error::NoArea { .. }));
         assert!(matches!(error(&[[5.0, 5.0]; 4]), Error::NoArea { .. }));
     }
 
@@ -295,8 +254,7 @@ mod tests {
             let p = [value(), value()];
             let crossings = sides(&points)
                 .filter(|(a, b)| {
-                    (a[1] > p[1]) != (b[1] > p[1])
-                        && p[0] < a[0] + (p[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
+                    (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (p[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
                 })
                 .count();
             let wanted = if crossings % 2 == 1 {
@@ -305,13 +263,11 @@ mod tests {
                 strays += 1;
                 let feet = sides(&points).map(|(a, b)| {
                     let u = [b[0] - a[0], b[1] - a[1]];
-                    let t = (((p[0] - a[0]) * u[0] + (p[1] - a[1]) * u[1])
-                        / (u[0] * u[0] + u[1] * u[1]))
-                        .clamp(0.0, 1.0);
+                    let t =
+                        (((p[0] - a[0]) * u[0] + (p[1] - a[1]) * u[1]) / (u[0] * u[0] + u[1] * u[1])).clamp(0.0, 1.0);
                     [a[0] + t * u[0], a[1] + t * u[1]]
                 });
-                feet.min_by(|a, b| distance(p, *a).total_cmp(&distance(p, *b)))
-                    .unwrap()
+                feet.min_by(|a, b| distance(p, *a).total_cmp(&distance(p, *b))).unwrap()
             };
             assert_eq!(inside.nearest(p), wanted);
         }

@@ -160,56 +160,26 @@ impl Default for XpbdParams {
 impl ClothParams {
     pub(crate) fn check(&self) -> Result<(), Error> {
         count("vertices", self.vertices, (32, 65_536), "32 to 65536")?;
-        count(
-            "outline_points",
-            self.outline_points,
-            (8, 65_536),
-            "8 to 65536",
-        )?;
+        count("outline_points", self.outline_points, (8, 65_536), "8 to 65536")?;
         range("excess", self.excess, (1.0, 4.0), "1 to 4")?;
         count("steps", self.steps, (1, 100_000), "1 to 100000")?;
         match &self.solver {
             Solver::Verlet(p) => {
                 range("damping", p.damping, (0.0, 1.0), "0 to 1")?;
-                range(
-                    "dt_squared",
-                    p.dt_squared,
-                    (f64::MIN_POSITIVE, 1.0),
-                    "above 0, at most 1",
-                )?;
+                range("dt_squared", p.dt_squared, (f64::MIN_POSITIVE, 1.0), "above 0, at most 1")?;
                 count("passes", p.passes, (1, 1000), "1 to 1000")?;
-                range(
-                    "attraction",
-                    p.attraction,
-                    (f64::MIN_POSITIVE, 1.0),
-                    "above 0, at most 1",
-                )?;
+                range("attraction", p.attraction, (f64::MIN_POSITIVE, 1.0), "above 0, at most 1")?;
                 range("outline_start", p.outline_start, (1.0, 2.0), "1 to 2")?;
                 range("lift", p.lift, (0.0, 1.0), "0 to 1")?;
                 range("gravity", p.gravity, (0.0, 1.0), "0 to 1")
             }
             Solver::Xpbd(p) => {
                 count("substeps", p.substeps, (1, 1000), "1 to 1000")?;
-                range(
-                    "stretch_compliance",
-                    p.stretch_compliance,
-                    (0.0, 1000.0),
-                    "0 to 1000",
-                )?;
-                range(
-                    "bend_compliance",
-                    p.bend_compliance,
-                    (0.0, 1000.0),
-                    "0 to 1000",
-                )?;
+                range("stretch_compliance", p.stretch_compliance, (0.0, 1000.0), "0 to 1000")?;
+                range("bend_compliance", p.bend_compliance, (0.0, 1000.0), "0 to 1000")?;
                 range("bend_yield", p.bend_yield, (0.0, 1.0), "0 to 1")?;
                 range("damping", p.damping, (0.0, 1.0), "0 to 1")?;
-                range(
-                    "ceiling",
-                    p.ceiling,
-                    (f64::MIN_POSITIVE, 10.0),
-                    "above 0, at most 10",
-                )?;
+                range("ceiling", p.ceiling, (f64::MIN_POSITIVE, 10.0), "above 0, at most 10")?;
                 range("gravity", p.gravity, (0.0, 1.0), "0 to 1")?;
                 range("lift", p.lift, (0.0, 1.0), "0 to 1")
             }
@@ -223,34 +193,13 @@ pub(crate) fn range(
     (low, high): (f64, f64),
     accepted: &'static str,
 ) -> Result<(), Error> {
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Parameter {
-            field,
-            value,
-            accepted,
-        })
-    }
+    if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Parameter { field, value, accepted }) }
 }
 
-fn count(
-    field: &'static str,
-    value: usize,
-    (low, high): (usize, usize),
-    accepted: &'static str,
-) -> Result<(), Error> {
+fn count(field: &'static str, value: usize, (low, high): (usize, usize), accepted: &'static str) -> Result<(), Error> {
     #[expect(clippy::cast_precision_loss, reason = "shown in a message only")]
     let shown = value as f64;
-    if (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(Error::Parameter {
-            field,
-            value: shown,
-            accepted,
-        })
-    }
+    if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Parameter { field, value: shown, accepted }) }
 }
 
 #[cfg(test)]
@@ -261,26 +210,11 @@ mod tests {
     fn the_papers_defaults() {
         let params = ClothParams::paper();
         assert_eq!(
-            (
-                params.outline_points,
-                params.steps,
-                params.rest,
-                params.smoothing
-            ),
+            (params.outline_points, params.steps, params.rest, params.smoothing),
             (75, 60, Rest::Disc, Smoothing::None)
         );
-        let Solver::Verlet(verlet) = params.solver else {
-            panic!("not the paper's solver")
-        };
-        assert_eq!(
-            (
-                verlet.damping,
-                verlet.dt_squared,
-                verlet.passes,
-                verlet.outline_start
-            ),
-            (0.1, 0.49, 2, 1.03)
-        );
+        let Solver::Verlet(verlet) = params.solver else { panic!("not the paper's solver") };
+        assert_eq!((verlet.damping, verlet.dt_squared, verlet.passes, verlet.outline_start), (0.1, 0.49, 2, 1.03));
         assert_eq!((verlet.attraction, verlet.lift), (1.0 / 102.0, 1.0 / 102.0));
     }
 
@@ -294,132 +228,33 @@ mod tests {
     fn every_field_is_checked() {
         let bad = f64::NAN;
         let base = ClothParams::default;
-        let verlet = |p: VerletParams| ClothParams {
-            solver: Solver::Verlet(p),
-            ..base()
-        };
-        let xpbd = |p: XpbdParams| ClothParams {
-            solver: Solver::Xpbd(p),
-            ..base()
-        };
+        let verlet = |p: VerletParams| ClothParams { solver: Solver::Verlet(p), ..base() };
+        let xpbd = |p: XpbdParams| ClothParams { solver: Solver::Xpbd(p), ..base() };
         let (v, x) = (VerletParams::default, XpbdParams::default);
         for (field, params) in [
-            (
-                "vertices",
-                ClothParams {
-                    vertices: 31,
-                    ..base()
-                },
-            ),
-            (
-                "outline_points",
-                ClothParams {
-                    outline_points: 2,
-                    ..base()
-                },
-            ),
-            (
-                "excess",
-                ClothParams {
-                    excess: 0.9,
-                    ..base()
-                },
-            ),
-            (
-                "excess",
-                ClothParams {
-                    excess: bad,
-                    ..base()
-                },
-            ),
+            ("vertices", ClothParams { vertices: 31, ..base() }),
+            ("outline_points", ClothParams { outline_points: 2, ..base() }),
+            ("excess", ClothParams { excess: 0.9, ..base() }),
+            ("excess", ClothParams { excess: bad, ..base() }),
             ("steps", ClothParams { steps: 0, ..base() }),
-            (
-                "damping",
-                verlet(VerletParams {
-                    damping: 1.1,
-                    ..v()
-                }),
-            ),
-            (
-                "dt_squared",
-                verlet(VerletParams {
-                    dt_squared: 0.0,
-                    ..v()
-                }),
-            ),
+            ("damping", verlet(VerletParams { damping: 1.1, ..v() })),
+            ("dt_squared", verlet(VerletParams { dt_squared: 0.0, ..v() })),
             ("passes", verlet(VerletParams { passes: 0, ..v() })),
-            (
-                "attraction",
-                verlet(VerletParams {
-                    attraction: -1.0,
-                    ..v()
-                }),
-            ),
-            (
-                "outline_start",
-                verlet(VerletParams {
-                    outline_start: 0.5,
-                    ..v()
-                }),
-            ),
+            ("attraction", verlet(VerletParams { attraction: -1.0, ..v() })),
+            ("outline_start", verlet(VerletParams { outline_start: 0.5, ..v() })),
             ("lift", verlet(VerletParams { lift: bad, ..v() })),
-            (
-                "gravity",
-                verlet(VerletParams {
-                    gravity: f64::INFINITY,
-                    ..v()
-                }),
-            ),
+            ("gravity", verlet(VerletParams { gravity: f64::INFINITY, ..v() })),
             ("substeps", xpbd(XpbdParams { substeps: 0, ..x() })),
-            (
-                "stretch_compliance",
-                xpbd(XpbdParams {
-                    stretch_compliance: -1.0,
-                    ..x()
-                }),
-            ),
-            (
-                "bend_compliance",
-                xpbd(XpbdParams {
-                    bend_compliance: bad,
-                    ..x()
-                }),
-            ),
-            (
-                "bend_yield",
-                xpbd(XpbdParams {
-                    bend_yield: 2.0,
-                    ..x()
-                }),
-            ),
-            (
-                "damping",
-                xpbd(XpbdParams {
-                    damping: -0.1,
-                    ..x()
-                }),
-            ),
-            (
-                "ceiling",
-                xpbd(XpbdParams {
-                    ceiling: 0.0,
-                    ..x()
-                }),
-            ),
-            (
-                "gravity",
-                xpbd(XpbdParams {
-                    gravity: -1.0,
-                    ..x()
-                }),
-            ),
+            ("stretch_compliance", xpbd(XpbdParams { stretch_compliance: -1.0, ..x() })),
+            ("bend_compliance", xpbd(XpbdParams { bend_compliance: bad, ..x() })),
+            ("bend_yield", xpbd(XpbdParams { bend_yield: 2.0, ..x() })),
+            ("damping", xpbd(XpbdParams { damping: -0.1, ..x() })),
+            ("ceiling", xpbd(XpbdParams { ceiling: 0.0, ..x() })),
+            ("gravity", xpbd(XpbdParams { gravity: -1.0, ..x() })),
             ("lift", xpbd(XpbdParams { lift: 1.1, ..x() })),
         ] {
             let error = params.check().unwrap_err();
-            assert!(
-                matches!(error, Error::Parameter { field: found, .. } if found == field),
-                "{error}"
-            );
+            assert!(matches!(error, Error::Parameter { field: found, .. } if found == field), "{error}");
             assert!(error.to_string().starts_with(field));
         }
     }

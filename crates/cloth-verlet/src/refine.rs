@@ -38,12 +38,9 @@ fn sorted(a: u32, b: u32) -> [u32; 2] {
 impl Refinement {
     pub(crate) fn new(disc: &Disc, smoothing: Smoothing) -> Refinement {
         let (triangles, stencils) = match smoothing {
-            Smoothing::None => (
-                disc.triangles.clone(),
-                (0..disc.points.len())
-                    .map(|v| vec![(index(v), 1.0)])
-                    .collect(),
-            ),
+            Smoothing::None => {
+                (disc.triangles.clone(), (0..disc.points.len()).map(|v| vec![(index(v), 1.0)]).collect())
+            }
             Smoothing::Loop => subdivided(disc),
         };
         let mut starts = vec![0];
@@ -52,17 +49,8 @@ impl Refinement {
             taps.extend(stencil);
             starts.push(index(taps.len()));
         }
-        let mut refinement = Refinement {
-            triangles,
-            starts,
-            taps,
-            radius: Vec::new(),
-            hem: Vec::new(),
-        };
-        refinement.radius = refinement
-            .mean(&disc.points)
-            .map(|[x, y]| (x * x + y * y).sqrt().min(1.0))
-            .collect();
+        let mut refinement = Refinement { triangles, starts, taps, radius: Vec::new(), hem: Vec::new() };
+        refinement.radius = refinement.mean(&disc.points).map(|[x, y]| (x * x + y * y).sqrt().min(1.0)).collect();
         refinement.hem = hem(&refinement.triangles);
         refinement
     }
@@ -124,10 +112,7 @@ impl Refinement {
             }
             let new = index(parts.vertices.len());
             parts.vertices.push([x, y, za + part * (zb - za)]);
-            parts.rest.push([
-                ra[0] + part * (rb[0] - ra[0]),
-                ra[1] + part * (rb[1] - ra[1]),
-            ]);
+            parts.rest.push([ra[0] + part * (rb[0] - ra[0]), ra[1] + part * (rb[1] - ra[1])]);
             parts.radius.push(1.0);
             parts.triangles.push([last, new, apex]);
             last = new;
@@ -199,8 +184,7 @@ fn hem(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
             }
         }
     }
-    let next: BTreeMap<u32, (u32, u32)> =
-        sides.into_iter().map(|((i, j), t)| (i, (j, t))).collect();
+    let next: BTreeMap<u32, (u32, u32)> = sides.into_iter().map(|((i, j), t)| (i, (j, t))).collect();
     let mut hem = Vec::with_capacity(next.len());
     let mut at = 0;
     while hem.len() < next.len() {

@@ -57,57 +57,28 @@ pub(crate) fn start<R: Rng + ?Sized>(
         Solver::Verlet(p) => (p.lift, 0),
         Solver::Xpbd(p) => (p.lift, disc.rim),
     };
-    let heights = (0..rest.len())
-        .map(|v| if v < held { 0.0 } else { lift * unit(rng) })
-        .collect();
-    (
-        Start {
-            rest,
-            heights,
-            outline: [from, target],
-        },
-        offset,
-    )
+    let heights = (0..rest.len()).map(|v| if v < held { 0.0 } else { lift * unit(rng) }).collect();
+    (Start { rest, heights, outline: [from, target] }, offset)
 }
 
 /// The paper's start: a disc, turned so that its rim stands where the outline's points are.
-fn round(
-    disc: &Disc,
-    target: &[Point],
-    outline: &Outline,
-    params: &ClothParams,
-) -> (Vec<Point>, Vec<Point>) {
-    let farthest = outline
-        .points
-        .iter()
-        .fold(0.0_f64, |m, p| m.max(p[0] * p[0] + p[1] * p[1]))
-        .sqrt();
+fn round(disc: &Disc, target: &[Point], outline: &Outline, params: &ClothParams) -> (Vec<Point>, Vec<Point>) {
+    let farthest = outline.points.iter().fold(0.0_f64, |m, p| m.max(p[0] * p[0] + p[1] * p[1])).sqrt();
     let radius = farthest.max(params.excess.sqrt());
     let room = match &params.solver {
         Solver::Verlet(p) => p.outline_start,
         Solver::Xpbd(_) => 1.0,
     };
     let turn = turn(target);
-    let turned = |p: &Point| {
-        [
-            radius * (p[0] * turn[0] - p[1] * turn[1]),
-            radius * (p[0] * turn[1] + p[1] * turn[0]),
-        ]
-    };
-    let from = circle(target.len())
-        .iter()
-        .map(|p| turned(p).map(|c| c * room))
-        .collect();
+    let turned = |p: &Point| [radius * (p[0] * turn[0] - p[1] * turn[1]), radius * (p[0] * turn[1] + p[1] * turn[0])];
+    let from = circle(target.len()).iter().map(|p| turned(p).map(|c| c * room)).collect();
     (disc.points.iter().map(turned).collect(), from)
 }
 
 /// Points at equal angles on the unit circle.
 fn circle(count: usize) -> Vec<Point> {
     #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
-    (0..count)
-        .map(|k| TAU * k as f64 / count as f64)
-        .map(|angle| [libm::cos(angle), libm::sin(angle)])
-        .collect()
+    (0..count).map(|k| TAU * k as f64 / count as f64).map(|angle| [libm::cos(angle), libm::sin(angle)]).collect()
 }
 
 /// Cosine and sine of the turn that brings the circle closest to the curve: the direction of its first Fourier coefficient.
@@ -118,11 +89,7 @@ fn turn(curve: &[Point]) -> Point {
         sum[1] += p[1] * c[0] - p[0] * c[1];
     }
     let length = (sum[0] * sum[0] + sum[1] * sum[1]).sqrt();
-    if length > 0.0 {
-        sum.map(|s| s / length)
-    } else {
-        [1.0, 0.0]
-    }
+    if length > 0.0 { sum.map(|s| s / length) } else { [1.0, 0.0] }
 }
 
 /// The curve smoothed by a Gaussian of `width` parts of the way round.
@@ -136,16 +103,13 @@ fn smoothed(curve: &[Point], width: f64) -> Vec<Point> {
     let count = curve.len();
     let sigma = width * count as f64;
     let reach = ((3.0 * sigma).ceil() as usize).min((count - 1) / 2);
-    let weights: Vec<f64> = (0..=reach)
-        .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
-        .collect();
+    let weights: Vec<f64> = (0..=reach).map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma))).collect();
     let total = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
     let twice = [curve, curve, curve].concat();
     (count..2 * count)
         .map(|k| {
             [0, 1].map(|axis| {
-                let pairs =
-                    (1..=reach).map(|i| weights[i] * (twice[k + i][axis] + twice[k - i][axis]));
+                let pairs = (1..=reach).map(|i| weights[i] * (twice[k + i][axis] + twice[k - i][axis]));
                 (weights[0] * twice[k][axis] + pairs.sum::<f64>()) / total
             })
         })
@@ -162,20 +126,12 @@ fn grown<R: Rng + ?Sized>(target: &[Point], excess: f64, rng: &mut R) -> Vec<Poi
             let (a, b) = (soft[(k + count - 1) % count], soft[(k + 1) % count]);
             let (x, y) = (b[1] - a[1], a[0] - b[0]);
             let length = (x * x + y * y).sqrt();
-            if length > 0.0 {
-                [x / length, y / length]
-            } else {
-                [0.0, 0.0]
-            }
+            if length > 0.0 { [x / length, y / length] } else { [0.0, 0.0] }
         })
         .collect();
     let normals = smoothed(&normals, SMOOTH[1]);
     let pushes: [[f64; 3]; PUSHES] = std::array::from_fn(|_| {
-        [
-            unit(rng),
-            PUSH_WIDTH.0 + PUSH_WIDTH.1 * unit(rng),
-            PUSH_DEPTH.0 + PUSH_DEPTH.1 * unit(rng),
-        ]
+        [unit(rng), PUSH_WIDTH.0 + PUSH_WIDTH.1 * unit(rng), PUSH_DEPTH.0 + PUSH_DEPTH.1 * unit(rng)]
     });
     let push = |k: usize| -> Point {
         let n = normals[k];
@@ -191,22 +147,14 @@ fn grown<R: Rng + ?Sized>(target: &[Point], excess: f64, rng: &mut R) -> Vec<Poi
     };
     let outwards = smoothed(&(0..count).map(push).collect::<Vec<_>>(), SMOOTH[2]);
     let moved = |far: f64| -> Vec<Point> {
-        target
-            .iter()
-            .zip(&outwards)
-            .map(|(p, v)| [p[0] + far * v[0], p[1] + far * v[1]])
-            .collect()
+        target.iter().zip(&outwards).map(|(p, v)| [p[0] + far * v[0], p[1] + far * v[1]]).collect()
     };
     // Area is a quadratic of how far the curve is pushed: A₀ + A₁ f + A₂ f² = excess A₀.
     let (a0, a2) = (moments(target).0, moments(&outwards).0);
     let a1 = moments(&moved(1.0)).0 - a0 - a2;
     let wanted = (excess - 1.0) * a0;
     let root = (a1 * a1 + 4.0 * a2 * wanted).max(0.0).sqrt();
-    let far = if a1 + root > 0.0 {
-        2.0 * wanted / (a1 + root)
-    } else {
-        0.0
-    };
+    let far = if a1 + root > 0.0 { 2.0 * wanted / (a1 + root) } else { 0.0 };
     moved(far)
 }
 
@@ -218,9 +166,7 @@ fn flattened(disc: &Disc, curve: &[Point], excess: f64) -> Vec<Point> {
     let area = PI * excess;
     let rim = |curve: &[Point]| -> Vec<Point> {
         let scale = (area / moments(curve).0.max(f64::MIN_POSITIVE)).sqrt();
-        (0..disc.rim)
-            .map(|k| between(curve, k, disc.rim).map(|c| c * scale))
-            .collect()
+        (0..disc.rim).map(|k| between(curve, k, disc.rim).map(|c| c * scale)).collect()
     };
     let mut rest = disc.spread(&rim(curve));
     let mut width = narrowest;
@@ -232,10 +178,7 @@ fn flattened(disc: &Disc, curve: &[Point], excess: f64) -> Vec<Point> {
         width *= 2.0;
     }
     let [c, s] = turn(curve).map(|t| t * excess.sqrt());
-    disc.points
-        .iter()
-        .map(|p| [p[0] * c - p[1] * s, p[0] * s + p[1] * c])
-        .collect()
+    disc.points.iter().map(|p| [p[0] * c - p[1] * s, p[0] * s + p[1] * c]).collect()
 }
 
 /// The point `k / count` of the way round, counted in the curve's points.

@@ -34,14 +34,9 @@ impl View {
     )]
     pub(crate) fn from([x, y]: Point, sides: usize) -> View {
         let count = sides as f64;
-        let half = (count * HALF_VIEW / (x * x + y * y).sqrt().max(WIDEST))
-            .ceil()
-            .min((count / 2.0).floor());
+        let half = (count * HALF_VIEW / (x * x + y * y).sqrt().max(WIDEST)).ceil().min((count / 2.0).floor());
         let own = (libm::atan2(y, x) / TAU + 1.0) * count;
-        View {
-            first: (own - half) as u32 % sides as u32,
-            count: (2.0 * half) as u32,
-        }
+        View { first: (own - half) as u32 % sides as u32, count: (2.0 * half) as u32 }
     }
 }
 
@@ -69,29 +64,15 @@ pub(crate) struct Ring<T, const L: usize> {
 
 impl<T: Real, const L: usize> Ring<T, L> {
     pub(crate) fn new(points: Curve<T, L>, vertices: usize) -> Ring<T, L> {
-        let corner = |&at: &[Lane<T, L>; 2]| Corner {
-            at,
-            normal: [Lane([T::ZERO; L]); 2],
-            inverse: Lane([T::ZERO; L]),
-        };
+        let corner =
+            |&at: &[Lane<T, L>; 2]| Corner { at, normal: [Lane([T::ZERO; L]); 2], inverse: Lane([T::ZERO; L]) };
         let corners = points.iter().chain(points.first()).map(corner).collect();
-        Ring {
-            corners,
-            before: points.clone(),
-            points,
-            slack: vec![Lane([T::ZERO; L]); vertices],
-        }
+        Ring { corners, before: points.clone(), points, slack: vec![Lane([T::ZERO; L]); vertices] }
     }
 
     /// Moves every vertex from `first` on that is outside to the nearest of the sides in its view, after step `step`.
     #[inline(always)]
-    pub(crate) fn press(
-        &mut self,
-        now: &mut [Node<T, L>],
-        views: &[View],
-        first: usize,
-        step: usize,
-    ) {
+    pub(crate) fn press(&mut self, now: &mut [Node<T, L>], views: &[View], first: usize, step: usize) {
         let pace = self.measure();
         // A vertex is looked at before its slack is used up, in a step that is a multiple of as great a power of two as may be: so
         // the lanes, which all wait for one, are looked at together.
@@ -109,17 +90,10 @@ impl<T: Real, const L: usize> Ring<T, L> {
                     let due = slack[l] < pace[l] * stride;
                     let outside = nearest.outwards[l] > T::ZERO;
                     for axis in 0..2 {
-                        node[axis][l] = if due & outside {
-                            node[axis][l] - nearest.off[axis][l]
-                        } else {
-                            node[axis][l]
-                        };
+                        node[axis][l] =
+                            if due & outside { node[axis][l] - nearest.off[axis][l] } else { node[axis][l] };
                     }
-                    let gap = if outside {
-                        T::ZERO
-                    } else {
-                        nearest.away[l].sqrt()
-                    };
+                    let gap = if outside { T::ZERO } else { nearest.away[l].sqrt() };
                     slack[l] = if due { gap } else { slack[l] };
                 }
             }
@@ -132,10 +106,7 @@ impl<T: Real, const L: usize> Ring<T, L> {
         let count = self.points.len();
         let mut fastest = Lane([T::ZERO; L]);
         for k in 0..count {
-            let (a, b) = (
-                self.points[k],
-                self.points[if k + 1 < count { k + 1 } else { 0 }],
-            );
+            let (a, b) = (self.points[k], self.points[if k + 1 < count { k + 1 } else { 0 }]);
             let corner = &mut self.corners[k];
             for l in 0..L {
                 let (mx, my) = (a[0][l] - corner.at[0][l], a[1][l] - corner.at[1][l]);
@@ -161,11 +132,7 @@ impl<T: Real, const L: usize> Ring<T, L> {
             previous = own;
         }
         self.corners[count] = self.corners[0];
-        Lane(
-            fastest
-                .0
-                .map(|square| square.sqrt() * T::of(HASTE.0) + T::of(HASTE.1)),
-        )
+        Lane(fastest.0.map(|square| square.sqrt() * T::of(HASTE.0) + T::of(HASTE.1)))
     }
 }
 
@@ -185,17 +152,10 @@ impl<T: Real, const L: usize> Nearest<T, L> {
     #[inline(always)]
     fn to(p: &[Lane<T, L>; 2], corners: &[Corner<T, L>], view: &View) -> Nearest<T, L> {
         let zero = Lane([T::ZERO; L]);
-        let mut nearest = Nearest {
-            away: Lane([T::of(f64::from(f32::MAX)); L]),
-            off: [zero; 2],
-            outwards: zero,
-        };
+        let mut nearest = Nearest { away: Lane([T::of(f64::from(f32::MAX)); L]), off: [zero; 2], outwards: zero };
         let sides = corners.len() - 1;
         let (start, end) = (view.first as usize, (view.first + view.count) as usize);
-        let (head, tail) = (
-            &corners[start..=end.min(sides)],
-            &corners[..=end.saturating_sub(sides)],
-        );
+        let (head, tail) = (&corners[start..=end.min(sides)], &corners[..=end.saturating_sub(sides)]);
         for pairs in [head.windows(2), tail.windows(2)] {
             for pair in pairs {
                 nearest.meet(p, &pair[0], &pair[1]);
@@ -210,19 +170,13 @@ impl<T: Real, const L: usize> Nearest<T, L> {
         for l in 0..L {
             let (rx, ry) = (p[0][l] - a.at[0][l], p[1][l] - a.at[1][l]);
             let (ux, uy) = (b.at[0][l] - a.at[0][l], b.at[1][l] - a.at[1][l]);
-            let t = ((rx * ux + ry * uy) * a.inverse[l])
-                .at_least(T::ZERO)
-                .at_most(T::ONE);
+            let t = ((rx * ux + ry * uy) * a.inverse[l]).at_least(T::ZERO).at_most(T::ONE);
             let (ex, ey) = (rx - t * ux, ry - t * uy);
             let away = ex * ex + ey * ey;
             let nx = a.normal[0][l] + t * (b.normal[0][l] - a.normal[0][l]);
             let ny = a.normal[1][l] + t * (b.normal[1][l] - a.normal[1][l]);
             // Weights of 1 and 0 instead of a choice: a masked store could not be read back without waiting for it.
-            let (new, old) = if away < self.away[l] {
-                (T::ONE, T::ZERO)
-            } else {
-                (T::ZERO, T::ONE)
-            };
+            let (new, old) = if away < self.away[l] { (T::ONE, T::ZERO) } else { (T::ZERO, T::ONE) };
             self.away[l] = self.away[l].at_most(away);
             self.off[0][l] = new * ex + old * self.off[0][l];
             self.off[1][l] = new * ey + old * self.off[1][l];

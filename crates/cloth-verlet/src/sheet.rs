@@ -25,20 +25,9 @@ pub(crate) struct Edge {
 
 impl Sheet {
     pub(crate) fn new(parts: Parts) -> Sheet {
-        let Parts {
-            vertices,
-            rest,
-            radius,
-            triangles,
-        } = parts;
+        let Parts { vertices, rest, radius, triangles } = parts;
         let edges = edges(&triangles, vertices.len());
-        Sheet {
-            vertices,
-            rest,
-            radius,
-            triangles,
-            edges,
-        }
+        Sheet { vertices, rest, radius, triangles, edges }
     }
 
     /// Where the sheet is. z ≥ 0 is the height above the ground.
@@ -68,9 +57,7 @@ impl Sheet {
     /// Area of the flat sheet.
     #[must_use]
     pub fn rest_area(&self) -> f64 {
-        (0..self.triangles.len())
-            .map(|t| self.rest_area_of(t))
-            .sum()
+        (0..self.triangles.len()).map(|t| self.rest_area_of(t)).sum()
     }
 
     /// Area of triangle `t` in the flat sheet.
@@ -82,17 +69,8 @@ impl Sheet {
     /// Volume of the sheet under a thickness that depends on [`Sheet::rest_radius`], linear within each triangle: what
     /// [`Sheet::thickness_into`] spreads over the picture.
     pub fn volume(&self, thickness: impl Fn(f64) -> f64) -> f64 {
-        let mean = |t: &[u32; 3]| {
-            t.iter()
-                .map(|&v| thickness(self.radius[v as usize]))
-                .sum::<f64>()
-                / 3.0
-        };
-        self.triangles
-            .iter()
-            .enumerate()
-            .map(|(t, corners)| self.rest_area_of(t) * mean(corners))
-            .sum()
+        let mean = |t: &[u32; 3]| t.iter().map(|&v| thickness(self.radius[v as usize])).sum::<f64>() / 3.0;
+        self.triangles.iter().enumerate().map(|(t, corners)| self.rest_area_of(t) * mean(corners)).sum()
     }
 
     /// Root mean square of the edges' relative change in length.
@@ -135,10 +113,7 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
                 sides[side] = t;
                 next.push(first[low as usize]);
                 first[low as usize] = new(&edges);
-                edges.push(Edge {
-                    ends: [low, high],
-                    sides,
-                });
+                edges.push(Edge { ends: [low, high], sides });
             } else {
                 edges[at as usize].sides[side] = t;
             }

@@ -16,26 +16,14 @@ pub(crate) fn rng(stream: u64) -> Xoshiro256PlusPlus {
 pub(crate) fn wavy(waves: f64, depth: f64) -> Vec<Point> {
     (0..200)
         .map(|k| TAU * f64::from(k) / 200.0)
-        .map(|angle| {
-            (
-                100.0 * (1.0 + depth * libm::cos(waves * angle + 1.0)),
-                angle,
-            )
-        })
+        .map(|angle| (100.0 * (1.0 + depth * libm::cos(waves * angle + 1.0)), angle))
         .map(|(r, angle)| [30.0 + r * libm::cos(angle), -20.0 + r * libm::sin(angle)])
         .collect()
 }
 
 /// An L, walked the other way round than [`wavy`].
 pub(crate) fn angular() -> Vec<Point> {
-    vec![
-        [0.0, 0.0],
-        [0.0, 9.0],
-        [4.0, 9.0],
-        [4.0, 4.5],
-        [8.0, 4.5],
-        [8.0, 0.0],
-    ]
+    vec![[0.0, 0.0], [0.0, 9.0], [4.0, 9.0], [4.0, 4.5], [8.0, 4.5], [8.0, 0.0]]
 }
 
 /// Signed area of a polygon.

@@ -12,11 +12,7 @@ impl<T: Real, const L: usize> Batch<T, L> {
         let gravity = T::of(-params.gravity * params.dt_squared);
         let attraction = T::of(params.attraction * params.dt_squared);
         let no_limit = T::of(f64::from(f32::MAX));
-        let rigid = Binding {
-            weights: [T::ONE; 2],
-            gain: T::of(0.5),
-            gives_way: no_limit,
-        };
+        let rigid = Binding { weights: [T::ONE; 2], gain: T::of(0.5), gives_way: no_limit };
         for step in 1..=steps {
             for _ in 0..params.passes {
                 for (pairs, lengths) in topology.edges.iter().zip(&self.edges) {
@@ -28,12 +24,7 @@ impl<T: Real, const L: usize> Batch<T, L> {
                 for axis in 0..2 {
                     for l in 0..L {
                         let now = point[axis][l];
-                        point[axis][l] = verlet(
-                            now,
-                            before[axis][l],
-                            (target[axis][l] - now) * attraction,
-                            keep,
-                        );
+                        point[axis][l] = verlet(now, before[axis][l], (target[axis][l] - now) * attraction, keep);
                         before[axis][l] = now;
                     }
                 }

@@ -8,33 +8,22 @@
 mod support;
 
 use fsd_shape::{
-    Descriptors, Point, Rng, ShapeModel, ShapeModelParams, ShapeStatistics, Spread, circularity,
-    resample, self_intersects,
+    Descriptors, Point, Rng, ShapeModel, ShapeModelParams, ShapeStatistics, Spread, circularity, resample,
+    self_intersects,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
 const DRAWS: usize = 10_000;
-const NAMES: [&str; 8] = [
-    "circularity",
-    "|u-1|",
-    "|u2|",
-    "|u3|",
-    "|u-2|",
-    "|u-3|",
-    "rms |l|>3",
-    "rms |l|>10",
-];
+const NAMES: [&str; 8] = ["circularity", "|u-1|", "|u2|", "|u3|", "|u-2|", "|u-3|", "rms |l|>3", "rms |l|>10"];
 
 /// The columns of the table for one outline, at so many harmonics.
 fn measure(shape: &Descriptors, harmonics: usize) -> [f64; 8] {
     let shape = shape.truncated(harmonics).normalised();
     let beyond = |least: i32| {
         let most = i32::try_from(harmonics).unwrap_or(i32::MAX);
-        let squares: f64 = (least + 1..=most)
-            .flat_map(|l| [shape.magnitude(l), shape.magnitude(-l)])
-            .map(|m| m * m)
-            .sum();
+        let squares: f64 =
+            (least + 1..=most).flat_map(|l| [shape.magnitude(l), shape.magnitude(-l)]).map(|m| m * m).sum();
         squares.sqrt()
     };
     [
@@ -50,11 +39,7 @@ fn measure(shape: &Descriptors, harmonics: usize) -> [f64; 8] {
 }
 
 /// Share of the paper's draws, none rejected, that cross themselves at the paper's number of points.
-fn crossing_share<R: Rng + ?Sized>(
-    of: &ShapeStatistics,
-    points: usize,
-    rng: &mut R,
-) -> Result<f64, fsd_shape::Error> {
+fn crossing_share<R: Rng + ?Sized>(of: &ShapeStatistics, points: usize, rng: &mut R) -> Result<f64, fsd_shape::Error> {
     let mut crossing = 0;
     for _ in 0..DRAWS {
         let mut terms: Vec<Point> = Vec::with_capacity(2 * of.harmonics + 1);
@@ -84,45 +69,23 @@ fn column(rows: &[[f64; 8]], k: usize) -> (f64, f64) {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let outlines: Vec<Vec<Point>> = match std::env::args().nth(1) {
         Some(path) => support::read_outlines(path.as_ref())?,
-        None => support::polygons(
-            70,
-            100.0,
-            &support::CELL,
-            &mut Xoshiro256PlusPlus::seed_from_u64(0x51),
-        ),
+        None => support::polygons(70, 100.0, &support::CELL, &mut Xoshiro256PlusPlus::seed_from_u64(0x51)),
     };
     let harmonics = match std::env::args().nth(2) {
         Some(text) => text.parse()?,
         None => ShapeModelParams::default().harmonics,
     };
-    let ours = ShapeModelParams {
-        harmonics,
-        ..ShapeModelParams::default()
-    };
+    let ours = ShapeModelParams { harmonics, ..ShapeModelParams::default() };
     let models = [
-        (
-            "the paper's, all harmonics",
-            ShapeModelParams::paper_cytoplasm(),
-        ),
-        (
-            "the paper's, fewer harmonics",
-            ShapeModelParams {
-                spread: Spread::Independent,
-                ..ours.clone()
-            },
-        ),
+        ("the paper's, all harmonics", ShapeModelParams::paper_cytoplasm()),
+        ("the paper's, fewer harmonics", ShapeModelParams { spread: Spread::Independent, ..ours.clone() }),
         ("default", ours),
     ];
     for (name, params) in models {
         let shown = params.harmonics.min(harmonics);
         let real: Vec<[f64; 8]> = outlines
             .iter()
-            .map(|outline| {
-                Ok(measure(
-                    &Descriptors::from_outline(&resample(outline, 1024))?,
-                    shown,
-                ))
-            })
+            .map(|outline| Ok(measure(&Descriptors::from_outline(&resample(outline, 1024))?, shown)))
             .collect::<Result<_, fsd_shape::Error>>()?;
         let model = ShapeModel::fit(&outlines, &params)?;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xC0);
@@ -154,17 +117,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let checks = 16 * params.harmonics;
         let mut real_crossing = 0;
         for outline in &outlines {
-            let smooth =
-                Descriptors::from_outline(&resample(outline, 1024))?.truncated(params.harmonics);
+            let smooth = Descriptors::from_outline(&resample(outline, 1024))?.truncated(params.harmonics);
             real_crossing += u32::from(self_intersects(&smooth.outline(checks)));
         }
-        println!(
-            "  real outlines crossing themselves at so many harmonics: {real_crossing} of {}",
-            outlines.len()
-        );
-        println!(
-            "  at {shown} harmonics      real mean ± sd      drawn mean ± sd   off by (s.e.)   sd ratio"
-        );
+        println!("  real outlines crossing themselves at so many harmonics: {real_crossing} of {}", outlines.len());
+        println!("  at {shown} harmonics      real mean ± sd      drawn mean ± sd   off by (s.e.)   sd ratio");
         for (k, label) in NAMES.iter().enumerate() {
             let (real_mean, real_sd) = column(&real, k);
             let (mean, sd) = column(&drawn, k);

@@ -20,9 +20,7 @@ const INK: [f64; 2] = [196.0, 96.0];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments
-        .next()
-        .unwrap_or_else(|| "target/fsd-shape.png".to_owned());
+    let path = arguments.next().unwrap_or_else(|| "target/fsd-shape.png".to_owned());
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x5EED);
     let cells = match arguments.next() {
         Some(table) => support::read_outlines(table.as_ref())?,
@@ -30,33 +28,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let nuclei = support::polygons(80, 16.0, &support::NUCLEUS, &mut rng);
     let cytoplasm = ShapeModel::fit(&cells, &ShapeModelParams::default())?;
-    let nucleus = ShapeModel::fit(
-        &nuclei,
-        &ShapeModelParams {
-            harmonics: 5,
-            ..ShapeModelParams::default()
-        },
-    )?;
+    let nucleus = ShapeModel::fit(&nuclei, &ShapeModelParams { harmonics: 5, ..ShapeModelParams::default() })?;
 
     let mut sheet = GrayImage::from_pixel(COLUMNS * TILE, ROWS * TILE, Luma([255]));
     for row in 0..ROWS {
         let is_nucleus = row + 1 == ROWS;
-        let (model, median) = if is_nucleus {
-            (&nucleus, 24.0)
-        } else {
-            (&cytoplasm, 38.0)
-        };
+        let (model, median) = if is_nucleus { (&nucleus, 24.0) } else { (&cytoplasm, 38.0) };
         for column in 0..COLUMNS {
             // Sizes vary as in the outlines fitted, about a median that fits the tile.
-            let radius = median
-                * (model.draw_radius(&mut rng) / libm::exp(model.statistics().ln_radius_mean))
-                    .clamp(0.8, 1.15);
+            let radius =
+                median * (model.draw_radius(&mut rng) / libm::exp(model.statistics().ln_radius_mean)).clamp(0.8, 1.15);
             let draw = model.draw(radius, &mut rng)?;
             let middle = |k: u32| f64::from(k * TILE + TILE / 2);
-            let outline = draw
-                .descriptors
-                .translated([middle(column), middle(row)])
-                .outline(512);
+            let outline = draw.descriptors.translated([middle(column), middle(row)]).outline(512);
             paint(&mut sheet, &outline, INK[usize::from(is_nucleus)]);
         }
     }
@@ -92,11 +76,7 @@ fn paint(sheet: &mut GrayImage, outline: &[Point], ink: f64) {
     for (pixel, &hits) in sheet.pixels_mut().zip(&coverage) {
         let share = f64::from(hits) / f64::from(FINE * FINE);
         let value = f64::from(pixel.0[0]) - share * (PAPER - ink);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the range of a byte"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of a byte")]
         let byte = value.round().clamp(0.0, 255.0) as u8;
         pixel.0[0] = byte;
     }

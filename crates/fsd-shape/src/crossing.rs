@@ -48,8 +48,7 @@ fn folds_back(p: Point, q: Point, r: Point) -> bool {
 
 /// Whether two closed segments share a point.
 fn meet(a: Point, b: Point, c: Point, d: Point) -> bool {
-    let boxes_meet =
-        (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
+    let boxes_meet = (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
     if !boxes_meet {
         return false;
     }
@@ -95,9 +94,8 @@ impl Grid {
             let (a, b) = (p[axis] - low[axis], q[axis] - low[axis]);
             cell(a.min(b))..cell(a.max(b)) + 1
         };
-        let touched: Vec<(Range<usize>, Range<usize>)> = edges(points)
-            .map(|(p, q)| (range(p, q, 0), range(p, q, 1)))
-            .collect();
+        let touched: Vec<(Range<usize>, Range<usize>)> =
+            edges(points).map(|(p, q)| (range(p, q, 0), range(p, q, 1))).collect();
 
         let mut starts = vec![0_u32; columns * rows + 1];
         for (across, down) in &touched {

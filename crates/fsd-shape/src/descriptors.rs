@@ -36,15 +36,9 @@ impl Descriptors {
     pub fn from_outline(outline: &[Point]) -> Result<Self, Error> {
         let count = outline.len();
         if count < FEWEST_POINTS {
-            return Err(Error::TooFewPoints {
-                count,
-                needed: FEWEST_POINTS,
-            });
+            return Err(Error::TooFewPoints { count, needed: FEWEST_POINTS });
         }
-        if let Some(index) = outline
-            .iter()
-            .position(|p| !p.iter().all(|v| v.is_finite()))
-        {
+        if let Some(index) = outline.iter().position(|p| !p.iter().all(|v| v.is_finite())) {
             return Err(Error::PointValue { index });
         }
         if signed_area(outline) == 0.0 {
@@ -53,19 +47,11 @@ impl Descriptors {
         // Eq. 2: uₗ = (1/K) Σₖ z(k) e^{−i2πlk/K}, with z(k) = x(k) + iy(k) (Eq. 1).
         let sums = transform(outline, Direction::Forward);
         let half = count / 2;
-        let shared = if count.is_multiple_of(2) {
-            half
-        } else {
-            half + 1
-        };
+        let shared = if count.is_multiple_of(2) { half } else { half + 1 };
         let terms = (0..=2 * half)
             .map(|place| {
                 let bin = (place + count - half) % count;
-                let share = if place.abs_diff(half) == shared {
-                    2.0
-                } else {
-                    1.0
-                };
+                let share = if place.abs_diff(half) == shared { 2.0 } else { 1.0 };
                 sums[bin].map(|v| v / (share * count_as_f64(count)))
             })
             .collect();
@@ -117,10 +103,7 @@ impl Descriptors {
 
     /// Area enclosed by the continuous curve, π Σ l |uₗ|², in px²; exact, and positive in the orientation of [`crate::trace`].
     pub fn area(&self) -> f64 {
-        let sum: f64 = self
-            .each()
-            .map(|(l, u)| l * (u[0] * u[0] + u[1] * u[1]))
-            .sum();
+        let sum: f64 = self.each().map(|(l, u)| l * (u[0] * u[0] + u[1] * u[1])).sum();
         core::f64::consts::PI * sum
     }
 
@@ -154,9 +137,7 @@ impl Descriptors {
     #[must_use]
     pub fn truncated(&self, harmonics: usize) -> Self {
         let drop = self.harmonics().saturating_sub(harmonics.max(1));
-        Self {
-            terms: self.terms[drop..self.terms.len() - drop].to_vec(),
-        }
+        Self { terms: self.terms[drop..self.terms.len() - drop].to_vec() }
     }
 
     /// Eq. 3: ûₗ = uₗ / |u₁| and û₀ = 0, the shape without place and size.
@@ -230,9 +211,7 @@ impl Descriptors {
     /// Run through backwards from the same start: u₋ₗ. The area changes sign.
     #[must_use]
     pub fn reversed(&self) -> Self {
-        Self {
-            terms: self.terms.iter().rev().copied().collect(),
-        }
+        Self { terms: self.terms.iter().rev().copied().collect() }
     }
 
     /// The mirror image, y to −y: the conjugate of u₋ₗ. The area changes sign; [`Self::reversed`] restores it.
@@ -248,16 +227,11 @@ impl Descriptors {
     /// The terms with their l.
     pub(crate) fn each(&self) -> impl Iterator<Item = (f64, Point)> + '_ {
         let centre = count_as_f64(self.harmonics());
-        self.terms
-            .iter()
-            .enumerate()
-            .map(move |(place, &u)| (count_as_f64(place) - centre, u))
+        self.terms.iter().enumerate().map(move |(place, &u)| (count_as_f64(place) - centre, u))
     }
 
     fn map(&self, change: impl Fn(f64, Point) -> Point) -> Self {
-        Self {
-            terms: self.each().map(|(l, u)| change(l, u)).collect(),
-        }
+        Self { terms: self.each().map(|(l, u)| change(l, u)).collect() }
     }
 
     /// u₋ₕ … uₕ.

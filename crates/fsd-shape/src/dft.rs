@@ -31,9 +31,7 @@ pub(crate) fn transform(input: &[Point], direction: Direction) -> Vec<Point> {
         Direction::Forward => -core::f64::consts::TAU,
         Direction::Inverse => core::f64::consts::TAU,
     };
-    let mut twiddles: Vec<Point> = (0..=len / 2)
-        .map(|k| unit(turn * count_as_f64(k) / count_as_f64(len)))
-        .collect();
+    let mut twiddles: Vec<Point> = (0..=len / 2).map(|k| unit(turn * count_as_f64(k) / count_as_f64(len))).collect();
     // The other half of the circle mirrors the first.
     for k in len / 2 + 1..len {
         let [re, im] = twiddles[len - k];
@@ -41,15 +39,7 @@ pub(crate) fn transform(input: &[Point], direction: Direction) -> Vec<Point> {
     }
     let mut output = vec![[0.0, 0.0]; len];
     let mut scratch = vec![[0.0, 0.0]; len];
-    split(
-        &Part {
-            input,
-            twiddles: &twiddles,
-            stride: 1,
-        },
-        &mut output,
-        &mut scratch,
-    );
+    split(&Part { input, twiddles: &twiddles, stride: 1 }, &mut output, &mut scratch);
     output
 }
 
@@ -70,11 +60,7 @@ fn split(part: &Part<'_>, output: &mut [Point], scratch: &mut [Point]) {
     let p = next_factor(len);
     let m = len / p;
     for (r, piece) in output.chunks_exact_mut(m).enumerate() {
-        let inner = Part {
-            input: &part.input[r * part.stride..],
-            stride: part.stride * p,
-            ..*part
-        };
+        let inner = Part { input: &part.input[r * part.stride..], stride: part.stride * p, ..*part };
         split(&inner, piece, &mut scratch[..m]);
     }
     let scratch = &mut scratch[..len];
@@ -104,10 +90,7 @@ fn next_factor(len: usize) -> usize {
     if len.is_multiple_of(4) {
         return 4;
     }
-    (2..)
-        .take_while(|p| p * p <= len)
-        .find(|&p| len.is_multiple_of(p))
-        .unwrap_or(len)
+    (2..).take_while(|p| p * p <= len).find(|&p| len.is_multiple_of(p)).unwrap_or(len)
 }
 
 #[cfg(test)]
@@ -122,17 +105,10 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xD0F7);
         let mut planner = rustfft::FftPlanner::new();
         for len in (1..70).chain([97, 128, 210, 420, 509, 640, 1024]) {
-            let input: Vec<Point> = (0..len)
-                .map(|_| {
-                    [
-                        f64::from(rng.next_u32() >> 8),
-                        f64::from(rng.next_u32() >> 8),
-                    ]
-                })
-                .collect();
+            let input: Vec<Point> =
+                (0..len).map(|_| [f64::from(rng.next_u32() >> 8), f64::from(rng.next_u32() >> 8)]).collect();
             for direction in [Direction::Forward, Direction::Inverse] {
-                let mut buffer: Vec<Complex<f64>> =
-                    input.iter().map(|p| Complex::new(p[0], p[1])).collect();
+                let mut buffer: Vec<Complex<f64>> = input.iter().map(|p| Complex::new(p[0], p[1])).collect();
                 match direction {
                     Direction::Forward => planner.plan_fft_forward(len).process(&mut buffer),
                     Direction::Inverse => planner.plan_fft_inverse(len).process(&mut buffer),

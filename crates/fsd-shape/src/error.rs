@@ -88,9 +88,7 @@ pub enum Error {
         problem: String,
     },
     /// Every try of a draw crossed itself or ran the wrong way round.
-    #[error(
-        "no simple outline in {tries} tries; the statistics are too wild for {harmonics} harmonics"
-    )]
+    #[error("no simple outline in {tries} tries; the statistics are too wild for {harmonics} harmonics")]
     NoSimpleOutline {
         /// Number of tries made.
         tries: u32,

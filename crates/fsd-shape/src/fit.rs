@@ -35,28 +35,19 @@ pub struct ShapeModelParams {
 
 impl Default for ShapeModelParams {
     fn default() -> Self {
-        Self {
-            harmonics: 40,
-            spread: Spread::Shrinkage { lambda: 0.1 },
-        }
+        Self { harmonics: 40, spread: Spread::Shrinkage { lambda: 0.1 } }
     }
 }
 
 impl ShapeModelParams {
     /// The paper's nuclei: independent normals for each descriptor up to |l| = 4.
     pub fn paper_nucleus() -> Self {
-        Self {
-            harmonics: 4,
-            spread: Spread::Independent,
-        }
+        Self { harmonics: 4, spread: Spread::Independent }
     }
 
     /// The paper's cytoplasm: independent normals for each descriptor of 420 points, all of them (|l| ≤ 209).
     pub fn paper_cytoplasm() -> Self {
-        Self {
-            harmonics: 209,
-            spread: Spread::Independent,
-        }
+        Self { harmonics: 209, spread: Spread::Independent }
     }
 }
 
@@ -89,42 +80,24 @@ impl ShapeModel {
             Spread::Independent => None,
             Spread::Shrinkage { lambda } if (0.0..=1.0).contains(&lambda) => Some(lambda),
             Spread::Shrinkage { lambda } => {
-                return Err(Error::Parameter {
-                    field: "lambda",
-                    value: lambda,
-                    accepted: "0..=1",
-                });
+                return Err(Error::Parameter { field: "lambda", value: lambda, accepted: "0..=1" });
             }
         };
         if !(1..=4096).contains(&params.harmonics) {
             let value = count_as_f64(params.harmonics);
-            return Err(Error::Parameter {
-                field: "harmonics",
-                value,
-                accepted: "1..=4096",
-            });
+            return Err(Error::Parameter { field: "harmonics", value, accepted: "1..=4096" });
         }
         if outlines.len() < FEWEST_OUTLINES {
-            return Err(Error::TooFewOutlines {
-                count: outlines.len(),
-                needed: FEWEST_OUTLINES,
-            });
+            return Err(Error::TooFewOutlines { count: outlines.len(), needed: FEWEST_OUTLINES });
         }
         let mut ln_radii = Vec::with_capacity(outlines.len());
         let mut shapes = Vec::with_capacity(outlines.len());
         for (index, outline) in outlines.iter().enumerate() {
-            let described =
-                describe(outline, params.harmonics).map_err(|source| Error::TrainingOutline {
-                    index,
-                    source: Box::new(source),
-                })?;
+            let described = describe(outline, params.harmonics)
+                .map_err(|source| Error::TrainingOutline { index, source: Box::new(source) })?;
             ln_radii.push(libm::log(described.radius()));
             let shape = described.normalised();
-            shapes.push(coordinates(&if lambda.is_some() {
-                shape.aligned()
-            } else {
-                shape
-            }));
+            shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
         }
         let (ln_radius_mean, ln_radius_sd) = mean_and_sd(&ln_radii);
         let mut statistics = ShapeStatistics {
@@ -145,8 +118,7 @@ impl ShapeModel {
         statistics.residual_sd = sd_of(&shapes);
         if let Some(lambda) = lambda {
             correlate(&mut statistics, &shapes, lambda);
-            let fine =
-                Fine::new(&shapes, params.harmonics).filter(|_| shapes.len() >= ENOUGH_FOR_MOMENTS);
+            let fine = Fine::new(&shapes, params.harmonics).filter(|_| shapes.len() >= ENOUGH_FOR_MOMENTS);
             if let Some(fine) = fine {
                 statistics.roughness_sd = fine.roughness_sd(&statistics);
                 statistics.local_roughness = fine.local_roughness();
@@ -160,9 +132,7 @@ impl ShapeModel {
 fn describe(outline: &[Point], harmonics: usize) -> Result<Descriptors, Error> {
     // Looks at the points before they are resampled, so that what is wrong is named by its own index.
     Descriptors::from_outline(outline)?;
-    let samples = (POINTS_PER_HARMONIC * harmonics)
-        .next_power_of_two()
-        .max(FEWEST_SAMPLES);
+    let samples = (POINTS_PER_HARMONIC * harmonics).next_power_of_two().max(FEWEST_SAMPLES);
     let mut points = resample(outline, samples);
     if signed_area(&points) < 0.0 {
         // The start point stays.
@@ -173,11 +143,7 @@ fn describe(outline: &[Point], harmonics: usize) -> Result<Descriptors, Error> {
 
 /// Re u₋ₕ, Im u₋ₕ, … without u₀.
 fn coordinates(shape: &Descriptors) -> Vec<f64> {
-    shape
-        .each()
-        .filter(|&(l, _)| l != 0.0)
-        .flat_map(|(_, u)| u)
-        .collect()
+    shape.each().filter(|&(l, _)| l != 0.0).flat_map(|(_, u)| u).collect()
 }
 
 /// Shrinkage: Σ = (1 − λ) S + λ diag S, the diagonal taken in directions and steps; as components of (1 − λ) S and residuals
@@ -192,18 +158,11 @@ fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: 
         }
         explained += axis.variance;
         let sd = axis.variance.sqrt();
-        let scores: Vec<f64> = deviations
-            .iter()
-            .map(|row| dot(row, &axis.direction) / sd)
-            .collect();
+        let scores: Vec<f64> = deviations.iter().map(|row| dot(row, &axis.direction) / sd).collect();
         let (skewness, excess_kurtosis) = notable_moments(&scores);
         let scale = sd * (1.0 - lambda).sqrt();
         let loading = axis.direction.iter().map(|v| v * scale).collect();
-        statistics.components.push(PrincipalComponent {
-            loading,
-            skewness,
-            excess_kurtosis,
-        });
+        statistics.components.push(PrincipalComponent { loading, skewness, excess_kurtosis });
     }
     // What the components leave of the variance of each direction and step.
     let in_steps = |row: &Vec<f64>| {
@@ -213,11 +172,7 @@ fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: 
     };
     statistics.residual = Residual::Steps;
     statistics.residual_sd = sd_of(&deviations.iter().map(in_steps).collect::<Vec<_>>());
-    let loadings: Vec<Vec<f64>> = statistics
-        .components
-        .iter()
-        .map(|c| in_steps(&c.loading))
-        .collect();
+    let loadings: Vec<Vec<f64>> = statistics.components.iter().map(|c| in_steps(&c.loading)).collect();
     for (k, sd) in statistics.residual_sd.iter_mut().enumerate() {
         let shared: f64 = loadings.iter().map(|loading| loading[k] * loading[k]).sum();
         *sd = (*sd * *sd - shared).max(0.0).sqrt();
@@ -231,44 +186,26 @@ fn notable_moments(scores: &[f64]) -> (f64, f64) {
         return (0.0, 0.0);
     }
     let n = count_as_f64(scores.len());
-    let power = |k: i32| {
-        scores
-            .iter()
-            .map(|&s| (0..k).fold(1.0, |product, _| product * s))
-            .sum::<f64>()
-            / n
-    };
+    let power = |k: i32| scores.iter().map(|&s| (0..k).fold(1.0, |product, _| product * s)).sum::<f64>() / n;
     let variance = power(2);
     let g1 = power(3) / (variance * variance.sqrt());
     let g2 = power(4) / (variance * variance) - 3.0;
     let skewness = g1 * (n * (n - 1.0)).sqrt() / (n - 2.0);
     let kurtosis = (n - 1.0) / ((n - 2.0) * (n - 3.0)) * ((n + 1.0) * g2 + 6.0);
     let notable = |value: f64, error: f64| {
-        if value.abs() > NOTABLE * error {
-            value
-        } else {
-            0.0
-        }
+        if value.abs() > NOTABLE * error { value } else { 0.0 }
     };
-    let skewness = notable(skewness, (6.0 / n).sqrt()).clamp(
-        -PrincipalComponent::MOST_SKEWNESS,
-        PrincipalComponent::MOST_SKEWNESS,
-    );
-    let kurtosis = notable(kurtosis, (24.0 / n).sqrt()).clamp(
-        Bend::least_kurtosis(skewness),
-        PrincipalComponent::MOST_KURTOSIS,
-    );
+    let skewness = notable(skewness, (6.0 / n).sqrt())
+        .clamp(-PrincipalComponent::MOST_SKEWNESS, PrincipalComponent::MOST_SKEWNESS);
+    let kurtosis =
+        notable(kurtosis, (24.0 / n).sqrt()).clamp(Bend::least_kurtosis(skewness), PrincipalComponent::MOST_KURTOSIS);
     (skewness, kurtosis)
 }
 
 /// |l| of coordinate k.
 pub(crate) fn order(k: usize, harmonics: usize) -> usize {
     let place = k / 2;
-    if place < harmonics {
-        harmonics - place
-    } else {
-        place + 1 - harmonics
-    }
+    if place < harmonics { harmonics - place } else { place + 1 - harmonics }
 }
 
 /// Descriptors of coordinates, u₀ = 0.

@@ -51,17 +51,9 @@ impl ShapeModel {
     /// If the numbers are out of range or do not fit together.
     pub fn from_statistics(statistics: ShapeStatistics) -> Result<Self, Error> {
         statistics.check()?;
-        let bends = statistics
-            .components
-            .iter()
-            .filter_map(|c| c.bend())
-            .collect();
+        let bends = statistics.components.iter().filter_map(|c| c.bend()).collect();
         let modulation = Modulation::new(&statistics);
-        Ok(Self {
-            statistics,
-            bends,
-            modulation,
-        })
+        Ok(Self { statistics, bends, modulation })
     }
 
     /// The numbers behind the model; they hold no outline it was fitted to.
@@ -84,11 +76,7 @@ impl ShapeModel {
     /// If `radius_px` is not positive and finite, or 200 tries in a row are rejected.
     pub fn draw<R: Rng + ?Sized>(&self, radius_px: f64, rng: &mut R) -> Result<Draw, Error> {
         if !(radius_px.is_finite() && radius_px > 0.0) {
-            return Err(Error::Parameter {
-                field: "radius_px",
-                value: radius_px,
-                accepted: "positive and finite",
-            });
+            return Err(Error::Parameter { field: "radius_px", value: radius_px, accepted: "positive and finite" });
         }
         let harmonics = self.statistics.harmonics;
         let checks = (CHECKS_PER_HARMONIC * harmonics).max(FEWEST_CHECKS);
@@ -105,16 +93,10 @@ impl ShapeModel {
                 continue;
             };
             if descriptors.area() > 0.0 && !self_intersects(&descriptors.outline(checks)) {
-                return Ok(Draw {
-                    descriptors,
-                    rejected,
-                });
+                return Ok(Draw { descriptors, rejected });
             }
         }
-        Err(Error::NoSimpleOutline {
-            tries: TRIES,
-            harmonics,
-        })
+        Err(Error::NoSimpleOutline { tries: TRIES, harmonics })
     }
 
     /// Descriptors u₋ₕ … uₕ of a normalised shape, not looked at yet.
@@ -127,11 +109,7 @@ impl ShapeModel {
             from_steps(&mut deviation);
         }
         for (component, bend) in of.components.iter().zip(&self.bends) {
-            add_scaled(
-                &mut deviation,
-                &component.loading,
-                bend.apply(normals.draw()),
-            );
+            add_scaled(&mut deviation, &component.loading, bend.apply(normals.draw()));
         }
         if of.roughness_sd > 0.0 {
             // Mean square 1: E e^{2(σz − σ²)} = 1.
@@ -186,11 +164,7 @@ impl Modulation {
                 let near = place.saturating_sub(reach)..=(place + reach).min(2 * harmonics);
                 let others = powers[near].iter().sum::<f64>() - powers[place];
                 let modulated = powers[place] + 2.0 * sd * sd * others;
-                if powers[place] > 0.0 {
-                    (powers[place] / modulated).sqrt()
-                } else {
-                    0.0
-                }
+                if powers[place] > 0.0 { (powers[place] / modulated).sqrt() } else { 0.0 }
             })
             .collect();
         Some(Self { sd, reach, gains })
@@ -207,11 +181,7 @@ impl Modulation {
             factor[reach - m] = [re, -im];
         }
         let mut modulated = vec![[0.0, 0.0]; terms.len()];
-        for (place, &u) in terms
-            .iter()
-            .enumerate()
-            .filter(|&(place, _)| self.gains[place] > 0.0)
-        {
+        for (place, &u) in terms.iter().enumerate().filter(|&(place, _)| self.gains[place] > 0.0) {
             // Place of the first product; what falls outside the curve's harmonics is lost.
             let first = place.saturating_sub(reach);
             let skipped = reach.saturating_sub(place);

@@ -19,9 +19,7 @@ pub fn signed_area(outline: &[Point]) -> f64 {
     let Some(&origin) = outline.first() else {
         return 0.0;
     };
-    let twice: f64 = edges(outline)
-        .map(|(p, q)| cross(sub(p, origin), sub(q, origin)))
-        .sum();
+    let twice: f64 = edges(outline).map(|(p, q)| cross(sub(p, origin), sub(q, origin))).sum();
     twice / 2.0
 }
 
@@ -41,11 +39,8 @@ pub fn centroid(outline: &[Point]) -> Point {
         sum = [sum[0] + p[0], sum[1] + p[1]];
     }
     // Three times twice the area: the centroid of the triangle (0, p, q) is a third of p + q.
-    let (sum, divisor) = if twice_area == 0.0 {
-        (sum, count_as_f64(outline.len()))
-    } else {
-        (moment, 3.0 * twice_area)
-    };
+    let (sum, divisor) =
+        if twice_area == 0.0 { (sum, count_as_f64(outline.len())) } else { (moment, 3.0 * twice_area) };
     [origin[0] + sum[0] / divisor, origin[1] + sum[1] / divisor]
 }
 
@@ -108,9 +103,7 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
             chords[k + 1] = total;
         }
         let mean = total / count_as_f64(count);
-        let spread = (squares / count_as_f64(count) / (mean * mean) - 1.0)
-            .max(0.0)
-            .sqrt();
+        let spread = (squares / count_as_f64(count) / (mean * mean) - 1.0).max(0.0).sqrt();
         if spread < best_spread {
             best_spread = spread;
             best.clone_from(&points);
@@ -151,11 +144,7 @@ fn place(outline: &[Point], arc: &[f64], places: &[f64], points: &mut Vec<Point>
 
 /// Place of a part within a whole, 0..=1; 0 in a whole of no length.
 fn ratio(part: f64, whole: f64) -> f64 {
-    if whole > 0.0 {
-        (part / whole).clamp(0.0, 1.0)
-    } else {
-        0.0
-    }
+    if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// The edges of the closed outline, the last one back to the start.

@@ -23,15 +23,9 @@ pub(crate) fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
     let size = count.min(dims);
     let column = |k: usize| deviations.iter().map(move |row| row[k]);
     let product = |i: usize, j: usize| -> f64 {
-        if by_rows {
-            dot(&deviations[i], &deviations[j])
-        } else {
-            column(i).zip(column(j)).map(|(a, b)| a * b).sum()
-        }
+        if by_rows { dot(&deviations[i], &deviations[j]) } else { column(i).zip(column(j)).map(|(a, b)| a * b).sum() }
     };
-    let mut matrix: Vec<Vec<f64>> = (0..size)
-        .map(|i| (0..size).map(|j| product(i, j)).collect())
-        .collect();
+    let mut matrix: Vec<Vec<f64>> = (0..size).map(|i| (0..size).map(|j| product(i, j)).collect()).collect();
     let (values, vectors) = eigen(&mut matrix);
 
     let mut axes: Vec<Axis> = values
@@ -45,10 +39,7 @@ pub(crate) fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
                     add_scaled(&mut direction, row, weight);
                 }
             }
-            Axis {
-                variance: value / freedom,
-                direction,
-            }
+            Axis { variance: value / freedom, direction }
         })
         .collect();
     axes.sort_by(|a, b| b.variance.total_cmp(&a.variance));
@@ -57,10 +48,7 @@ pub(crate) fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
     let floor = largest * f64::EPSILON * count_as_f64(size);
     axes.retain(|axis| axis.variance > floor);
     for axis in &mut axes {
-        let extreme = axis
-            .direction
-            .iter()
-            .fold(0.0, |m: f64, &v| if v.abs() > m.abs() { v } else { m });
+        let extreme = axis.direction.iter().fold(0.0, |m: f64, &v| if v.abs() > m.abs() { v } else { m });
         let scale = extreme.signum() / dot(&axis.direction, &axis.direction).sqrt();
         axis.direction.iter_mut().for_each(|v| *v *= scale);
     }
@@ -70,9 +58,7 @@ pub(crate) fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
 /// Eigenvalues and eigenvectors of a symmetric matrix, in no order; the matrix is used up.
 fn eigen(a: &mut [Vec<f64>]) -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = a.len();
-    let mut vectors: Vec<Vec<f64>> = (0..n)
-        .map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect())
-        .collect();
+    let mut vectors: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
     let trace: f64 = (0..n).map(|i| a[i][i].abs()).sum();
     for _ in 0..SWEEPS {
         let mut off = 0.0;
@@ -131,11 +117,7 @@ mod tests {
     fn rows(count: usize, dims: usize, seed: u64) -> Vec<Vec<f64>> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut rows: Vec<Vec<f64>> = (0..count)
-            .map(|_| {
-                (0..dims)
-                    .map(|k| f64::from(rng.next_u32() >> 16) / count_as_f64(k + 1))
-                    .collect()
-            })
+            .map(|_| (0..dims).map(|k| f64::from(rng.next_u32() >> 16) / count_as_f64(k + 1)).collect())
             .collect();
         for k in 0..dims {
             let mean = rows.iter().map(|r| r[k]).sum::<f64>() / count_as_f64(count);
@@ -151,13 +133,7 @@ mod tests {
             let axes = principal_axes(&rows);
             let y = nalgebra::DMatrix::from_fn(count, dims, |i, j| rows[i][j]);
             let covariance = y.transpose() * &y / (count_as_f64(count) - 1.0);
-            let mut oracle: Vec<f64> = covariance
-                .clone()
-                .symmetric_eigen()
-                .eigenvalues
-                .iter()
-                .copied()
-                .collect();
+            let mut oracle: Vec<f64> = covariance.clone().symmetric_eigen().eigenvalues.iter().copied().collect();
             oracle.sort_by(|a, b| b.total_cmp(a));
             assert_eq!(axes.len(), dims.min(count - 1));
             for (axis, value) in axes.iter().zip(&oracle) {

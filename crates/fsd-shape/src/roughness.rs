@@ -26,17 +26,11 @@ impl Fine {
     pub(crate) fn new(deviations: &[Vec<f64>], harmonics: usize) -> Option<Self> {
         let coarse = finest_coarse(harmonics);
         let detail = |(k, &v): (usize, &f64)| if order(k, harmonics) > coarse { v } else { 0.0 };
-        let details: Vec<Vec<f64>> = deviations
-            .iter()
-            .map(|row| row.iter().enumerate().map(detail).collect())
-            .collect();
+        let details: Vec<Vec<f64>> =
+            deviations.iter().map(|row| row.iter().enumerate().map(detail).collect()).collect();
         let energies: Vec<f64> = details.iter().map(|row| dot(row, row)).collect();
         let there = energies.iter().all(|&e| e > 0.0);
-        there.then_some(Self {
-            harmonics,
-            details,
-            energies,
-        })
+        there.then_some(Self { harmonics, details, energies })
     }
 
     /// Spread of the logarithm of a shape's root-mean-square detail, beyond what chance gives draws without roughness.
@@ -50,31 +44,17 @@ impl Fine {
         let loadings: Vec<Vec<f64>> = of
             .components
             .iter()
-            .map(|c| {
-                c.loading
-                    .iter()
-                    .enumerate()
-                    .map(|(k, &v)| if is_fine(k) { v } else { 0.0 })
-                    .collect()
-            })
+            .map(|c| c.loading.iter().enumerate().map(|(k, &v)| if is_fine(k) { v } else { 0.0 }).collect())
             .collect();
         let mut residual = of.residual_squares();
-        residual
-            .iter_mut()
-            .enumerate()
-            .filter(|&(k, _)| !is_fine(k))
-            .for_each(|(_, v)| *v = 0.0);
+        residual.iter_mut().enumerate().filter(|&(k, _)| !is_fine(k)).for_each(|(_, v)| *v = 0.0);
         let mut mean: f64 = residual.iter().sum();
         let mut variance = 2.0 * dot(&residual, &residual);
         for (k, a) in loadings.iter().enumerate() {
             let square = dot(a, a);
             mean += square;
             variance += 2.0 * square * square;
-            variance += a
-                .iter()
-                .zip(&residual)
-                .map(|(v, r)| 4.0 * v * v * r)
-                .sum::<f64>();
+            variance += a.iter().zip(&residual).map(|(v, r)| 4.0 * v * v * r).sum::<f64>();
             for b in &loadings[..k] {
                 let product = dot(a, b);
                 variance += 4.0 * product * product;
@@ -116,7 +96,8 @@ const GREATEST_GROWTH: f64 = 2.5;
 /// Fewest harmonics at which roughness can vary along the outline.
 pub(crate) const LEAST_FOR_LOCAL: usize = 16;
 
-/// Highest |l| that counts as form, not as detail: a fifth of the harmonics, which is where the spectra of real outlines change from corners and notches to crenulation.
+/// Highest |l| that counts as form, not as detail: a fifth of the harmonics. Of 40 that is 8, up to where the components explain
+/// outlines of cells; beyond, the residual does.
 pub(crate) fn finest_coarse(harmonics: usize) -> usize {
     (harmonics / 5).max(1)
 }

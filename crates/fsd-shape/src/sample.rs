@@ -73,9 +73,7 @@ impl Bend {
         }
         let [b, c, d] = p;
         let left = Self::errors(p, skewness, excess_kurtosis);
-        left.iter()
-            .all(|e| e.abs() < TOLERANCE)
-            .then_some(Self { b, c, d })
+        left.iter().all(|e| e.abs() < TOLERANCE).then_some(Self { b, c, d })
     }
 
     pub(crate) fn apply(self, z: f64) -> f64 {
@@ -105,9 +103,7 @@ impl Bend {
             [
                 24.0 * (d + c * c * (2.0 * b + 28.0 * d) + 48.0 * d * d * d),
                 48.0 * (c * (1.0 + b * b + 28.0 * b * d) + 141.0 * c * d * d),
-                24.0 * (b
-                    + 28.0 * b * c * c
-                    + d * (24.0 + 144.0 * b * d + 282.0 * c * c + 900.0 * d * d)),
+                24.0 * (b + 28.0 * b * c * c + d * (24.0 + 144.0 * b * d + 282.0 * c * c + 900.0 * d * d)),
             ],
         ]
     }
@@ -116,8 +112,7 @@ impl Bend {
 /// x with Mx = y, by Cramer's rule.
 fn solve(m: [[f64; 3]; 3], y: [f64; 3]) -> Option<[f64; 3]> {
     let determinant = |m: [[f64; 3]; 3]| {
-        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
-            - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
             + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
     };
     let whole = determinant(m);
@@ -140,20 +135,9 @@ mod tests {
     fn moments(values: &[f64]) -> [f64; 4] {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
-        let central = |k: usize| {
-            values
-                .iter()
-                .map(|v| [v - mean; 4][..k].iter().product::<f64>())
-                .sum::<f64>()
-                / n
-        };
+        let central = |k: usize| values.iter().map(|v| [v - mean; 4][..k].iter().product::<f64>()).sum::<f64>() / n;
         let var = central(2);
-        [
-            mean,
-            var,
-            central(3) / (var * var.sqrt()),
-            central(4) / (var * var) - 3.0,
-        ]
+        [mean, var, central(3) / (var * var.sqrt()), central(4) / (var * var) - 3.0]
     }
 
     #[test]
@@ -189,13 +173,7 @@ mod tests {
     #[test]
     fn bent_normals_have_the_moments_asked_for() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xBE4D);
-        for (skewness, kurtosis) in [
-            (-1.5, 3.4),
-            (1.6, 7.0),
-            (0.0, 5.0),
-            (0.6, -0.3),
-            (0.0, -1.0),
-        ] {
+        for (skewness, kurtosis) in [(-1.5, 3.4), (1.6, 7.0), (0.0, 5.0), (0.6, -0.3), (0.0, -1.0)] {
             let bend = Bend::new(skewness, kurtosis).unwrap();
             let mut normals = Normals::new(&mut rng);
             let values: Vec<f64> = (0..400_000).map(|_| bend.apply(normals.draw())).collect();
@@ -203,10 +181,7 @@ mod tests {
             assert!(mean.abs() < 4.0 / 400_000_f64.sqrt());
             assert!((var - 1.0).abs() < 0.03, "{var}");
             assert!((skew - skewness).abs() < 0.1, "{skew} for {skewness}");
-            assert!(
-                (excess - kurtosis).abs() < 0.15 * (1.0 + kurtosis.abs()),
-                "{excess} for {kurtosis}"
-            );
+            assert!((excess - kurtosis).abs() < 0.15 * (1.0 + kurtosis.abs()), "{excess} for {kurtosis}");
         }
     }
 
@@ -217,10 +192,7 @@ mod tests {
             let least = Bend::least_kurtosis(skewness);
             for k in 0..=20 {
                 let kurtosis = least + (12.0 - least) * f64::from(k) / 20.0;
-                assert!(
-                    Bend::new(skewness, kurtosis).is_some(),
-                    "{skewness} {kurtosis}"
-                );
+                assert!(Bend::new(skewness, kurtosis).is_some(), "{skewness} {kurtosis}");
             }
         }
         assert!(Bend::new(3.0, 0.0).is_none());

@@ -81,29 +81,22 @@ impl PrincipalComponent {
     /// The bend of a normal that gives its score.
     pub(crate) fn bend(&self) -> Option<Bend> {
         let kurtosis = Bend::least_kurtosis(self.skewness)..=Self::MOST_KURTOSIS;
-        let possible =
-            self.skewness.abs() <= Self::MOST_SKEWNESS && kurtosis.contains(&self.excess_kurtosis);
-        possible
-            .then(|| Bend::new(self.skewness, self.excess_kurtosis))
-            .flatten()
+        let possible = self.skewness.abs() <= Self::MOST_SKEWNESS && kurtosis.contains(&self.excess_kurtosis);
+        possible.then(|| Bend::new(self.skewness, self.excess_kurtosis)).flatten()
     }
 }
 
 impl ShapeStatistics {
     /// The same statistics with every number rounded to `digits` significant decimal digits (1..=17), so that they print short.
     ///
-    /// Five digits change drawn outlines by less than a thousandth of a pixel per 100 px of radius.
+    /// Five digits change drawn outlines by less than a hundredth of a pixel per 100 px of radius.
     ///
     /// # Errors
     ///
     /// If `digits` is 0 or above 17.
     pub fn rounded(&self, digits: usize) -> Result<Self, Error> {
         if !(1..=17).contains(&digits) {
-            return Err(Error::Parameter {
-                field: "digits",
-                value: count_as_f64(digits),
-                accepted: "1..=17",
-            });
+            return Err(Error::Parameter { field: "digits", value: count_as_f64(digits), accepted: "1..=17" });
         }
         let round = |v: f64| round_to(v, digits);
         let all = |values: &[f64]| values.iter().map(|&v| round(v)).collect();
@@ -162,10 +155,7 @@ impl ShapeStatistics {
     /// Whether the numbers fit together.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
-            return wrong(
-                "harmonics",
-                format!("is {}; accepted: 1..={MOST_HARMONICS}", self.harmonics),
-            );
+            return wrong("harmonics", format!("is {}; accepted: 1..={MOST_HARMONICS}", self.harmonics));
         }
         check_number("ln_radius_mean", self.ln_radius_mean, -100.0, 100.0)?;
         check_number("ln_radius_sd", self.ln_radius_sd, 0.0, 10.0)?;
@@ -190,17 +180,11 @@ impl ShapeStatistics {
 
     fn check_vector(&self, field: &'static str, values: &[f64], least: f64) -> Result<(), Error> {
         if values.len() != self.coordinates() {
-            let problem = format!(
-                "has {} numbers; {} harmonics need {}",
-                values.len(),
-                self.harmonics,
-                self.coordinates()
-            );
+            let problem =
+                format!("has {} numbers; {} harmonics need {}", values.len(), self.harmonics, self.coordinates());
             return wrong(field, problem);
         }
-        values
-            .iter()
-            .try_for_each(|&v| check_number(field, v, least, f64::MAX))
+        values.iter().try_for_each(|&v| check_number(field, v, least, f64::MAX))
     }
 }
 
@@ -208,16 +192,8 @@ fn check_number(field: &'static str, value: f64, least: f64, most: f64) -> Resul
     if (least..=most).contains(&value) {
         return Ok(());
     }
-    let least = if least == f64::MIN {
-        "any".to_owned()
-    } else {
-        least.to_string()
-    };
-    let most = if most == f64::MAX {
-        "finite".to_owned()
-    } else {
-        most.to_string()
-    };
+    let least = if least == f64::MIN { "any".to_owned() } else { least.to_string() };
+    let most = if most == f64::MAX { "finite".to_owned() } else { most.to_string() };
     wrong(field, format!("holds {value}; accepted: {least}..={most}"))
 }
 

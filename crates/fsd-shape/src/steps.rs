@@ -35,10 +35,7 @@ pub(crate) fn from_steps(coordinates: &mut [f64]) {
     for m in pairs(coordinates) {
         let (high, low) = places(coordinates, m);
         let (up, down) = (count_as_f64(m) + 1.0, 1.0 - count_as_f64(m));
-        let (direction, step) = (
-            [coordinates[high], coordinates[high + 1]],
-            [coordinates[low], coordinates[low + 1]],
-        );
+        let (direction, step) = ([coordinates[high], coordinates[high + 1]], [coordinates[low], coordinates[low + 1]]);
         coordinates[high] = (step[0] - direction[1]) / up;
         coordinates[high + 1] = (step[1] + direction[0]) / up;
         coordinates[low] = (step[0] + direction[1]) / down;
@@ -51,10 +48,7 @@ pub(crate) fn squares_from_steps(squares: &mut [f64]) {
     for m in pairs(squares) {
         let (high, low) = places(squares, m);
         let (up, down) = (count_as_f64(m) + 1.0, 1.0 - count_as_f64(m));
-        let (direction, step) = (
-            [squares[high], squares[high + 1]],
-            [squares[low], squares[low + 1]],
-        );
+        let (direction, step) = ([squares[high], squares[high + 1]], [squares[low], squares[low + 1]]);
         let (re, im) = (step[0] + direction[1], step[1] + direction[0]);
         squares[high] = re / (up * up);
         squares[high + 1] = im / (up * up);
@@ -83,19 +77,12 @@ mod tests {
     #[test]
     fn there_and_back() {
         for harmonics in [1, 3, 4, 5, 12] {
-            let before: Vec<f64> = (0..4 * harmonics)
-                .map(|k| libm::sin(count_as_f64(k * k)))
-                .collect();
+            let before: Vec<f64> = (0..4 * harmonics).map(|k| libm::sin(count_as_f64(k * k))).collect();
             let mut after = before.clone();
             to_steps(&mut after);
             assert_eq!(after == before, harmonics < 4);
             from_steps(&mut after);
-            assert!(
-                after
-                    .iter()
-                    .zip(&before)
-                    .all(|(a, b)| (a - b).abs() < 1e-14)
-            );
+            assert!(after.iter().zip(&before).all(|(a, b)| (a - b).abs() < 1e-14));
         }
     }
 
@@ -107,13 +94,9 @@ mod tests {
             coordinates[place_of(harmonics, 5)] = 0.01;
             from_steps(&mut coordinates);
             coordinates[2 * harmonics] = 1.0;
-            let outline = Descriptors::from_harmonics(terms(&coordinates))
-                .unwrap()
-                .outline(2000);
+            let outline = Descriptors::from_harmonics(terms(&coordinates)).unwrap().outline(2000);
             let steps: Vec<f64> = edges(&outline).map(|(p, q)| distance(p, q)).collect();
-            let (low, high) = steps
-                .iter()
-                .fold((f64::MAX, 0.0_f64), |(l, h), &s| (l.min(s), h.max(s)));
+            let (low, high) = steps.iter().fold((f64::MAX, 0.0_f64), |(l, h), &s| (l.min(s), h.max(s)));
             high / low - 1.0
         };
         let direction = spread(|h, m| 2 * (h + m));

@@ -27,10 +27,7 @@ use crate::outline::{Point, signed_area};
 /// ```
 pub fn trace(mask: &[f32], width: usize, level: f32) -> Result<Vec<Point>, Error> {
     if width == 0 || !mask.len().is_multiple_of(width) {
-        return Err(Error::MaskSize {
-            len: mask.len(),
-            width,
-        });
+        return Err(Error::MaskSize { len: mask.len(), width });
     }
     if !(level.is_finite() && level > 0.0) {
         return Err(Error::Parameter {
@@ -40,11 +37,7 @@ pub fn trace(mask: &[f32], width: usize, level: f32) -> Result<Vec<Point>, Error
         });
     }
     if let Some(i) = mask.iter().position(|v| !v.is_finite()) {
-        return Err(Error::MaskValue {
-            value: mask[i],
-            x: i % width,
-            y: i / width,
-        });
+        return Err(Error::MaskValue { value: mask[i], x: i % width, y: i / width });
     }
     let field = Field { mask, width, level };
     // Every loop, outer or hole, somewhere runs upwards past the west side of an inside pixel: each such place starts a loop or lies on one walked before.
@@ -86,9 +79,7 @@ struct Field<'a> {
 impl Field<'_> {
     fn at(&self, [x, y]: Pixel) -> f32 {
         match (usize::try_from(x), usize::try_from(y)) {
-            (Ok(x), Ok(y)) if x < self.width => {
-                self.mask.get(y * self.width + x).copied().unwrap_or(0.0)
-            }
+            (Ok(x), Ok(y)) if x < self.width => self.mask.get(y * self.width + x).copied().unwrap_or(0.0),
             _ => 0.0,
         }
     }
@@ -110,10 +101,7 @@ impl Field<'_> {
     /// The walker stands between an outside pixel at its left hand and an inside pixel at its right, and looks at the two
     /// pixels ahead of these: both outside, it turns right; both inside, left; else straight on, or at a saddle as the mean says.
     fn walk(&self, start: usize, seen: &mut [bool]) -> Vec<Point> {
-        #[expect(
-            clippy::cast_possible_wrap,
-            reason = "no image has 2^63 columns or rows"
-        )]
+        #[expect(clippy::cast_possible_wrap, reason = "no image has 2^63 columns or rows")]
         let first: Pixel = [(start % self.width) as isize, (start / self.width) as isize];
         let (mut left, mut right) = ([first[0] - 1, first[1]], first);
         let mut points: Vec<Point> = Vec::new();
@@ -137,8 +125,7 @@ impl Field<'_> {
                 (true, true) => right = ahead_left,
                 (false, true) => (left, right) = (ahead_left, ahead_right),
                 (true, false) => {
-                    let sum =
-                        self.at(left) + self.at(right) + self.at(ahead_left) + self.at(ahead_right);
+                    let sum = self.at(left) + self.at(right) + self.at(ahead_left) + self.at(ahead_right);
                     if sum / 4.0 >= self.level {
                         right = ahead_left;
                     } else {

@@ -5,10 +5,7 @@ mod support;
 
 use std::f64::consts::{PI, TAU};
 
-use fsd_shape::{
-    Error, Point, Rng, centroid, circularity, perimeter, resample, self_intersects, signed_area,
-    trace,
-};
+use fsd_shape::{Error, Point, Rng, centroid, circularity, perimeter, resample, self_intersects, signed_area, trace};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
@@ -29,11 +26,10 @@ fn regular(corners: usize, radius: f64) -> Vec<Point> {
 fn disc(width: usize, height: usize, centre: Point, radius: f64) -> Vec<f32> {
     (0..width * height)
         .map(|i| {
-            let (dx, dy) = (
-                (i % width) as f64 - centre[0],
-                (i / width) as f64 - centre[1],
-            );
-            ((radius - (dx * dx + dy * dy).sqrt()) / 4.0 + 0.5).clamp(0.0, 1.0) as f32
+            let (dx, dy) = ((i % width) as f64 - centre[0], (i / width) as f64 - centre[1]);
+            #[expect(clippy::cast_possible_truncation, reason = "a mask is f32")]
+            let value = ((radius - (dx * dx + dy * dy).sqrt()) / 4.0 + 0.5).clamp(0.0, 1.0) as f32;
+            value
         })
         .collect()
 }
@@ -43,8 +39,7 @@ fn a_disc_is_traced_to_a_fraction_of_a_pixel() {
     let centre = [20.3, 17.8];
     let outline = trace(&disc(43, 39, centre, 12.0), 43, 0.5).unwrap();
     for p in &outline {
-        let r = ((p[0] - centre[0]) * (p[0] - centre[0]) + (p[1] - centre[1]) * (p[1] - centre[1]))
-            .sqrt();
+        let r = ((p[0] - centre[0]) * (p[0] - centre[0]) + (p[1] - centre[1]) * (p[1] - centre[1])).sqrt();
         assert!((r - 12.0).abs() < 0.03, "{r}");
     }
     assert!((signed_area(&outline) - PI * 144.0).abs() < 1.0);
@@ -70,63 +65,33 @@ fn tracing_knows_the_smallest_masks_and_the_border() {
 fn holes_are_ignored_and_diagonals_join() {
     let mut ring = vec![1.0; 49];
     ring[24] = 0.0;
-    assert_eq!(
-        trace(&ring, 7, 0.5).unwrap(),
-        trace(&[1.0; 49], 7, 0.5).unwrap()
-    );
+    assert_eq!(trace(&ring, 7, 0.5).unwrap(), trace(&[1.0; 49], 7, 0.5).unwrap());
     let diagonal = [1.0, 0.0, 0.0, 1.0];
     let outline = trace(&diagonal, 2, 0.5).unwrap();
     assert_eq!(outline.len(), 8);
     assert!(!self_intersects(&outline));
     // A weaker bridge than the level parts them.
-    assert_eq!(
-        trace(&diagonal, 2, 0.6),
-        Err(Error::SeveralComponents { count: 2 })
-    );
+    assert_eq!(trace(&diagonal, 2, 0.6), Err(Error::SeveralComponents { count: 2 }));
 }
 
 #[test]
 fn tracing_refuses_what_has_no_single_outline() {
-    assert_eq!(
-        trace(&[0.0; 12], 4, 0.5),
-        Err(Error::EmptyMask { level: 0.5 })
-    );
+    assert_eq!(trace(&[0.0; 12], 4, 0.5), Err(Error::EmptyMask { level: 0.5 }));
     assert_eq!(trace(&[], 4, 0.5), Err(Error::EmptyMask { level: 0.5 }));
-    assert_eq!(
-        trace(&[1.0, 0.0, 1.0, 0.0, 1.0], 5, 0.5),
-        Err(Error::SeveralComponents { count: 3 })
-    );
+    assert_eq!(trace(&[1.0, 0.0, 1.0, 0.0, 1.0], 5, 0.5), Err(Error::SeveralComponents { count: 3 }));
     // An island in a hole counts.
     let mut island = vec![1.0; 49];
     for y in 2..5 {
         island[y * 7 + 2..y * 7 + 5].fill(0.0);
     }
     island[24] = 1.0;
-    assert_eq!(
-        trace(&island, 7, 0.5),
-        Err(Error::SeveralComponents { count: 2 })
-    );
-    assert_eq!(
-        trace(&[1.0; 5], 2, 0.5),
-        Err(Error::MaskSize { len: 5, width: 2 })
-    );
-    assert_eq!(
-        trace(&[1.0; 5], 0, 0.5),
-        Err(Error::MaskSize { len: 5, width: 0 })
-    );
-    assert!(matches!(
-        trace(&[1.0, f32::NAN], 2, 0.5),
-        Err(Error::MaskValue { x: 1, y: 0, .. })
-    ));
-    assert!(matches!(
-        trace(&[f32::INFINITY], 1, 0.5),
-        Err(Error::MaskValue { .. })
-    ));
+    assert_eq!(trace(&island, 7, 0.5), Err(Error::SeveralComponents { count: 2 }));
+    assert_eq!(trace(&[1.0; 5], 2, 0.5), Err(Error::MaskSize { len: 5, width: 2 }));
+    assert_eq!(trace(&[1.0; 5], 0, 0.5), Err(Error::MaskSize { len: 5, width: 0 }));
+    assert!(matches!(trace(&[1.0, f32::NAN], 2, 0.5), Err(Error::MaskValue { x: 1, y: 0, .. })));
+    assert!(matches!(trace(&[f32::INFINITY], 1, 0.5), Err(Error::MaskValue { .. })));
     for level in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(
-            trace(&[1.0], 1, level),
-            Err(Error::Parameter { field: "level", .. })
-        ));
+        assert!(matches!(trace(&[1.0], 1, level), Err(Error::Parameter { field: "level", .. })));
     }
 }
 
@@ -157,9 +122,7 @@ fn components_agree_with_a_flood_fill() {
     let mut rng = rng(0xF100D);
     for round in 0..400 {
         let width = 3 + (round % 7);
-        let mask: Vec<f32> = (0..width * 6)
-            .map(|_| if rng.next_u32() % 100 < 45 { 1.0 } else { 0.0 })
-            .collect();
+        let mask: Vec<f32> = (0..width * 6).map(|_| if rng.next_u32() % 100 < 45 { 1.0 } else { 0.0 }).collect();
         let counted = match trace(&mask, width, 0.5) {
             Ok(outline) => {
                 assert!(signed_area(&outline) > 0.0);
@@ -176,12 +139,7 @@ fn components_agree_with_a_flood_fill() {
 
 #[test]
 fn an_image_buffer_is_a_mask() {
-    let buffer = image::ImageBuffer::<image::Luma<f32>, Vec<f32>>::from_vec(
-        9,
-        9,
-        disc(9, 9, [4.0, 4.0], 2.0),
-    )
-    .unwrap();
+    let buffer = image::ImageBuffer::<image::Luma<f32>, Vec<f32>>::from_vec(9, 9, disc(9, 9, [4.0, 4.0], 2.0)).unwrap();
     assert!(trace(&buffer, 9, 0.5).is_ok());
 }
 
@@ -192,15 +150,7 @@ fn measures_of_a_square() {
     assert_eq!(perimeter(&square), 12.0);
     assert_eq!(centroid(&square), [2.5, 3.5]);
     assert!((circularity(&square) - PI / 4.0).abs() < 1e-15);
-    assert_eq!(
-        (
-            signed_area(&[]),
-            perimeter(&[]),
-            circularity(&[]),
-            centroid(&[])
-        ),
-        (0.0, 0.0, 0.0, [0.0, 0.0])
-    );
+    assert_eq!((signed_area(&[]), perimeter(&[]), circularity(&[]), centroid(&[])), (0.0, 0.0, 0.0, [0.0, 0.0]));
     assert_eq!(centroid(&[[0.0, 0.0], [2.0, 0.0]]), [1.0, 0.0]);
     assert!(circularity(&regular(1000, 3.0)) > 0.999_99);
 }
@@ -236,28 +186,10 @@ fn resampling_takes_any_outline() {
     assert!(resample(&[], 5).is_empty());
     assert!(resample(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0).is_empty());
     assert_eq!(resample(&[[2.0, 3.0]], 3), [[2.0, 3.0]; 3]);
-    let doubled = [
-        [0.0, 0.0],
-        [0.0, 0.0],
-        [2.0, 0.0],
-        [2.0, 2.0],
-        [2.0, 2.0],
-        [0.0, 2.0],
-    ];
-    assert_eq!(
-        resample(&doubled, 4),
-        [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
-    );
+    let doubled = [[0.0, 0.0], [0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [2.0, 2.0], [0.0, 2.0]];
+    assert_eq!(resample(&doubled, 4), [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
     // A needle narrower than the spacing cannot have equal chords: the best is returned, in order.
-    let needle = [
-        [0.0, 0.0],
-        [10.0, 0.0],
-        [10.0, 30.0],
-        [10.1, 0.0],
-        [20.0, 0.0],
-        [20.0, 10.0],
-        [0.0, 10.0],
-    ];
+    let needle = [[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [10.1, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0]];
     assert_eq!(resample(&needle, 12).len(), 12);
 }
 
@@ -265,18 +197,11 @@ fn resampling_takes_any_outline() {
 fn brute(points: &[Point]) -> bool {
     let n = points.len();
     let side = |a: Point, b: Point, c: Point| {
-        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-            .partial_cmp(&0.0)
-            .unwrap() as i32
+        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).partial_cmp(&0.0).unwrap() as i32
     };
     (0..n).any(|i| {
         (i + 2..n).filter(|j| (j + 1) % n != i).any(|j| {
-            let (a, b, c, d) = (
-                points[i],
-                points[(i + 1) % n],
-                points[j],
-                points[(j + 1) % n],
-            );
+            let (a, b, c, d) = (points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]);
             side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0
         })
     })
@@ -291,12 +216,7 @@ fn crossing_agrees_with_every_pair() {
         let wild = if round % 3 == 0 { 1.0 } else { 1.6 / n as f64 };
         let points: Vec<Point> = regular(n, 1.0)
             .iter()
-            .map(|p| {
-                [
-                    p[0] + wild * support::sway(&mut rng),
-                    p[1] + wild * support::sway(&mut rng),
-                ]
-            })
+            .map(|p| [p[0] + wild * support::sway(&mut rng), p[1] + wild * support::sway(&mut rng)])
             .collect();
         let expected = brute(&points);
         crossing += usize::from(expected);
@@ -308,47 +228,18 @@ fn crossing_agrees_with_every_pair() {
 #[test]
 fn touching_counts_as_crossing() {
     // A vertex on another edge, an edge run twice, a spike, too few points, a stray NaN.
-    assert!(self_intersects(&[
-        [0.0, 0.0],
-        [4.0, 0.0],
-        [4.0, 4.0],
-        [2.0, 0.0],
-        [0.0, 4.0]
-    ]));
-    assert!(self_intersects(&[
-        [0.0, 0.0],
-        [2.0, 0.0],
-        [4.0, 0.0],
-        [4.0, 1.0],
-        [3.0, 0.0],
-        [1.0, 0.0],
-        [0.0, 3.0]
-    ]));
-    assert!(self_intersects(&[
-        [0.0, 0.0],
-        [2.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 2.0]
-    ]));
+    assert!(self_intersects(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 0.0], [0.0, 4.0]]));
+    assert!(self_intersects(&[[0.0, 0.0], [2.0, 0.0], [4.0, 0.0], [4.0, 1.0], [3.0, 0.0], [1.0, 0.0], [0.0, 3.0]]));
+    assert!(self_intersects(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 2.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [1.0, 0.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [1.0, f64::NAN], [1.0, 1.0]]));
     // Repeated points and straight runs are harmless.
-    assert!(!self_intersects(&[
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 0.0],
-        [2.0, 0.0],
-        [2.0, 2.0],
-        [0.0, 0.0]
-    ]));
+    assert!(!self_intersects(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 0.0]]));
 }
 
 #[test]
 fn crossing_takes_flat_and_lopsided_outlines() {
-    let sliver: Vec<Point> = (0..1000)
-        .map(|k| [f64::from(k), 0.0])
-        .chain([[500.0, 1e-9]])
-        .collect();
+    let sliver: Vec<Point> = (0..1000).map(|k| [f64::from(k), 0.0]).chain([[500.0, 1e-9]]).collect();
     assert!(!self_intersects(&sliver));
     // Two long edges among a thousand short ones.
     let mut comet = regular(1000, 1e-3);

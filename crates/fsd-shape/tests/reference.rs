@@ -5,10 +5,7 @@ mod support;
 
 use std::path::PathBuf;
 
-use fsd_shape::{
-    Descriptors, Point, ShapeModel, ShapeModelParams, Spread, circularity, resample,
-    self_intersects,
-};
+use fsd_shape::{Descriptors, Point, ShapeModel, ShapeModelParams, Spread, circularity, resample, self_intersects};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
@@ -19,10 +16,7 @@ const NAMES: [&str; 4] = ["circularity", "|u-1|", "|u2|", "|u3|"];
 /// None, with a message, where there is no reference material; on a build server there must be.
 fn outlines() -> Option<Vec<Vec<Point>>> {
     let Some(folder) = std::env::var_os("PAPSYNTH_REFERENCE") else {
-        assert!(
-            std::env::var("CI").as_deref() != Ok("true"),
-            "PAPSYNTH_REFERENCE is not set"
-        );
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "PAPSYNTH_REFERENCE is not set");
         eprintln!("skipped: PAPSYNTH_REFERENCE is not set");
         return None;
     };
@@ -33,29 +27,16 @@ fn outlines() -> Option<Vec<Vec<Point>>> {
 fn measure(descriptors: &Descriptors) -> [f64; 4] {
     let shape = descriptors.truncated(HARMONICS).normalised();
     let roundness = circularity(&shape.outline(1024));
-    [
-        roundness,
-        shape.magnitude(-1),
-        shape.magnitude(2),
-        shape.magnitude(3),
-    ]
+    [roundness, shape.magnitude(-1), shape.magnitude(2), shape.magnitude(3)]
 }
 
 fn columns(rows: &[[f64; 4]]) -> [(f64, f64); 4] {
-    std::array::from_fn(|k| {
-        support::mean_and_sd(&rows.iter().map(|row| row[k]).collect::<Vec<_>>())
-    })
+    std::array::from_fn(|k| support::mean_and_sd(&rows.iter().map(|row| row[k]).collect::<Vec<_>>()))
 }
 
 fn real(outlines: &[Vec<Point>]) -> [(f64, f64); 4] {
-    let describe =
-        |outline: &Vec<Point>| Descriptors::from_outline(&resample(outline, 1024)).unwrap();
-    columns(
-        &outlines
-            .iter()
-            .map(|outline| measure(&describe(outline)))
-            .collect::<Vec<_>>(),
-    )
+    let describe = |outline: &Vec<Point>| Descriptors::from_outline(&resample(outline, 1024)).unwrap();
+    columns(&outlines.iter().map(|outline| measure(&describe(outline))).collect::<Vec<_>>())
 }
 
 /// Statistics of the draws, and the share of tries rejected.
@@ -72,10 +53,7 @@ fn drawn(outlines: &[Vec<Point>], params: &ShapeModelParams, draws: u32) -> ([(f
         assert!(!self_intersects(&draw.descriptors.outline(points)));
         rows.push(measure(&draw.descriptors));
     }
-    (
-        columns(&rows),
-        f64::from(rejected) / f64::from(rejected + draws),
-    )
+    (columns(&rows), f64::from(rejected) / f64::from(rejected + draws))
 }
 
 #[test]
@@ -85,14 +63,8 @@ fn the_default_reproduces_real_cytoplasm() {
     let (drawn, rejected) = drawn(&outlines, &ShapeModelParams::default(), DRAWS);
     for (name, ((mean, sd), (real_mean, real_sd))) in NAMES.iter().zip(drawn.iter().zip(&real)) {
         let error = real_sd / (outlines.len() as f64).sqrt();
-        assert!(
-            (mean - real_mean).abs() < 2.5 * error,
-            "{name}: mean {mean} for {real_mean} ± {error}"
-        );
-        assert!(
-            (sd / real_sd - 1.0).abs() < 0.15,
-            "{name}: spread {sd} for {real_sd}"
-        );
+        assert!((mean - real_mean).abs() < 2.5 * error, "{name}: mean {mean} for {real_mean} ± {error}");
+        assert!((sd / real_sd - 1.0).abs() < 0.15, "{name}: spread {sd} for {real_sd}");
     }
     assert!(rejected < 0.01, "{rejected}");
 }
@@ -112,15 +84,8 @@ fn the_papers_model_is_too_round_and_crosses_itself() {
 fn stored_statistics_are_small() {
     let Some(outlines) = outlines() else { return };
     for spread in [Spread::Independent, ShapeModelParams::default().spread] {
-        let params = ShapeModelParams {
-            harmonics: HARMONICS,
-            spread,
-        };
-        let statistics = ShapeModel::fit(&outlines, &params)
-            .unwrap()
-            .statistics()
-            .rounded(5)
-            .unwrap();
+        let params = ShapeModelParams { harmonics: HARMONICS, spread };
+        let statistics = ShapeModel::fit(&outlines, &params).unwrap().statistics().rounded(5).unwrap();
         // A number of five digits prints in about as many characters as in JSON.
         let length: usize = statistics
             .components

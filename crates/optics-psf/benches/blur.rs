@@ -7,9 +7,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 fn noise(len: usize) -> Vec<f32> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-    (0..len)
-        .map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0)
-        .collect()
+    (0..len).map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0).collect()
 }
 
 fn frame(c: &mut Criterion) {
@@ -25,9 +23,7 @@ fn frame(c: &mut Criterion) {
             }
             let gaussian = Gaussian::with_method(sigma, method).expect("a finite width");
             group.bench_function(BenchmarkId::new(format!("{method:?}"), sigma), |b| {
-                b.iter(|| {
-                    gaussian.blur_into(&image, width, Border::Reflect, &mut dst, &mut scratch)
-                });
+                b.iter(|| gaussian.blur_into(&image, width, Border::Reflect, &mut dst, &mut scratch));
             });
         }
     }

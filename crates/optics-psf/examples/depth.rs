@@ -17,9 +17,7 @@ const DEPTHS_UM: [f64; 5] = [0.0, 1.0, 2.0, 4.0, 8.0];
 const ABSORBANCE: f32 = 0.5;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "target/depth.png".to_owned());
+    let path = std::env::args().nth(1).unwrap_or_else(|| "target/depth.png".to_owned());
     let focus = DepthOfFocus::new(&FocusParams::paper())?;
     let disc = notched_disc();
     let mut picture = vec![255; PANEL * DEPTHS_UM.len() * 2 * PANEL];
@@ -29,9 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let light = Gaussian::new(focus.sigma_xy_px())?.blur(&light, PANEL, Default::default());
         let row_of = |y| y * PANEL * DEPTHS_UM.len() + i * PANEL;
         for (y, row) in light.chunks(PANEL).enumerate() {
-            row.iter()
-                .enumerate()
-                .for_each(|(x, &v)| picture[row_of(y) + x] = grey(v));
+            row.iter().enumerate().for_each(|(x, &v)| picture[row_of(y) + x] = grey(v));
         }
         let height = |y: usize| usize::from(255 - grey(light[y * PANEL + SLITS])) * 3 / 4;
         for y in 1..PANEL {
@@ -41,9 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let (width, height) = (PANEL * DEPTHS_UM.len(), 2 * PANEL);
     let picture = GrayImage::from_raw(u32::try_from(width)?, u32::try_from(height)?, picture);
-    picture
-        .ok_or("the picture has the wrong size")?
-        .save(path)?;
+    picture.ok_or("the picture has the wrong size")?.save(path)?;
     Ok(())
 }
 
@@ -53,15 +47,9 @@ fn notched_disc() -> Vec<f32> {
     let pixel = |i: usize| {
         let (x, y) = ((i % TILE) as f32 - centre, (i / TILE) as f32 - centre);
         let inside = (centre - 4.0 - (x * x + y * y).sqrt() + 0.5).clamp(0.0, 1.0);
-        let slit = [
-            (-27.0, 1.0),
-            (-16.0, 2.0),
-            (-3.0, 3.0),
-            (11.0, 4.0),
-            (25.0, 5.0),
-        ]
-        .iter()
-        .any(|(top, thickness)| y > *top && y <= top + thickness && x < 12.0);
+        let slit = [(-27.0, 1.0), (-16.0, 2.0), (-3.0, 3.0), (11.0, 4.0), (25.0, 5.0)]
+            .iter()
+            .any(|(top, thickness)| y > *top && y <= top + thickness && x < 12.0);
         if slit { 0.0 } else { ABSORBANCE * inside }
     };
     (0..TILE * TILE).map(pixel).collect()
@@ -71,24 +59,14 @@ fn notched_disc() -> Vec<f32> {
 fn transmitted(tile: &[f32], width: usize) -> Vec<f32> {
     let shift = (PANEL as isize - width as isize) / 2;
     let pixel = |i: usize| {
-        let at = |p: usize| {
-            usize::try_from(p as isize - shift)
-                .ok()
-                .filter(|&p| p < width)
-        };
-        let absorbance = at(i % PANEL)
-            .zip(at(i / PANEL))
-            .map_or(0.0, |(x, y)| tile[y * width + x]);
+        let at = |p: usize| usize::try_from(p as isize - shift).ok().filter(|&p| p < width);
+        let absorbance = at(i % PANEL).zip(at(i / PANEL)).map_or(0.0, |(x, y)| tile[y * width + x]);
         libm::exp10f(-absorbance)
     };
     (0..PANEL * PANEL).map(pixel).collect()
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "0..=1 to 8 bits"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..=1 to 8 bits")]
 fn grey(light: f32) -> u8 {
     (light * 240.0 + 0.5) as u8
 }

@@ -53,14 +53,8 @@ mod tests {
     #[test]
     fn borders_are_what_the_words_say() {
         assert_eq!(extended(Border::Zero, -2, 7), [0., 0., 1., 2., 3., 0., 0.]);
-        assert_eq!(
-            extended(Border::Reflect, -2, 7),
-            [2., 1., 1., 2., 3., 3., 2.]
-        );
-        assert_eq!(
-            extended(Border::Replicate, -2, 7),
-            [1., 1., 1., 2., 3., 3., 3.]
-        );
+        assert_eq!(extended(Border::Reflect, -2, 7), [2., 1., 1., 2., 3., 3., 2.]);
+        assert_eq!(extended(Border::Replicate, -2, 7), [1., 1., 1., 2., 3., 3., 3.]);
     }
 
     #[test]

@@ -32,35 +32,17 @@ impl Source<'_> {
 
 /// Blurs `source` into `dst`, which is larger by `margin` on each side, with the taps
 /// `half[0]` at the centre and `half[k]` at ±k.
-pub(crate) fn blur(
-    source: Source<'_>,
-    half: &[f32],
-    margin: usize,
-    dst: &mut [f32],
-    scratch: &mut Scratch,
-) {
+pub(crate) fn blur(source: Source<'_>, half: &[f32], margin: usize, dst: &mut [f32], scratch: &mut Scratch) {
     let dst_width = source.width + 2 * margin;
     for x in (0..dst_width).step_by(STRIP) {
         let columns = STRIP.min(dst_width - x);
-        blur_strip(
-            source,
-            half,
-            margin,
-            x,
-            columns,
-            dst,
-            &mut scratch.strip,
-            &mut scratch.line,
-        );
+        blur_strip(source, half, margin, x, columns, dst, &mut scratch.strip, &mut scratch.line);
     }
 }
 
 /// Columns `x .. x + columns` of `dst`.
 #[multiversion::multiversion(targets = "simd")]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one loop nest, cut where it is dispatched"
-)]
+#[expect(clippy::too_many_arguments, reason = "one loop nest, cut where it is dispatched")]
 fn blur_strip(
     source: Source<'_>,
     half: &[f32],
@@ -81,9 +63,7 @@ fn blur_strip(
     // Along the rows.
     let start = x.cast_signed() - above.cast_signed();
     let taps = useful(border, radius, start + radius.cast_signed(), columns, width);
-    let interior = usize::try_from(start)
-        .ok()
-        .filter(|&s| s + line.len() <= width);
+    let interior = usize::try_from(start).ok().filter(|&s| s + line.len() <= width);
     for y in 0..height {
         let out = &mut strip[(above + y) * pitch..][..pitch];
         if let Some(start) = interior {
@@ -107,14 +87,7 @@ fn blur_strip(
     for (i, row) in dst.chunks_exact_mut(dst_width).enumerate() {
         let y = i.cast_signed() - margin.cast_signed();
         let taps = useful(border, radius, y, 1, height);
-        fir(
-            strip,
-            (i + radius) * pitch,
-            pitch,
-            half,
-            taps,
-            &mut row[x..x + columns],
-        );
+        fir(strip, (i + radius) * pitch, pitch, half, taps, &mut row[x..x + columns]);
     }
 }
 
@@ -137,14 +110,7 @@ fn useful(border: Border, radius: usize, from: isize, count: usize, len: usize) 
 /// Each pair is added before it is weighed: a mirrored image gives the mirrored result, bit for
 /// bit. The smallest taps come first, which keeps the rounding small.
 #[inline(always)]
-fn fir(
-    data: &[f32],
-    centre: usize,
-    stride: usize,
-    half: &[f32],
-    taps: (usize, usize),
-    out: &mut [f32],
-) {
+fn fir(data: &[f32], centre: usize, stride: usize, half: &[f32], taps: (usize, usize), out: &mut [f32]) {
     let mut at = 0;
     let mut blocks = out.chunks_exact_mut(BLOCK);
     for block in &mut blocks {

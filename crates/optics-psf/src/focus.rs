@@ -14,10 +14,7 @@ pub struct FocusParams {
 
 impl Default for FocusParams {
     fn default() -> Self {
-        Self {
-            sigma_xy_px: 0.9,
-            sigma_per_um: 1.0,
-        }
+        Self { sigma_xy_px: 0.9, sigma_per_um: 1.0 }
     }
 }
 
@@ -35,10 +32,7 @@ impl FocusParams {
     /// condenser reaches that; it is here to compare with.
     #[must_use]
     pub fn paper_in_micrometres() -> Self {
-        Self {
-            sigma_per_um: 4.0,
-            ..Self::paper()
-        }
+        Self { sigma_per_um: 4.0, ..Self::paper() }
     }
 }
 
@@ -103,26 +97,10 @@ mod tests {
     #[test]
     fn impossible_numbers_are_refused_by_name() {
         for bad in [-0.1, f64::NAN, f64::INFINITY] {
-            let xy = FocusParams {
-                sigma_xy_px: bad,
-                ..FocusParams::default()
-            };
-            let z = FocusParams {
-                sigma_per_um: bad,
-                ..FocusParams::default()
-            };
-            assert!(
-                DepthOfFocus::new(&xy)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("sigma_xy_px")
-            );
-            assert!(
-                DepthOfFocus::new(&z)
-                    .unwrap_err()
-                    .to_string()
-                    .contains("sigma_per_um")
-            );
+            let xy = FocusParams { sigma_xy_px: bad, ..FocusParams::default() };
+            let z = FocusParams { sigma_per_um: bad, ..FocusParams::default() };
+            assert!(DepthOfFocus::new(&xy).unwrap_err().to_string().contains("sigma_xy_px"));
+            assert!(DepthOfFocus::new(&z).unwrap_err().to_string().contains("sigma_per_um"));
         }
     }
 }

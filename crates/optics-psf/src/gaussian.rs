@@ -68,11 +68,7 @@ impl Gaussian {
             Method::Auto => Some(pyramid::NARROWEST_BY_DEFAULT),
         };
         let pyramid = narrowest.and_then(|n| Pyramid::new(sigma_px, n, kernel.radius()));
-        Ok(Self {
-            sigma_px,
-            kernel,
-            pyramid,
-        })
+        Ok(Self { sigma_px, kernel, pyramid })
     }
 
     /// The standard deviation in pixels.
@@ -110,14 +106,7 @@ impl Gaussian {
     /// # Panics
     ///
     /// If `src` is empty or not whole rows of `width`, or `dst` is not as long as it.
-    pub fn blur_into(
-        &self,
-        src: &[f32],
-        width: usize,
-        border: Border,
-        dst: &mut [f32],
-        scratch: &mut Scratch,
-    ) {
+    pub fn blur_into(&self, src: &[f32], width: usize, border: Border, dst: &mut [f32], scratch: &mut Scratch) {
         self.apply(src, width, border, 0, dst, scratch);
     }
 
@@ -166,11 +155,7 @@ impl Gaussian {
         );
         let expected = (width + 2 * margin) * (pixels.len() / width + 2 * margin);
         assert_eq!(dst.len(), expected, "dst has the wrong number of pixels");
-        let source = Source {
-            pixels,
-            width,
-            border,
-        };
+        let source = Source { pixels, width, border };
         match &self.pyramid {
             Some(pyramid) => pyramid.blur(source, margin, dst, scratch),
             None => fir::blur(source, self.kernel.half(), margin, dst, scratch),

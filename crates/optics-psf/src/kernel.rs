@@ -28,10 +28,7 @@ impl Kernel {
         Self::from_taps(normalised(exponent(variance, radius), radius))
     }
 
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "pixels are single precision"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
     fn from_taps(taps: Vec<f64>) -> Self {
         let mut half: Vec<f32> = taps.iter().map(|&w| w as f32).collect();
         let sides: f64 = half[1..].iter().map(|&w| 2.0 * f64::from(w)).sum();
@@ -89,11 +86,7 @@ fn normalised(t: f64, radius: usize) -> Vec<f64> {
 /// The t at which the taps up to `radius` have this variance, by Newton's method on its logarithm.
 fn exponent(variance: f64, radius: usize) -> f64 {
     // Both ends are known: t = 1/(2σ²) for a wide kernel, and for a narrow one w₁ = exp(-t) = σ²/2.
-    let mut t = if variance > 0.36 {
-        0.5 / variance
-    } else {
-        libm::log(2.0 / variance)
-    };
+    let mut t = if variance > 0.36 { 0.5 / variance } else { libm::log(2.0 / variance) };
     // It takes three to five steps; the rest is a bound for the loop.
     for _ in 0..50 {
         let taps = normalised(t, radius);
@@ -123,17 +116,12 @@ mod tests {
     }
 
     fn widths() -> impl Iterator<Item = f64> {
-        (0..600)
-            .map(|i| 1e-6 * libm::exp(0.03 * f64::from(i)))
-            .filter(|s| *s < 300.0)
+        (0..600).map(|i| 1e-6 * libm::exp(0.03 * f64::from(i))).filter(|s| *s < 300.0)
     }
 
     #[test]
     fn variance_is_exact_at_every_width() {
-        for sigma in [0.05, 0.2, 0.5, 0.6, 0.9, 1.0, 3.6, 20.0, 300.0]
-            .into_iter()
-            .chain(widths())
-        {
+        for sigma in [0.05, 0.2, 0.5, 0.6, 0.9, 1.0, 3.6, 20.0, 300.0].into_iter().chain(widths()) {
             let error = variance(&Kernel::new(sigma)) / (sigma * sigma) - 1.0;
             assert!(error.abs() < 1e-12, "sigma {sigma}: {error}");
         }
@@ -150,12 +138,7 @@ mod tests {
             assert!(taps.windows(2).all(|w| w[0] > w[1]));
             let sum = taps[0] + 2.0 * taps[1..].iter().sum::<f64>();
             assert!((sum - 1.0).abs() < 1e-14, "sigma {sigma}: {sum}");
-            let single: f64 = kernel
-                .half()
-                .iter()
-                .skip(1)
-                .map(|&w| 2.0 * f64::from(w))
-                .sum();
+            let single: f64 = kernel.half().iter().skip(1).map(|&w| 2.0 * f64::from(w)).sum();
             assert!((single + f64::from(kernel.half()[0]) - 1.0).abs() < 3.1e-8);
         }
     }
@@ -186,11 +169,7 @@ mod tests {
             for n in 0..=now.radius() {
                 let tap = |k: &Kernel| k.taps().get(n).copied().unwrap_or(0.0);
                 let moved = (tap(&now) - tap(&before)).abs();
-                assert!(
-                    moved < 0.002,
-                    "sigma {}: tap {n} by {moved}",
-                    0.002 * f64::from(i)
-                );
+                assert!(moved < 0.002, "sigma {}: tap {n} by {moved}", 0.002 * f64::from(i));
             }
             before = now;
         }

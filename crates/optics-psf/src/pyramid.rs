@@ -49,13 +49,7 @@ impl Pyramid {
     }
 
     /// Blurs `source` into `dst`, which is larger by `margin` on each side.
-    pub(crate) fn blur(
-        &self,
-        source: Source<'_>,
-        margin: usize,
-        dst: &mut [f32],
-        scratch: &mut Scratch,
-    ) {
+    pub(crate) fn blur(&self, source: Source<'_>, margin: usize, dst: &mut [f32], scratch: &mut Scratch) {
         let reach = match source.border {
             Border::Zero => self.reach_of_nothing,
             Border::Reflect | Border::Replicate => self.reach,
@@ -86,35 +80,17 @@ impl Pyramid {
 
         for l in (1..self.halvings).rev() {
             let (above, below) = levels.split_at_mut(l + 1);
-            double(
-                &below[0],
-                width >> (l + 1),
-                &mut above[l],
-                width >> l,
-                0,
-                &mut scratch.line,
-            );
+            double(&below[0], width >> (l + 1), &mut above[l], width >> l, 0, &mut scratch.line);
         }
         let out_width = source.width + 2 * margin;
-        double(
-            &levels[1],
-            width / 2,
-            dst,
-            out_width,
-            reach,
-            &mut scratch.line,
-        );
+        double(&levels[1], width / 2, dst, out_width, reach, &mut scratch.line);
         scratch.levels = levels;
     }
 }
 
 /// A small image, with nothing around it that could matter.
 fn alone(pixels: &[f32], width: usize) -> Source<'_> {
-    Source {
-        pixels,
-        width,
-        border: Border::Zero,
-    }
+    Source { pixels, width, border: Border::Zero }
 }
 
 /// Every second pixel of `source`, counted from `before` pixels above and to the left of its
@@ -150,11 +126,7 @@ fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line:
             }
         }
         source.border.extend(sum, start, long_line);
-        for ((pair, e), o) in long_line
-            .chunks_exact(2)
-            .zip(even.iter_mut())
-            .zip(odd.iter_mut())
-        {
+        for ((pair, e), o) in long_line.chunks_exact(2).zip(even.iter_mut()).zip(odd.iter_mut()) {
             (*e, *o) = (pair[0], pair[1]);
         }
         let outer = even.iter().zip(&even[2..]);
@@ -168,14 +140,7 @@ fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line:
 /// Cubic B-spline subdivision: twice as many pixels along each side, of which those from `skip`
 /// (even) on, along both, go to `out`.
 #[multiversion::multiversion(targets = "simd")]
-fn double(
-    small: &[f32],
-    small_width: usize,
-    out: &mut [f32],
-    width: usize,
-    skip: usize,
-    line: &mut Vec<f32>,
-) {
+fn double(small: &[f32], small_width: usize, out: &mut [f32], width: usize, skip: usize, line: &mut Vec<f32>) {
     let rows = (small.len() / small_width).cast_signed();
     line.clear();
     line.resize(2 * small_width + 2, 0.0);
@@ -185,11 +150,7 @@ fn double(
         let y = y + skip;
         let k = (y / 2).cast_signed();
         let row = |k: isize| {
-            if (0..rows).contains(&k) {
-                &small[k.cast_unsigned() * small_width..][..small_width]
-            } else {
-                &*nothing
-            }
+            if (0..rows).contains(&k) { &small[k.cast_unsigned() * small_width..][..small_width] } else { &*nothing }
         };
         let sum = &mut line[1..=small_width];
         if y.is_multiple_of(2) {

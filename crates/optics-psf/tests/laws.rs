@@ -14,23 +14,16 @@ fn direct(sigma_px: f64) -> Gaussian {
 
 fn noise(len: usize) -> Vec<f32> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    (0..len)
-        .map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0)
-        .collect()
+    (0..len).map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0).collect()
 }
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f32::max)
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
 fn transposed(image: &[f32], width: usize) -> Vec<f32> {
-    (0..width)
-        .flat_map(|x| image.iter().skip(x).step_by(width).copied())
-        .collect()
+    (0..width).flat_map(|x| image.iter().skip(x).step_by(width).copied()).collect()
 }
 
 /// Two-dimensional convolution in double precision, one pixel after the other.
@@ -47,10 +40,7 @@ fn oracle(image: &[f32], width: usize, border: Border, gaussian: &Gaussian) -> V
     let at = |x, y| fold(x, w).zip(fold(y, h)).map_or(0.0, |(x, y)| pixel(x, y));
     let row = |x, y| (-r..=r).map(|i| tap(i) * at(x + i, y)).sum::<f64>();
     let sum = |x, y| (-r..=r).map(|j| tap(j) * row(x, y + j)).sum::<f64>();
-    (0..h)
-        .flat_map(|y| (0..w).map(move |x| (x, y)))
-        .map(|(x, y)| sum(x, y))
-        .collect()
+    (0..h).flat_map(|y| (0..w).map(move |x| (x, y))).map(|(x, y)| sum(x, y)).collect()
 }
 
 #[test]
@@ -64,10 +54,7 @@ fn direct_is_the_convolution() {
                 let slow = oracle(&image, width, border, &gaussian);
                 let difference = |(a, b): (&f32, &f64)| (f64::from(*a) - b).abs();
                 let error = fast.iter().zip(&slow).map(difference).fold(0.0, f64::max);
-                assert!(
-                    error < 3e-7,
-                    "{width} x {height}, {sigma}, {border:?}: {error}"
-                );
+                assert!(error < 3e-7, "{width} x {height}, {sigma}, {border:?}: {error}");
             }
         }
     }
@@ -131,10 +118,7 @@ fn response(gaussian: &Gaussian, x: usize, y: usize) -> [f64; 2] {
 fn the_impulse_response_has_the_variance_asked_for() {
     for sigma in WIDTHS.into_iter().chain([0.01, 1.7, 8.0]) {
         let [variance, mean] = response(&direct(sigma), 8, 8);
-        assert!(
-            (variance - sigma * sigma).abs() <= 2e-6 * sigma * sigma,
-            "{sigma}: {variance}"
-        );
+        assert!((variance - sigma * sigma).abs() <= 2e-6 * sigma * sigma, "{sigma}: {variance}");
         assert!(mean.abs() < 1e-6 * sigma.max(0.01), "{sigma}: {mean}");
     }
 }
@@ -179,11 +163,7 @@ fn one_blur_after_the_other_is_the_blur_of_the_summed_variance() {
 fn a_mirrored_image_gives_the_mirrored_blur() {
     let (width, height) = (141, 75);
     let image = noise(width * height);
-    let mirrored = |i: &[f32]| -> Vec<f32> {
-        i.chunks(width)
-            .flat_map(|r| r.iter().rev().copied())
-            .collect()
-    };
+    let mirrored = |i: &[f32]| -> Vec<f32> { i.chunks(width).flat_map(|r| r.iter().rev().copied()).collect() };
     let flipped = |i: &[f32]| -> Vec<f32> { i.chunks(width).rev().flatten().copied().collect() };
     for sigma in [0.3, 0.9, 3.6] {
         for border in BORDERS {
@@ -209,15 +189,9 @@ fn a_shifted_object_gives_the_shifted_blur() {
         image
     };
     let cut = |image: &[f32], x: usize, y: usize| -> Vec<f32> {
-        image
-            .chunks(wide)
-            .skip(y - 30)
-            .take(100)
-            .flat_map(|r| r[x - 30..x + 70].to_vec())
-            .collect()
+        image.chunks(wide).skip(y - 30).take(100).flat_map(|r| r[x - 30..x + 70].to_vec()).collect()
     };
-    let blurred =
-        |gaussian: &Gaussian, x, y| cut(&gaussian.blur(&placed(x, y), wide, Border::Zero), x, y);
+    let blurred = |gaussian: &Gaussian, x, y| cut(&gaussian.blur(&placed(x, y), wide, Border::Zero), x, y);
     for (x, y) in [(31, 30), (77, 41), (203, 50), (330, 33)] {
         let exact = direct(4.0);
         assert_eq!(blurred(&exact, x, y), blurred(&exact, 30, 30));
@@ -248,9 +222,7 @@ fn an_object_spread_is_the_object_blurred_in_an_empty_frame() {
 /// White noise, a corner, a small disc and a smooth ramp, all from 0 to 1.
 fn phantoms(width: usize, height: usize) -> [Vec<f32>; 4] {
     let image = |f: &dyn Fn(f32, f32) -> f32| -> Vec<f32> {
-        (0..width * height)
-            .map(|i| f((i % width) as f32, (i / width) as f32))
-            .collect()
+        (0..width * height).map(|i| f((i % width) as f32, (i / width) as f32)).collect()
     };
     let disc = |x: f32, y: f32| {
         let (x, y) = (x - 140.3, y - 110.8);
@@ -269,10 +241,9 @@ fn decimated_agrees_with_direct() {
     let (width, height) = (301, 219);
     let images = phantoms(width, height);
     let mut scratch = Scratch::new();
-    for (method, bound, widths) in [
-        (Method::Decimated, 1e-3, [3.5, 3.6, 4.3, 8.0]),
-        (Method::Auto, 2e-4, [4.72, 6.0, 9.6, 20.0]),
-    ] {
+    for (method, bound, widths) in
+        [(Method::Decimated, 1e-3, [3.5, 3.6, 4.3, 8.0]), (Method::Auto, 2e-4, [4.72, 6.0, 9.6, 20.0])]
+    {
         for sigma in widths {
             let fast = Gaussian::with_method(sigma, method).unwrap();
             for border in BORDERS {
@@ -300,22 +271,13 @@ fn narrow_kernels_are_never_decimated() {
         let exact = direct(sigma).blur(&image, 100, Border::Reflect);
         assert_eq!(gaussian.blur(&image, 100, Border::Reflect), exact);
     }
-    assert_eq!(
-        Gaussian::new(9.0).unwrap(),
-        Gaussian::with_method(9.0, Method::default()).unwrap()
-    );
+    assert_eq!(Gaussian::new(9.0).unwrap(), Gaussian::with_method(9.0, Method::default()).unwrap());
 }
 
 #[test]
 fn scratch_carries_nothing_from_call_to_call() {
     let mut scratch = Scratch::new();
-    for (width, height, sigma) in [
-        (300, 200, 20.0),
-        (40, 30, 3.6),
-        (131, 90, 9.9),
-        (7, 5, 0.9),
-        (90, 90, 30.0),
-    ] {
+    for (width, height, sigma) in [(300, 200, 20.0), (40, 30, 3.6), (131, 90, 9.9), (7, 5, 0.9), (90, 90, 30.0)] {
         let image = noise(width * height);
         let gaussian = Gaussian::new(sigma).unwrap();
         for border in BORDERS {
@@ -330,16 +292,7 @@ fn scratch_carries_nothing_from_call_to_call() {
 fn impossible_widths_are_refused() {
     for bad in [-0.1, f64::NAN, f64::INFINITY, 4097.0] {
         let error = Gaussian::new(bad).unwrap_err();
-        assert!(
-            matches!(
-                error,
-                Error::OutOfRange {
-                    field: "sigma_px",
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        assert!(matches!(error, Error::OutOfRange { field: "sigma_px", .. }), "{error}");
         assert!(error.to_string().contains("from 0 to 4096"), "{error}");
     }
     assert_eq!(Gaussian::new(3.0).unwrap().sigma_px(), 3.0);
@@ -354,13 +307,7 @@ fn a_ragged_image_is_a_mistake() {
 #[test]
 #[should_panic(expected = "dst has the wrong number of pixels")]
 fn a_short_destination_is_a_mistake() {
-    direct(1.0).blur_into(
-        &[0.0; 9],
-        3,
-        Border::Zero,
-        &mut [0.0; 6],
-        &mut Scratch::new(),
-    );
+    direct(1.0).blur_into(&[0.0; 9], 3, Border::Zero, &mut [0.0; 6], &mut Scratch::new());
 }
 
 /// The same bytes on every machine, whatever its vector instructions.
@@ -368,18 +315,11 @@ fn a_short_destination_is_a_mistake() {
 fn bits_are_pinned() {
     let image = noise(211 * 97);
     let hashes = [0.9, 3.6, 5.0, 20.0].map(|sigma| {
-        let blurred = Gaussian::new(sigma)
-            .unwrap()
-            .blur(&image, 211, Border::Reflect);
-        blurred.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, v| {
-            (h ^ u64::from(v.to_bits())).wrapping_mul(0x100_0000_01b3)
-        })
+        let blurred = Gaussian::new(sigma).unwrap().blur(&image, 211, Border::Reflect);
+        blurred
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, v| (h ^ u64::from(v.to_bits())).wrapping_mul(0x100_0000_01b3))
     });
-    let pinned = [
-        0xaa80_296c_a49d_52eb,
-        0x5a29_9a94_bf88_4933,
-        0xc960_a6ca_b341_8c0d,
-        0xee8f_a659_c3b6_b29d,
-    ];
+    let pinned = [0xaa80_296c_a49d_52eb, 0x5a29_9a94_bf88_4933, 0xc960_a6ca_b341_8c0d, 0xee8f_a659_c3b6_b29d];
     assert_eq!(hashes, pinned);
 }

@@ -137,7 +137,7 @@ fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point
         let refuse = |what: String| Failure::input(Complaint::new(format!("{}: {what}", path.display())));
         let labels = read_label_map(path, limits)?;
         let regions = components(&labels, limits).map_err(|problem| Error::Input { path: path.clone(), problem })?;
-        for region in regions.iter().filter(|r| !r.touches_border && r.mask.area() as f64 >= smallest_px) {
+        for region in regions.iter().filter(|r| !r.at_border && r.mask.area() as f64 >= smallest_px) {
             let (tile, width, _) = region.tile();
             let outline = fsd_shape::trace(&tile, width, 0.5).map_err(|error| refuse(error.to_string()))?;
             outlines.push(fsd_shape::resample(&outline, TRACED_POINTS));

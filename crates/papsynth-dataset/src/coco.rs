@@ -23,7 +23,11 @@ pub(crate) fn categories(recipe: &Recipe) -> Vec<Category> {
     let others = Kind::ALL.into_iter().filter(|&kind| kind != Kind::Cell).map(|kind| (kind.name(), Part::Whole));
     (1..)
         .zip(cells.chain(others))
-        .map(|(id, (class, part))| Category { id, name: category_name(class, part), supercategory: group(part).name().to_owned() })
+        .map(|(id, (class, part))| Category {
+            id,
+            name: category_name(class, part),
+            supercategory: group(part).name().to_owned(),
+        })
         .collect()
 }
 

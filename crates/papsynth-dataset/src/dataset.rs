@@ -69,7 +69,9 @@ impl Dataset {
             Some(name) => {
                 return Err(Error::Folder {
                     path: path.to_owned(),
-                    message: format!("the folder holds something else (`{name}`) and no data set; choose another, or a new one"),
+                    message: format!(
+                        "the folder holds something else (`{name}`) and no data set; choose another, or a new one"
+                    ),
                 });
             }
         }
@@ -137,7 +139,9 @@ impl Dataset {
         difference.map_or(Ok(()), |difference| {
             Err(Error::Folder {
                 path: self.path().to_owned(),
-                message: format!("the data set in this folder {difference}; choose another folder, or what it was made from"),
+                message: format!(
+                    "the data set in this folder {difference}; choose another folder, or what it was made from"
+                ),
             })
         })
     }
@@ -148,7 +152,10 @@ impl Dataset {
         let mut section = "";
         for (there, here) in there.lines().zip(recipe.lines()) {
             if there != here {
-                return format!(" ({section}{}`{there}` there, `{here}` here)", if section.is_empty() { "" } else { ": " });
+                return format!(
+                    " ({section}{}`{there}` there, `{here}` here)",
+                    if section.is_empty() { "" } else { ": " }
+                );
             }
             if here.starts_with('[') {
                 section = here;
@@ -181,9 +188,10 @@ fn stranger(path: &Path) -> Result<Option<String>, Error> {
 pub(crate) fn read_manifest(folder: &Folder) -> Result<Manifest, Error> {
     let path = folder.path(layout::MANIFEST);
     let file = File::open(&path).map_err(|e| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::Folder { path: folder.root().to_owned(), message: "holds no data set: there is no manifest.json".to_owned() }
-        }
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::Folder {
+            path: folder.root().to_owned(),
+            message: "holds no data set: there is no manifest.json".to_owned(),
+        },
         _ => Error::io("read", &path)(e),
     })?;
     Manifest::from_reader(BufReader::new(file)).map_err(|problem| Error::Input { path, problem })

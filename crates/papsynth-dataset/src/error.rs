@@ -99,7 +99,9 @@ pub enum Problem {
         limit: u64,
     },
     /// The image is larger than it may be, or has no pixel.
-    #[error("the image is {width} x {height}; accepted are 1 to {max_side} pixels a side and at most {max_pixels} in all")]
+    #[error(
+        "the image is {width} x {height}; accepted are 1 to {max_side} pixels a side and at most {max_pixels} in all"
+    )]
     ImageSize {
         /// Columns.
         width: u64,

@@ -229,7 +229,10 @@ impl Output {
     }
 
     /// The elements of a JSON array between its brackets, one a line.
-    pub(crate) fn json_lines<T: Serialize>(&mut self, items: impl IntoIterator<Item = Result<T, Error>>) -> Result<(), Error> {
+    pub(crate) fn json_lines<T: Serialize>(
+        &mut self,
+        items: impl IntoIterator<Item = Result<T, Error>>,
+    ) -> Result<(), Error> {
         for (i, item) in items.into_iter().enumerate() {
             self.bytes(if i == 0 { b"\n" } else { b",\n" })?;
             self.json(&item?)?;
@@ -317,14 +320,11 @@ pub(crate) mod fault {
 
 #[cfg(test)]
 mod tests {
-    #[path = "../../tests/support/mod.rs"]
-    mod support;
-
     use papsynth::model::Model;
 
     use super::*;
+    use crate::support::{SEED, Scratch, contents, frame, recipe};
     use crate::{Dataset, DatasetInfo};
-    use support::{SEED, Scratch, contents, frame, recipe};
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {

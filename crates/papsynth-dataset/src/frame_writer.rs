@@ -63,12 +63,17 @@ impl<'a> FrameWriter<'a> {
         let index = scene.key.index;
         let wrong = |message: String| Error::Frame { index, message };
         if scene.key.seed != dataset.identity.seed {
-            return Err(wrong(format!("the scene is of seed {}, the data set of {}", scene.key.seed, dataset.identity.seed)));
+            return Err(wrong(format!(
+                "the scene is of seed {}, the data set of {}",
+                scene.key.seed, dataset.identity.seed
+            )));
         }
         let geometry = Geometry::of(scene);
         let (pixels, planes) = (geometry.pixels(), geometry.planes_um.len());
         if pixels == 0 || planes == 0 {
-            return Err(wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted")));
+            return Err(wrong(format!(
+                "the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"
+            )));
         }
         // From now on the frame is not whole, whatever it was before.
         let record = dataset.folder.path(&layout::record(index));
@@ -184,7 +189,10 @@ impl<'a> FrameWriter<'a> {
             return Err(self.wrong(format!("{} of {due} planes were written", self.saturated.len())));
         }
         if Geometry::of(&finished.scene) != self.geometry {
-            return Err(self.wrong(format!("the truth handed over is that of another scene, of frame {}", finished.scene.key.index)));
+            return Err(self.wrong(format!(
+                "the truth handed over is that of another scene, of frame {}",
+                finished.scene.key.index
+            )));
         }
         self.check_size("all-in-focus values", finished.all_in_focus.len(), pixels)?;
         self.check_size("layer counts", truth.layers.len(), pixels)?;
@@ -192,15 +200,20 @@ impl<'a> FrameWriter<'a> {
             self.check_size("labels", truth.labels_of(group).ids.len(), pixels)?;
         }
         let outside = truth.objects.iter().find(|object| {
-            [&object.amodal, &object.front].iter().filter_map(|mask| mask.bounds()).any(|b| {
-                (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height
-            })
+            [&object.amodal, &object.front]
+                .iter()
+                .filter_map(|mask| mask.bounds())
+                .any(|b| (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height)
         });
         outside.map_or(Ok(()), |object| Err(self.wrong(format!("the mask of object {} leaves the image", object.id))))
     }
 
     fn check_size(&self, what: &str, found: usize, pixels: usize) -> Result<(), Error> {
-        if found == pixels { Ok(()) } else { Err(self.wrong(format!("{found} {what} for an image of {pixels} pixels"))) }
+        if found == pixels {
+            Ok(())
+        } else {
+            Err(self.wrong(format!("{found} {what} for an image of {pixels} pixels")))
+        }
     }
 
     fn wrong(&self, message: String) -> Error {

@@ -13,6 +13,9 @@ mod picture;
 pub mod read;
 mod record;
 pub mod rle;
+#[cfg(test)]
+#[path = "../tests/support/mod.rs"]
+mod support;
 mod table;
 mod write;
 

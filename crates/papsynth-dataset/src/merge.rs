@@ -130,7 +130,8 @@ pub(crate) fn write_manifest(dataset: &Dataset, merged: &[FileRecord], frames: &
         files.push(folder.record(&layout::record(index))?);
         Ok(files)
     };
-    let head = serde_json::to_string(&head).map_err(|e| Error::io("encode", &folder.path(layout::MANIFEST))(e.into()))?;
+    let head =
+        serde_json::to_string(&head).map_err(|e| Error::io("encode", &folder.path(layout::MANIFEST))(e.into()))?;
     folder.write_if_new(layout::MANIFEST, |out| {
         // The list is put into the head's braces by hand: it may be longer than memory.
         out.bytes(head.strip_suffix('}').unwrap_or(&head).as_bytes())?;

@@ -16,14 +16,9 @@ mod recipe;
 
 /// Gives every input of a target to its check, and each cut off at three places.
 fn replay(target: &str, check: fn(&[u8])) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../fuzz/corpus")
-        .join(target);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
     let Ok(entries) = fs::read_dir(&folder) else {
-        eprintln!(
-            "left out: there is no {}, the corpora are part of the repository alone",
-            folder.display()
-        );
+        eprintln!("left out: there is no {}, the corpora are part of the repository alone", folder.display());
         return;
     };
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
@@ -33,12 +28,7 @@ fn replay(target: &str, check: fn(&[u8])) {
         // Shown if the check fails.
         println!("{}", path.display());
         let bytes = fs::read(&path).unwrap();
-        for length in [
-            bytes.len(),
-            bytes.len() * 3 / 4,
-            bytes.len() / 2,
-            bytes.len().min(9),
-        ] {
+        for length in [bytes.len(), bytes.len() * 3 / 4, bytes.len() / 2, bytes.len().min(9)] {
             check(&bytes[..length]);
         }
     }

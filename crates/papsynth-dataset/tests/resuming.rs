@@ -14,14 +14,7 @@ use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Outcome, Progress, Ru
 use support::{SEED, Scratch, contents, frame, recipe};
 
 fn open_with(path: &Path, recipe: &Recipe, model: &Model, seed: u64) -> Result<Dataset, Error> {
-    Dataset::create_or_resume(
-        path,
-        &DatasetInfo {
-            recipe,
-            model,
-            seed,
-        },
-    )
+    Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed })
 }
 
 fn open(path: &Path) -> Result<Dataset, Error> {
@@ -37,10 +30,7 @@ fn write(dataset: &Dataset, index: u64) {
 
 fn refused(result: Result<Dataset, Error>, what: &str) {
     let error = result.unwrap_err();
-    assert!(
-        !error.is_io() && error.to_string().contains(what),
-        "{error}"
-    );
+    assert!(!error.is_io() && error.to_string().contains(what), "{error}");
 }
 
 #[test]
@@ -48,22 +38,13 @@ fn another_data_set_in_the_folder_is_refused_by_what_differs() {
     let scratch = Scratch::new("identity");
     let (recipe, model) = (recipe(), Model::builtin());
     open(scratch.path()).unwrap();
-    refused(
-        open_with(scratch.path(), &recipe, &model, 12),
-        "seed 11, not 12",
-    );
+    refused(open_with(scratch.path(), &recipe, &model, 12), "seed 11, not 12");
     let mut other = recipe.clone();
     other.focus.planes = 7.0.into();
-    refused(
-        open_with(scratch.path(), &other, &model, SEED),
-        "[focus]: `planes = 1",
-    );
+    refused(open_with(scratch.path(), &other, &model, SEED), "[focus]: `planes = 1");
     let mut other = model.clone();
     other.provenance.clear();
-    refused(
-        open_with(scratch.path(), &recipe, &other, SEED),
-        "another model",
-    );
+    refused(open_with(scratch.path(), &recipe, &other, SEED), "another model");
     assert!(open(scratch.path()).is_ok());
 }
 
@@ -73,10 +54,7 @@ fn a_folder_with_something_else_is_refused_and_left_alone() {
     fs::write(scratch.join("thesis.tex"), "years of work").unwrap();
     refused(open(scratch.path()), "thesis.tex");
     refused(open(&scratch.join("thesis.tex")), "is a file");
-    assert_eq!(
-        contents(scratch.path()),
-        [("thesis.tex".to_owned(), b"years of work".to_vec())]
-    );
+    assert_eq!(contents(scratch.path()), [("thesis.tex".to_owned(), b"years of work".to_vec())]);
     fs::write(scratch.join("manifest.json"), "{}").unwrap();
     refused(open(scratch.path()), "manifest.json");
     refused(open(&scratch.join("thesis.tex/inner")), "");
@@ -102,10 +80,7 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
             let mut changed = bytes.clone();
             changed[bytes.len() / 2] ^= 1;
             fs::write(&path, &changed).unwrap();
-            assert!(
-                whole(Check::Sizes) && !whole(Check::Hashes),
-                "{name} changed"
-            );
+            assert!(whole(Check::Sizes) && !whole(Check::Hashes), "{name} changed");
         }
         fs::write(&path, bytes).unwrap();
         count += 1;
@@ -118,12 +93,7 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
 #[test]
 fn inspection_says_what_is_there_and_what_is_not() {
     let scratch = Scratch::new("inspect");
-    assert!(
-        inspect(scratch.path(), Check::Sizes)
-            .unwrap_err()
-            .to_string()
-            .contains("holds no data set")
-    );
+    assert!(inspect(scratch.path(), Check::Sizes).unwrap_err().to_string().contains("holds no data set"));
     let dataset = open(scratch.path()).unwrap();
     assert_eq!(inspect(scratch.path(), Check::Sizes).unwrap().frames, 0);
     for index in [1, 2, 5, 6] {
@@ -145,10 +115,7 @@ fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
     let scratch = Scratch::new("sweep");
     let dataset = open(scratch.path()).unwrap();
     write(&dataset, 0);
-    let (dead, alive) = (
-        scratch.join("images/.000001.png.0123.tmp"),
-        scratch.join("images/.000002.png.4567.tmp"),
-    );
+    let (dead, alive) = (scratch.join("images/.000001.png.0123.tmp"), scratch.join("images/.000002.png.4567.tmp"));
     fs::write(&dead, "half").unwrap();
     let held = File::create(&alive).unwrap();
     held.lock().unwrap();
@@ -182,16 +149,9 @@ fn a_disk_that_refuses_is_an_error_of_input_and_output() {
     let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
     writer.write_plane(&frame.planes[0]).unwrap();
     let error = writer.finish(&frame.finished).unwrap_err();
-    assert!(
-        error.is_io() && error.to_string().contains("labels/cytoplasm/000000.tif"),
-        "{error}"
-    );
+    assert!(error.is_io() && error.to_string().contains("labels/cytoplasm/000000.tif"), "{error}");
     assert!(!dataset.is_whole(0, Check::Sizes).unwrap());
-    assert!(
-        contents(scratch.path())
-            .iter()
-            .all(|(name, _)| !name.ends_with(".tmp"))
-    );
+    assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }
 
 /// A small field of the engine.
@@ -214,12 +174,7 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     let stop = AtomicBool::new(false);
     let run = |dataset: &Dataset, frames, at_once| {
         let seen = Mutex::new(Vec::new());
-        let run = Run {
-            frames,
-            at_once,
-            threads: Threads::One,
-            stop: &stop,
-        };
+        let run = Run { frames, at_once, threads: Threads::One, stop: &stop };
         let outcome = dataset.generate(&engine, &run, &|progress| {
             seen.lock().unwrap().push(match progress {
                 Progress::Kept(index) => (index, false),
@@ -232,57 +187,22 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     };
     let whole = open_with(one.path(), &recipe, &model, SEED).unwrap();
     let (outcome, _) = run(&whole, 0..4, 1);
-    assert_eq!(
-        outcome,
-        Outcome {
-            kept: 0,
-            made: 4,
-            stopped: false
-        }
-    );
+    assert_eq!(outcome, Outcome { kept: 0, made: 4, stopped: false });
     whole.finish().unwrap();
 
     let parts = open_with(two.path(), &recipe, &model, SEED).unwrap();
     run(&parts, 2..3, 1);
     let (outcome, seen) = run(&parts, 0..4, 3);
-    assert_eq!(
-        outcome,
-        Outcome {
-            kept: 1,
-            made: 3,
-            stopped: false
-        }
-    );
+    assert_eq!(outcome, Outcome { kept: 1, made: 3, stopped: false });
     assert_eq!(seen, [(0, true), (1, true), (2, false), (3, true)]);
     parts.finish().unwrap();
     assert_eq!(contents(one.path()), contents(two.path()));
 
     stop.store(true, Ordering::Relaxed);
     let (outcome, seen) = run(&parts, 0..9, 2);
-    assert_eq!(
-        (outcome, seen),
-        (
-            Outcome {
-                kept: 0,
-                made: 0,
-                stopped: true
-            },
-            vec![]
-        )
-    );
+    assert_eq!((outcome, seen), (Outcome { kept: 0, made: 0, stopped: true }, vec![]));
     let other = Scratch::new("split-3");
     let stranger = open(other.path()).unwrap();
-    let run = Run {
-        frames: 0..1,
-        at_once: 1,
-        threads: Threads::One,
-        stop: &AtomicBool::new(false),
-    };
-    assert!(
-        stranger
-            .generate(&engine, &run, &|_| ())
-            .unwrap_err()
-            .to_string()
-            .contains("another recipe")
-    );
+    let run = Run { frames: 0..1, at_once: 1, threads: Threads::One, stop: &AtomicBool::new(false) };
+    assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("another recipe"));
 }

@@ -17,11 +17,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
 fn open(scratch: &Scratch) -> Dataset {
-    let info = DatasetInfo {
-        recipe: &recipe(),
-        model: &Model::builtin(),
-        seed: SEED,
-    };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
     Dataset::create_or_resume(scratch.path(), &info).unwrap()
 }
 
@@ -34,8 +30,7 @@ fn write(dataset: &Dataset, frame: &Frame) -> FrameSummary {
 }
 
 fn pages(scratch: &Scratch, name: &str) -> (Vec<DecodingResult>, Option<String>) {
-    let mut decoder =
-        Decoder::new(BufReader::new(File::open(scratch.join(name)).unwrap())).unwrap();
+    let mut decoder = Decoder::new(BufReader::new(File::open(scratch.join(name)).unwrap())).unwrap();
     let description = decoder.get_tag_ascii_string(Tag::ImageDescription).ok();
     let mut pages = Vec::new();
     loop {
@@ -56,23 +51,10 @@ fn check_labels(scratch: &Scratch, frame: &Frame) {
     let name = format!("{:06}.tif", frame.finished.scene.key.index);
     for group in Group::ALL {
         let path = scratch.join(&format!("labels/{}/{name}", group.name()));
-        assert_eq!(
-            &read_label_map(&path, &Limits::default()).unwrap(),
-            frame.finished.truth.labels_of(group)
-        );
+        assert_eq!(&read_label_map(&path, &Limits::default()).unwrap(), frame.finished.truth.labels_of(group));
     }
-    let layers = read_label_map(
-        &scratch.join(&format!("labels/layers/{name}")),
-        &Limits::default(),
-    )
-    .unwrap();
-    let expected: Vec<u32> = frame
-        .finished
-        .truth
-        .layers
-        .iter()
-        .map(|&n| n.into())
-        .collect();
+    let layers = read_label_map(&scratch.join(&format!("labels/layers/{name}")), &Limits::default()).unwrap();
+    let expected: Vec<u32> = frame.finished.truth.layers.iter().map(|&n| n.into()).collect();
     assert_eq!(layers.ids, expected);
 }
 
@@ -83,24 +65,17 @@ fn a_single_plane_reads_back_in_8_and_in_12_bits() {
         let dataset = open(&scratch);
         let frame = frame(3, 1, bits, 1);
         let summary = write(&dataset, &frame);
-        let image =
-            GreyImage::read(&scratch.join("images/000003.png"), &Limits::default()).unwrap();
+        let image = GreyImage::read(&scratch.join("images/000003.png"), &Limits::default()).unwrap();
         assert_eq!((image.width, image.white), (WIDTH, white));
         assert_eq!(image.grey, frame.planes[0].grey);
         let (floats, _) = pages(&scratch, "noise-free/000003.tif");
-        assert!(
-            matches!(&floats[..], [DecodingResult::F32(values)] if *values == frame.planes[0].noise_free)
-        );
+        assert!(matches!(&floats[..], [DecodingResult::F32(values)] if *values == frame.planes[0].noise_free));
         assert!(!scratch.join("all-in-focus").exists());
         check_labels(&scratch, &frame);
-        assert_eq!(
-            (summary.most_layers, summary.truncated, summary.saturated),
-            (2, 2, vec![0])
-        );
+        assert_eq!((summary.most_layers, summary.truncated, summary.saturated), (2, 2, vec![0]));
         assert_eq!(summary.objects.values().sum::<u64>(), 6);
         assert!(dataset.is_whole(3, Check::Hashes).unwrap());
-        let record =
-            FrameRecord::from_json(&fs::read(scratch.join("frames/000003.json")).unwrap()).unwrap();
+        let record = FrameRecord::from_json(&fs::read(scratch.join("frames/000003.json")).unwrap()).unwrap();
         assert_eq!(&record.identity, dataset.identity());
     }
 }
@@ -110,19 +85,11 @@ fn the_physical_size_of_a_pixel_stands_in_every_image() {
     let scratch = Scratch::new("physical");
     let dataset = open(&scratch);
     write(&dataset, &frame(0, 1, 8, 1));
-    let decoder = png::Decoder::new(BufReader::new(
-        File::open(scratch.join("images/000000.png")).unwrap(),
-    ));
+    let decoder = png::Decoder::new(BufReader::new(File::open(scratch.join("images/000000.png")).unwrap()));
     let dims = decoder.read_info().unwrap().info().pixel_dims.unwrap();
-    assert_eq!(
-        (dims.xppu, dims.yppu, dims.unit),
-        (4_000_000, 4_000_000, png::Unit::Meter)
-    );
+    assert_eq!((dims.xppu, dims.yppu, dims.unit), (4_000_000, 4_000_000, png::Unit::Meter));
     let file = BufReader::new(File::open(scratch.join("labels/nucleus/000000.tif")).unwrap());
-    let resolution = Decoder::new(file)
-        .unwrap()
-        .get_tag_u64(Tag::ResolutionUnit)
-        .unwrap();
+    let resolution = Decoder::new(file).unwrap().get_tag_u64(Tag::ResolutionUnit).unwrap();
     assert_eq!(resolution, 3, "centimetres");
 }
 
@@ -157,13 +124,8 @@ fn a_stack_reads_back_plane_by_plane() {
         for (plane, page) in frame.planes.iter().zip(floats) {
             assert!(matches!(page, DecodingResult::F32(values) if values == plane.noise_free));
         }
-        let sharp =
-            GreyImage::read(&scratch.join("all-in-focus/000000.png"), &Limits::default()).unwrap();
-        let off = sharp
-            .grey
-            .iter()
-            .zip(&frame.finished.all_in_focus)
-            .map(|(&g, v)| (f32::from(g) - v).abs());
+        let sharp = GreyImage::read(&scratch.join("all-in-focus/000000.png"), &Limits::default()).unwrap();
+        let off = sharp.grey.iter().zip(&frame.finished.all_in_focus).map(|(&g, v)| (f32::from(g) - v).abs());
         assert!(off.fold(0.0, f32::max) <= 0.5);
         check_labels(&scratch, &frame);
     }
@@ -188,15 +150,9 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
     let frames = [frame(0, 1, 8, 1), frame(2, 3, 8, 1)];
     frames.iter().for_each(|frame| drop(write(&dataset, frame)));
     let summary = dataset.finish().unwrap();
-    assert_eq!(
-        (summary.frames, summary.objects.values().sum::<u64>()),
-        (2, 12)
-    );
+    assert_eq!((summary.frames, summary.objects.values().sum::<u64>()), (2, 12));
     let coco = json(&scratch, "coco.json");
-    let objects: Vec<_> = frames
-        .iter()
-        .flat_map(|f| &f.finished.truth.objects)
-        .collect();
+    let objects: Vec<_> = frames.iter().flat_map(|f| &f.finished.truth.objects).collect();
     let annotations = coco["annotations"].as_array().unwrap();
     assert_eq!(annotations.len(), objects.len());
     for (i, (annotation, object)) in annotations.iter().zip(&objects).enumerate() {
@@ -210,31 +166,19 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
         };
         assert_eq!(mask("segmentation"), object.amodal);
         assert_eq!(mask("front"), object.front);
-        let category = coco["categories"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .find(|c| c["id"] == annotation["category_id"]);
+        let category = coco["categories"].as_array().unwrap().iter().find(|c| c["id"] == annotation["category_id"]);
         assert_eq!(category.unwrap()["supercategory"], object.group().name());
     }
-    let files: Vec<&str> = coco["images"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|i| i["file_name"].as_str().unwrap())
-        .collect();
+    let files: Vec<&str> =
+        coco["images"].as_array().unwrap().iter().map(|i| i["file_name"].as_str().unwrap()).collect();
     assert_eq!(files, ["images/000000.png", "images/000002.ome.tif"]);
 
     let mut table = csv::Reader::from_path(scratch.join("objects.csv")).unwrap();
     let header = table.headers().unwrap().clone();
     let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
     assert_eq!(rows.len(), objects.len());
-    let get = |row: usize, column: &str| {
-        rows[row]
-            .get(header.iter().position(|h| h == column).unwrap())
-            .unwrap()
-            .to_owned()
-    };
+    let get =
+        |row: usize, column: &str| rows[row].get(header.iter().position(|h| h == column).unwrap()).unwrap().to_owned();
     for (i, object) in objects.iter().enumerate() {
         assert_eq!(get(i, "image"), if i < 6 { "0" } else { "2" });
         assert_eq!(get(i, "id"), object.id.to_string());
@@ -243,10 +187,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
         assert_eq!(get(i, "traits"), object.traits);
         assert_eq!(get(i, "truncated"), object.truncated.to_string());
         assert_eq!(get(i, "depth_um").parse(), Ok(object.depth_um));
-        let list: Vec<f64> = get(i, "detectability")
-            .split(';')
-            .map(|v| v.parse().unwrap())
-            .collect();
+        let list: Vec<f64> = get(i, "detectability").split(';').map(|v| v.parse().unwrap()).collect();
         assert_eq!(list, object.detectability);
         let best: usize = get(i, "best_plane").parse().unwrap();
         assert!(list.iter().all(|d| *d <= list[best]));
@@ -262,32 +203,16 @@ fn the_manifest_names_every_file_with_its_hash() {
     }
     dataset.finish().unwrap();
     let manifest = json(&scratch, "manifest.json");
-    assert_eq!(
-        (
-            manifest["frames"].as_u64(),
-            manifest["identity"]["seed"].as_u64()
-        ),
-        (Some(3), Some(SEED))
-    );
+    assert_eq!((manifest["frames"].as_u64(), manifest["identity"]["seed"].as_u64()), (Some(3), Some(SEED)));
     let listed: BTreeSet<(String, u64)> = manifest["files"]
         .as_array()
         .unwrap()
         .iter()
-        .map(|f| {
-            (
-                f["path"].as_str().unwrap().to_owned(),
-                f["bytes"].as_u64().unwrap(),
-            )
-        })
+        .map(|f| (f["path"].as_str().unwrap().to_owned(), f["bytes"].as_u64().unwrap()))
         .collect();
     let there = contents(scratch.path());
-    let found = there
-        .iter()
-        .map(|(name, bytes)| (name.clone(), bytes.len() as u64));
-    assert_eq!(
-        listed,
-        found.filter(|(name, _)| name != "manifest.json").collect()
-    );
+    let found = there.iter().map(|(name, bytes)| (name.clone(), bytes.len() as u64));
+    assert_eq!(listed, found.filter(|(name, _)| name != "manifest.json").collect());
     assert_eq!(manifest["files"].as_array().unwrap().len(), listed.len());
 }
 
@@ -312,16 +237,10 @@ fn bytes_depend_neither_on_order_nor_on_repetition() {
     assert_eq!(contents(one.path()), contents(two.path()));
 
     let touched = |name: &str| fs::metadata(two.join(name)).unwrap().modified().unwrap();
-    let names: Vec<String> = contents(two.path())
-        .into_iter()
-        .map(|(name, _)| name)
-        .collect();
+    let names: Vec<String> = contents(two.path()).into_iter().map(|(name, _)| name).collect();
     let before: Vec<_> = names.iter().map(|name| touched(name)).collect();
     open(&two).finish().unwrap();
-    assert_eq!(
-        names.iter().map(|name| touched(name)).collect::<Vec<_>>(),
-        before
-    );
+    assert_eq!(names.iter().map(|name| touched(name)).collect::<Vec<_>>(), before);
 }
 
 #[test]
@@ -329,10 +248,8 @@ fn pictures_show_every_object() {
     let frame = frame(0, 1, 8, 1);
     let picture = Picture::overlay(&frame.planes[0], &frame.finished);
     assert_eq!(picture.rgb.len(), WIDTH * HEIGHT * 3);
-    let is_grey = |at: usize| {
-        picture.rgb[at * 3] == picture.rgb[at * 3 + 1]
-            && picture.rgb[at * 3] == picture.rgb[at * 3 + 2]
-    };
+    let is_grey =
+        |at: usize| picture.rgb[at * 3] == picture.rgb[at * 3 + 1] && picture.rgb[at * 3] == picture.rgb[at * 3 + 2];
     for object in &frame.finished.truth.objects {
         // The first pixel of a mask is always on its edge.
         let first = object.amodal.pixels(WIDTH).next().unwrap();
@@ -344,20 +261,12 @@ fn pictures_show_every_object() {
     let scratch = Scratch::new("sheet");
     let dataset = open(&scratch);
     for index in 0..30 {
-        write(
-            &dataset,
-            &support::frame(index, 1 + index as usize % 2 * 2, 12, 1),
-        );
+        write(&dataset, &support::frame(index, 1 + index as usize % 2 * 2, 12, 1));
     }
     dataset.finish().unwrap();
-    let decoder = png::Decoder::new(BufReader::new(
-        File::open(scratch.join("contact-sheet.png")).unwrap(),
-    ));
+    let decoder = png::Decoder::new(BufReader::new(File::open(scratch.join("contact-sheet.png")).unwrap()));
     let info = decoder.read_info().unwrap();
-    assert_eq!(
-        (info.info().width, info.info().height),
-        (4 * 352 + 8, 6 * 290 + 8)
-    );
+    assert_eq!((info.info().width, info.info().height), (4 * 352 + 8, 6 * 290 + 8));
 }
 
 #[test]
@@ -366,46 +275,26 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     let dataset = open(&scratch);
     let good = frame(0, 2, 8, 1);
     let refused = |error: papsynth_dataset::Error, what: &str| {
-        assert!(
-            !error.is_io() && error.to_string().contains(what),
-            "{error}"
-        );
+        assert!(!error.is_io() && error.to_string().contains(what), "{error}");
     };
     let begin = || dataset.frame_writer(&good.finished.scene).unwrap();
     let both = || {
         let mut writer = begin();
-        good.planes
-            .iter()
-            .for_each(|plane| writer.write_plane(plane).unwrap());
+        good.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
         writer
     };
-    refused(
-        begin().write_plane(&good.planes[1]).unwrap_err(),
-        "plane 1 came where plane 0 of 2 was due",
-    );
-    refused(
-        both().write_plane(&good.planes[1]).unwrap_err(),
-        "plane 1 came where plane 2 of 2 was due",
-    );
+    refused(begin().write_plane(&good.planes[1]).unwrap_err(), "plane 1 came where plane 0 of 2 was due");
+    refused(both().write_plane(&good.planes[1]).unwrap_err(), "plane 1 came where plane 2 of 2 was due");
     refused(begin().finish(&good.finished).unwrap_err(), "0 of 2 planes");
-    refused(
-        both().finish(&frame(1, 2, 8, 1).finished).unwrap_err(),
-        "another scene",
-    );
+    refused(both().finish(&frame(1, 2, 8, 1).finished).unwrap_err(), "another scene");
     let mut plane = good.planes[0].clone();
     plane.grey[7] = 256;
-    refused(
-        begin().write_plane(&plane).unwrap_err(),
-        "256 does not fit into 8 bits",
-    );
+    refused(begin().write_plane(&plane).unwrap_err(), "256 does not fit into 8 bits");
     plane.grey.pop();
     refused(begin().write_plane(&plane).unwrap_err(), "3499 grey levels");
     let mut finished = good.finished.clone();
     finished.truth.objects[0].class = "unheard of".to_owned();
-    refused(
-        both().finish(&finished).unwrap_err(),
-        "unheard of cytoplasm",
-    );
+    refused(both().finish(&finished).unwrap_err(), "unheard of cytoplasm");
     let mut finished = good.finished.clone();
     finished.truth.layers.pop();
     refused(both().finish(&finished).unwrap_err(), "3499 layer counts");
@@ -417,9 +306,5 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     refused(dataset.frame_writer(&scene).err().unwrap(), "0 planes");
     assert!(!dataset.is_whole(0, Check::Sizes).unwrap());
     assert_eq!(dataset.finish().unwrap().frames, 0);
-    assert!(
-        contents(scratch.path())
-            .iter()
-            .all(|(name, _)| !name.ends_with(".tmp"))
-    );
+    assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }

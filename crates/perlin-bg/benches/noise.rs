@@ -1,9 +1,7 @@
 //! How long a field of 1376 x 1038 pixels takes: one octave, four octaves, a background and its logarithm.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use perlin_bg::{
-    Background, BackgroundParams, Fractal, FractalParams, Perlin, PerlinParams, Window,
-};
+use perlin_bg::{Background, BackgroundParams, Fractal, FractalParams, Perlin, PerlinParams, Window};
 use std::hint::black_box;
 
 const WIDTH: usize = 1376;
@@ -38,9 +36,7 @@ fn bench(c: &mut Criterion) {
     group.bench_function("the paper's background, log10, set-up included", |b| {
         let params = BackgroundParams::paper();
         b.iter(|| {
-            Background::new(&params, WIDTH, HEIGHT, KEY)
-                .unwrap()
-                .log10_into(black_box(&mut image), WIDTH, [0, 0]);
+            Background::new(&params, WIDTH, HEIGHT, KEY).unwrap().log10_into(black_box(&mut image), WIDTH, [0, 0]);
         });
     });
     group.finish();

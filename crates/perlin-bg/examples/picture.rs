@@ -13,25 +13,15 @@ const PICTURE: [usize; 2] = [3 * NOISE[0] + 2 * GAP, NOISE[1] + GAP + FIELD[1]];
 const KEY: u64 = 8;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "target/perlin-bg.png".into());
+    let path = std::env::args().nth(1).unwrap_or_else(|| "target/perlin-bg.png".into());
     let mut picture = vec![1.0; PICTURE[0] * PICTURE[1]];
 
     for (column, octaves) in [1, 3, 5].into_iter().enumerate() {
-        let params = FractalParams {
-            octaves,
-            ..FractalParams::default()
-        };
+        let params = FractalParams { octaves, ..FractalParams::default() };
         let mut panel = vec![0.0; NOISE[0] * NOISE[1]];
         let window = Window::with_cell_px(40.0);
         Fractal::new(&params, KEY)?.add_into(&mut panel, NOISE[0], &window, 1.0);
-        paste(
-            &mut picture,
-            panel,
-            NOISE[0],
-            [column * (NOISE[0] + GAP), 0],
-        );
+        paste(&mut picture, panel, NOISE[0], [column * (NOISE[0] + GAP), 0]);
     }
 
     let backgrounds = [BackgroundParams::paper(), BackgroundParams::default()];
@@ -47,9 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let [width, height] = [u32::try_from(PICTURE[0])?, u32::try_from(PICTURE[1])?];
     let bytes = picture.into_iter().map(grey).collect();
-    GrayImage::from_raw(width, height, bytes)
-        .ok_or("the picture has the size of its buffer")?
-        .save(path)?;
+    GrayImage::from_raw(width, height, bytes).ok_or("the picture has the size of its buffer")?.save(path)?;
     Ok(())
 }
 
@@ -61,11 +49,7 @@ fn paste(picture: &mut [f32], mut panel: Vec<f32>, width: usize, corner: [usize;
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "values lie in 0..=1"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "values lie in 0..=1")]
 fn grey(value: f32) -> u8 {
     (value * 255.0).round() as u8
 }

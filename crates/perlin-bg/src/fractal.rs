@@ -20,12 +20,7 @@ pub struct FractalParams {
 
 impl Default for FractalParams {
     fn default() -> Self {
-        Self {
-            octaves: 4,
-            persistence: 0.5,
-            lacunarity: 2.0,
-            base: PerlinParams::default(),
-        }
+        Self { octaves: 4, persistence: 0.5, lacunarity: 2.0, base: PerlinParams::default() }
     }
 }
 
@@ -59,37 +54,12 @@ impl Fractal {
     /// # Errors
     /// [`Error::OutOfRange`] for a parameter outside the range its field states.
     pub fn new(params: &FractalParams, key: u64) -> Result<Self, Error> {
-        let FractalParams {
-            octaves,
-            persistence,
-            lacunarity,
-            ref base,
-        } = *params;
-        require(
-            "octaves",
-            octaves as f64,
-            (1..=32).contains(&octaves),
-            "between 1 and 32",
-        )?;
-        require(
-            "persistence",
-            persistence,
-            persistence > 0.0 && persistence <= 4.0,
-            "above 0, at most 4",
-        )?;
-        require(
-            "lacunarity",
-            lacunarity,
-            (1.0..=16.0).contains(&lacunarity),
-            "between 1 and 16",
-        )?;
+        let FractalParams { octaves, persistence, lacunarity, ref base } = *params;
+        require("octaves", octaves as f64, (1..=32).contains(&octaves), "between 1 and 32")?;
+        require("persistence", persistence, persistence > 0.0 && persistence <= 4.0, "above 0, at most 4")?;
+        require("lacunarity", lacunarity, (1.0..=16.0).contains(&lacunarity), "between 1 and 16")?;
 
-        let coarsest = Layer {
-            noise: Perlin::new(base, key)?,
-            frequency: 1.0,
-            shift: [0.0, 0.0],
-            amplitude: 1.0,
-        };
+        let coarsest = Layer { noise: Perlin::new(base, key)?, frequency: 1.0, shift: [0.0, 0.0], amplitude: 1.0 };
         let layers: Vec<Layer> = core::iter::successors(Some((0, coarsest)), |(octave, layer)| {
             let octave = octave + 1;
             let key = hash::derive(key, octave);

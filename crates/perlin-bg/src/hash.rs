@@ -17,10 +17,7 @@ pub(crate) fn derive(key: u64, index: u64) -> u64 {
 
 /// Hash of one lattice point.
 pub(crate) fn lattice(key: u64, cell: [i64; 2]) -> u64 {
-    derive(
-        derive(key, cell[0].cast_unsigned()),
-        cell[1].cast_unsigned(),
-    )
+    derive(derive(key, cell[0].cast_unsigned()), cell[1].cast_unsigned())
 }
 
 /// A number in [0, 1) with 53 random bits.

@@ -27,11 +27,7 @@ pub enum Illumination {
 impl Default for Illumination {
     /// The mean bowl of real fields: 1 − 0.0325 x² − 0.0112 y² (ours, measured).
     fn default() -> Self {
-        Self::Bowl {
-            x2: 0.0325,
-            y2: 0.0112,
-            tilt: [0.0, 0.0],
-        }
+        Self::Bowl { x2: 0.0325, y2: 0.0112, tilt: [0.0, 0.0] }
     }
 }
 
@@ -54,12 +50,7 @@ impl Shade {
     pub(crate) fn new(shape: &Illumination, width: usize, height: usize) -> Result<Self, Error> {
         match *shape {
             Illumination::BorderDistance { exponent } => {
-                require(
-                    "illumination.exponent",
-                    exponent,
-                    (0.0..=16.0).contains(&exponent),
-                    "between 0 and 16",
-                )?;
+                require("illumination.exponent", exponent, (0.0..=16.0).contains(&exponent), "between 0 and 16")?;
                 let largest = width.min(height).div_ceil(2) as f64;
                 // Eq. 8: I_dⁿ with I_d = min(distance to each border) / largest. A power with n ≥ 0 keeps order, so it
                 // may be taken before the minimum, once a column and once a row.
@@ -71,11 +62,7 @@ impl Shade {
                         })
                         .collect()
                 };
-                Ok(Self {
-                    columns: powers(width),
-                    rows: powers(height),
-                    join: Join::Smaller,
-                })
+                Ok(Self { columns: powers(width), rows: powers(height), join: Join::Smaller })
             }
             Illumination::Bowl { x2, y2, tilt } => {
                 for (field, value) in [
@@ -100,16 +87,7 @@ impl Shade {
                     join: Join::Sum,
                 };
                 let lowest = f64::from(shade.lowest());
-                if lowest > 0.0 {
-                    Ok(shade)
-                } else {
-                    Err(Error::DarkBowl {
-                        x2,
-                        y2,
-                        tilt,
-                        lowest,
-                    })
-                }
+                if lowest > 0.0 { Ok(shade) } else { Err(Error::DarkBowl { x2, y2, tilt, lowest }) }
             }
         }
     }

@@ -21,10 +21,7 @@ pub(crate) struct Profile {
 #[inline(always)]
 pub(crate) fn lattice_line(offset: f32, fade: f32, left: [f32; 2], right: [f32; 2]) -> [f32; 2] {
     let (from, to) = (left[0] * offset, right[0] * (offset - 1.0));
-    [
-        from + fade * (to - from),
-        left[1] + fade * (right[1] - left[1]),
-    ]
+    [from + fade * (to - from), left[1] + fade * (right[1] - left[1])]
 }
 
 /// The noise between the lattice line above a row and the one below it.
@@ -111,10 +108,7 @@ pub(crate) fn extremes(row: &[f32], low: f32, high: f32) -> (f32, f32) {
             highs[lane] = larger(highs[lane], block[lane]);
         }
     }
-    (
-        lows.iter().chain(rest).copied().fold(low, smaller),
-        highs.iter().chain(rest).copied().fold(high, larger),
-    )
+    (lows.iter().chain(rest).copied().fold(low, smaller), highs.iter().chain(rest).copied().fold(high, larger))
 }
 
 #[inline(always)]

@@ -39,10 +39,7 @@ pub struct PerlinParams {
 
 impl Default for PerlinParams {
     fn default() -> Self {
-        Self {
-            fade: Fade::default(),
-            gradients: 256,
-        }
+        Self { fade: Fade::default(), gradients: 256 }
     }
 }
 
@@ -69,31 +66,19 @@ impl Perlin {
     pub fn new(params: &PerlinParams, key: u64) -> Result<Self, Error> {
         // Two directions cannot span the plane; more than 2^16 serve nobody and would only cost memory.
         let count = params.gradients as f64;
-        require(
-            "gradients",
-            count,
-            (3..=1 << 16).contains(&params.gradients),
-            "between 3 and 65536",
-        )?;
+        require("gradients", count, (3..=1 << 16).contains(&params.gradients), "between 3 and 65536")?;
         let directions = (0..params.gradients)
             .map(|i| {
                 let (sin, cos) = libm::sincos(core::f64::consts::TAU * i as f64 / count);
                 [single(cos), single(sin)]
             })
             .collect();
-        Ok(Self {
-            fade: params.fade,
-            directions,
-            key,
-        })
+        Ok(Self { fade: params.fade, directions, key })
     }
 
     /// The same noise under another key.
     pub(crate) fn with_key(&self, key: u64) -> Self {
-        Self {
-            key,
-            ..self.clone()
-        }
+        Self { key, ..self.clone() }
     }
 
     /// The noise at one point, in lattice cells. A position that is not finite gives NaN.

@@ -17,21 +17,14 @@ pub struct Window {
 
 impl Default for Window {
     fn default() -> Self {
-        Self {
-            origin: [0.0, 0.0],
-            step: 1.0,
-            first: [0, 0],
-        }
+        Self { origin: [0.0, 0.0], step: 1.0, first: [0, 0] }
     }
 }
 
 impl Window {
     /// The window of the plane whose lattice cells measure `cell_px` pixels, pixel (0, 0) at the position zero.
     pub fn with_cell_px(cell_px: f64) -> Self {
-        Self {
-            step: 1.0 / cell_px,
-            ..Self::default()
-        }
+        Self { step: 1.0 / cell_px, ..Self::default() }
     }
 
     /// The same plane, seen by an image whose first pixel is number `first`.
@@ -59,11 +52,7 @@ impl Window {
 ///
 /// # Panics
 /// If `width` is zero or does not divide the length of `image`.
-pub(crate) fn for_each_row(
-    image: &mut [f32],
-    width: usize,
-    mut visit: impl FnMut(usize, &mut [f32]),
-) {
+pub(crate) fn for_each_row(image: &mut [f32], width: usize, mut visit: impl FnMut(usize, &mut [f32])) {
     assert!(
         width > 0 && image.len().is_multiple_of(width),
         "width {width} must divide the image's {} pixels",
@@ -107,20 +96,12 @@ struct Line {
 
 impl Line {
     fn new(width: usize) -> Self {
-        Self {
-            number: None,
-            values: vec![0.0; width],
-            slopes: vec![0.0; width],
-        }
+        Self { number: None, values: vec![0.0; width], slopes: vec![0.0; width] }
     }
 }
 
 impl<'a> Rows<'a> {
-    pub(crate) fn new(
-        noise: &'a Perlin,
-        positions: impl ExactSizeIterator<Item = f64>,
-        amplitude: f32,
-    ) -> Self {
+    pub(crate) fn new(noise: &'a Perlin, positions: impl ExactSizeIterator<Item = f64>, amplitude: f32) -> Self {
         let width = positions.len();
         let mut offsets = Vec::with_capacity(width);
         let mut fades = Vec::with_capacity(width);
@@ -131,21 +112,10 @@ impl<'a> Rows<'a> {
             fades.push(profile.fade);
             match runs.last_mut() {
                 Some(run) if run.cell == profile.cell => run.end = column + 1,
-                _ => runs.push(Run {
-                    cell: profile.cell,
-                    end: column + 1,
-                }),
+                _ => runs.push(Run { cell: profile.cell, end: column + 1 }),
             }
         }
-        Self {
-            noise,
-            amplitude,
-            offsets,
-            fades,
-            runs,
-            above: Line::new(width),
-            below: Line::new(width),
-        }
+        Self { noise, amplitude, offsets, fades, runs, above: Line::new(width), below: Line::new(width) }
     }
 
     /// Adds the noise at `y` to a row.
@@ -168,35 +138,14 @@ impl<'a> Rows<'a> {
             core::mem::swap(&mut self.above, &mut self.below);
         }
         if self.above.number != Some(number) {
-            Self::sample(
-                self.noise,
-                &self.offsets,
-                &self.fades,
-                &self.runs,
-                &mut self.above,
-                number,
-            );
+            Self::sample(self.noise, &self.offsets, &self.fades, &self.runs, &mut self.above, number);
         }
         if self.below.number != Some(next) {
-            Self::sample(
-                self.noise,
-                &self.offsets,
-                &self.fades,
-                &self.runs,
-                &mut self.below,
-                next,
-            );
+            Self::sample(self.noise, &self.offsets, &self.fades, &self.runs, &mut self.below, next);
         }
     }
 
-    fn sample(
-        noise: &Perlin,
-        offsets: &[f32],
-        fades: &[f32],
-        runs: &[Run],
-        line: &mut Line,
-        number: i64,
-    ) {
+    fn sample(noise: &Perlin, offsets: &[f32], fades: &[f32], runs: &[Run], line: &mut Line, number: i64) {
         line.number = Some(number);
         let mut start = 0;
         for run in runs {

@@ -367,8 +367,8 @@ impl<'a> Quilter<'a> {
 /// some log N for a pixel of the grid.
 fn spectral_is_faster(source: &Source, candidates: &Candidates, params: &QuiltParams) -> bool {
     /// Time of one difference, and of one step of a transform, measured.
-    const DIFFERENCE_NS: f64 = 0.04;
-    const STEP_NS: f64 = 3.0;
+    const DIFFERENCE_NS: f64 = 0.035;
+    const STEP_NS: f64 = 1.0;
     let overlaps = params.overlap_px * (2 * params.patch_px - params.overlap_px);
     let pixels: usize = Spectral::grid(source).iter().product();
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]

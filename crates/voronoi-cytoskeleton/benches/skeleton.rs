@@ -4,9 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::hint::black_box;
-use voronoi_cytoskeleton::{
-    Diagram, LineParams, Point, Skeleton, SkeletonParams, Window, draw_into,
-};
+use voronoi_cytoskeleton::{Diagram, LineParams, Point, Skeleton, SkeletonParams, Window, draw_into};
 
 const SIDE: usize = 200;
 const SEED: u64 = 7;
@@ -17,10 +15,7 @@ fn outline() -> Vec<Point> {
         .map(|k| {
             let angle = core::f64::consts::TAU * f64::from(k) / 420.0;
             let radius = 88.0 + 8.0 * libm::cos(3.0 * angle) + 3.0 * libm::sin(7.0 * angle);
-            [
-                100.0 + radius * libm::cos(angle),
-                100.0 + radius * libm::sin(angle),
-            ]
+            [100.0 + radius * libm::cos(angle), 100.0 + radius * libm::sin(angle)]
         })
         .collect()
 }
@@ -52,8 +47,7 @@ fn bench(c: &mut Criterion) {
         b.iter(|| Diagram::new(black_box(diagram.sites()), &window).unwrap());
     });
     group.bench_function("rivers on a cone", |b| {
-        let cone =
-            |[x, y]: Point| 90.0 - ((x - 100.0) * (x - 100.0) + (y - 100.0) * (y - 100.0)).sqrt();
+        let cone = |[x, y]: Point| 90.0 - ((x - 100.0) * (x - 100.0) + (y - 100.0) * (y - 100.0)).sqrt();
         b.iter(|| skeleton.rivers(black_box(&diagram), cone, &mut rng()));
     });
     group.bench_function("drawing", |b| {
@@ -61,10 +55,7 @@ fn bench(c: &mut Criterion) {
     });
     group.finish();
 
-    let params = SkeletonParams {
-        sites: 10_000,
-        ..SkeletonParams::default()
-    };
+    let params = SkeletonParams { sites: 10_000, ..SkeletonParams::default() };
     let skeleton = Skeleton::new(&params).unwrap();
     let mut group = c.benchmark_group("10000 sites");
     group.throughput(Throughput::Elements(params.sites as u64));

@@ -5,9 +5,7 @@
 use image::GrayImage;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
-use voronoi_cytoskeleton::{
-    Diagram, LineParams, Mouth, Point, River, Skeleton, SkeletonParams, Window, draw_into,
-};
+use voronoi_cytoskeleton::{Diagram, LineParams, Mouth, Point, River, Skeleton, SkeletonParams, Window, draw_into};
 
 const SIDE: usize = 256;
 const GAP: usize = 4;
@@ -15,16 +13,11 @@ const WIDTH: usize = 3 * SIDE + 2 * GAP;
 const SEED: u64 = 3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "target/voronoi-cytoskeleton.png".into());
+    let path = std::env::args().nth(1).unwrap_or_else(|| "target/voronoi-cytoskeleton.png".into());
     let outline = outline();
     let window = Window::around(&outline)?;
     let skeleton = Skeleton::new(&SkeletonParams::default())?;
-    let unrelaxed = Skeleton::new(&SkeletonParams {
-        lloyd_passes: 0,
-        ..SkeletonParams::default()
-    })?;
+    let unrelaxed = Skeleton::new(&SkeletonParams { lloyd_passes: 0, ..SkeletonParams::default() })?;
     let rng = || Xoshiro256PlusPlus::seed_from_u64(SEED);
 
     let before = unrelaxed.diagram(&window, &mut rng())?;
@@ -32,11 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let trees = skeleton.grow(&outline, &mut rng())?;
 
     let mut picture = vec![0.0; WIDTH * SIDE];
-    let fine = LineParams {
-        width_px: 1.2,
-        taper: 0.0,
-        ..LineParams::default()
-    };
+    let fine = LineParams { width_px: 1.2, taper: 0.0, ..LineParams::default() };
     let faint = LineParams { peak: 0.3, ..fine };
     for (column, diagram) in [&before, &after].into_iter().enumerate() {
         let lines: Vec<River> = edges(diagram).chain(sites(diagram)).collect();
@@ -44,10 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     draw_panel(&mut picture, 2, &edges(&after).collect::<Vec<_>>(), &faint)?;
     draw_panel(&mut picture, 2, &[closed(&outline)], &fine)?;
-    let bold = LineParams {
-        width_px: 3.0,
-        ..LineParams::default()
-    };
+    let bold = LineParams { width_px: 3.0, ..LineParams::default() };
     draw_panel(&mut picture, 2, &trees, &bold)?;
 
     let bytes = picture.into_iter().map(grey).collect();
@@ -64,19 +50,13 @@ fn outline() -> Vec<Point> {
             let angle = core::f64::consts::TAU * f64::from(k) / 420.0;
             let wave = 0.06 * libm::cos(3.0 * angle) + 0.03 * libm::sin(7.0 * angle);
             let radius = 112.0 * (1.0 + wave);
-            [
-                128.0 + radius * libm::cos(angle),
-                128.0 + 0.9 * radius * libm::sin(angle),
-            ]
+            [128.0 + radius * libm::cos(angle), 128.0 + 0.9 * radius * libm::sin(angle)]
         })
         .collect()
 }
 
 fn edges(diagram: &Diagram) -> impl Iterator<Item = River> + '_ {
-    diagram
-        .edges()
-        .iter()
-        .map(|edge| line(&edge.ends.map(|vertex| diagram.vertices()[vertex])))
+    diagram.edges().iter().map(|edge| line(&edge.ends.map(|vertex| diagram.vertices()[vertex])))
 }
 
 fn sites(diagram: &Diagram) -> impl Iterator<Item = River> + '_ {
@@ -91,11 +71,7 @@ fn closed(outline: &[Point]) -> River {
 
 /// Any line can be drawn as a river.
 fn line(points: &[Point]) -> River {
-    River {
-        points: points.to_vec(),
-        heights: vec![1.0; points.len()],
-        mouth: Mouth::Border,
-    }
+    River { points: points.to_vec(), heights: vec![1.0; points.len()], mouth: Mouth::Border }
 }
 
 fn draw_panel(
@@ -116,11 +92,7 @@ fn draw_panel(
 }
 
 /// Dark lines on white.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "values lie in 0..=1"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "values lie in 0..=1")]
 fn grey(value: f32) -> u8 {
     (255.0 - value * 255.0).round() as u8
 }

@@ -40,15 +40,9 @@ pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error>
     let numbered = sites
         .iter()
         .enumerate()
-        .map(|(site, &[x, y])| Numbered {
-            position: Point2::new(flushed(x), flushed(y)),
-            site,
-        })
+        .map(|(site, &[x, y])| Numbered { position: Point2::new(flushed(x), flushed(y)), site })
         .collect();
-    let refused = |distinct: usize| Error::Sites {
-        given: sites.len(),
-        distinct,
-    };
+    let refused = |distinct: usize| Error::Sites { given: sites.len(), distinct };
     let delaunay = Delaunay::bulk_load(numbered).map_err(|_| refused(0))?;
     if sites.is_empty() || delaunay.num_vertices() != sites.len() {
         return Err(refused(delaunay.num_vertices()));
@@ -56,23 +50,8 @@ pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error>
     let mut builder = Builder::new(&window, &delaunay);
     builder.clip_edges();
     builder.walk_cells();
-    let Builder {
-        vertices,
-        inner,
-        edges,
-        cell_ends,
-        cell_vertices,
-        ..
-    } = builder;
-    Ok(Diagram {
-        window,
-        sites,
-        vertices,
-        inner,
-        edges,
-        cell_ends,
-        cell_vertices,
-    })
+    let Builder { vertices, inner, edges, cell_ends, cell_vertices, .. } = builder;
+    Ok(Diagram { window, sites, vertices, inner, edges, cell_ends, cell_vertices })
 }
 
 struct Builder<'a> {
@@ -126,11 +105,7 @@ impl<'a> Builder<'a> {
         for edge in self.delaunay.undirected_edges() {
             let edge = edge.as_directed();
             let dual = self.clip_edge(edge).map(|ends| {
-                self.edges.push(Edge {
-                    ends,
-                    cell: edge.from().data().site,
-                    neighbour: Some(edge.to().data().site),
-                });
+                self.edges.push(Edge { ends, cell: edge.from().data().site, neighbour: Some(edge.to().data().site) });
                 self.edges.len() - 1
             });
             self.duals.push(dual);
@@ -157,10 +132,7 @@ impl<'a> Builder<'a> {
                         dot(sub([x, y], middle), direction) / dot(direction, direction)
                     })
                 };
-                let range = [
-                    place(edge.rev(), f64::NEG_INFINITY),
-                    place(edge, f64::INFINITY),
-                ];
+                let range = [place(edge.rev(), f64::NEG_INFINITY), place(edge, f64::INFINITY)];
                 let cuts = self.window.clip(middle, direction, range)?;
                 Some(cuts.map(|t| self.border_at(along(middle, direction, t))))
             }
@@ -257,9 +229,7 @@ impl<'a> Builder<'a> {
         let mut last = from;
         if way < perimeter * (1.0 - ROUNDING) {
             let count = self.corners.len();
-            let next = (0..count)
-                .find(|&corner| self.window.reach_of_corner(corner) > start)
-                .unwrap_or(0);
+            let next = (0..count).find(|&corner| self.window.reach_of_corner(corner) > start).unwrap_or(0);
             for corner in (next..count).chain(0..next) {
                 let distance = ahead(self.window.reach_of_corner(corner));
                 if distance >= way {
@@ -277,10 +247,6 @@ impl<'a> Builder<'a> {
     }
 
     fn add_border_edge(&mut self, site: usize, from: usize, to: usize) {
-        self.edges.push(Edge {
-            ends: [from, to],
-            cell: site,
-            neighbour: None,
-        });
+        self.edges.push(Edge { ends: [from, to], cell: site, neighbour: None });
     }
 }

@@ -37,10 +37,7 @@ impl Diagram {
     pub fn new(sites: &[Point], window: &Window) -> Result<Self, Error> {
         require_coordinates("site", sites)?;
         if let Some(index) = sites.iter().position(|&site| !window.contains(site)) {
-            return Err(Error::SiteOutside {
-                index,
-                point: sites[index],
-            });
+            return Err(Error::SiteOutside { index, point: sites[index] });
         }
         build(sites.to_vec(), window.clone())
     }
@@ -83,10 +80,7 @@ impl Diagram {
     ///
     /// # Panics
     /// If there is no such cell.
-    pub fn corners(
-        &self,
-        cell: usize,
-    ) -> impl DoubleEndedIterator<Item = Point> + ExactSizeIterator + Clone {
+    pub fn corners(&self, cell: usize) -> impl DoubleEndedIterator<Item = Point> + ExactSizeIterator + Clone {
         self.cell(cell).iter().map(|&vertex| self.vertices[vertex])
     }
 
@@ -110,11 +104,7 @@ impl Diagram {
                 let Moments { area, first, .. } = self.moments(cell);
                 let centroid = [site[0] + first[0] / area, site[1] + first[1] / area];
                 // A cell too thin to have a centroid in floating point keeps its site.
-                if self.window.contains(centroid) {
-                    centroid
-                } else {
-                    site
-                }
+                if self.window.contains(centroid) { centroid } else { site }
             })
             .collect();
         // Cells are disjoint and convex, so their centroids differ; where rounding makes two of them one, the diagram
@@ -126,9 +116,7 @@ impl Diagram {
 
     /// The energy that relaxing lowers: the squared distance to the nearest site, integrated over the window.
     pub fn energy(&self) -> f64 {
-        (0..self.sites.len())
-            .map(|cell| self.moments(cell).second)
-            .sum()
+        (0..self.sites.len()).map(|cell| self.moments(cell).second).sum()
     }
 
     fn moments(&self, cell: usize) -> Moments {

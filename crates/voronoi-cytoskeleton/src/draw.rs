@@ -29,12 +29,7 @@ pub struct LineParams {
 
 impl Default for LineParams {
     fn default() -> Self {
-        Self {
-            width_px: 1.7,
-            profile: Profile::default(),
-            taper: 0.5,
-            peak: 1.0,
-        }
+        Self { width_px: 1.7, profile: Profile::default(), taper: 0.5, peak: 1.0 }
     }
 }
 
@@ -46,30 +41,10 @@ impl Default for LineParams {
 ///
 /// # Panics
 /// If `width` is zero or does not divide the length of `image`.
-pub fn draw_into(
-    image: &mut [f32],
-    width: usize,
-    rivers: &[River],
-    params: &LineParams,
-) -> Result<(), Error> {
-    let LineParams {
-        width_px,
-        profile: _,
-        taper,
-        peak,
-    } = *params;
-    require(
-        "width_px",
-        width_px,
-        width_px > 0.0 && width_px <= 1000.0,
-        "above 0, at most 1000",
-    )?;
-    require(
-        "taper",
-        taper,
-        (0.0..=1.0).contains(&taper),
-        "between 0 and 1",
-    )?;
+pub fn draw_into(image: &mut [f32], width: usize, rivers: &[River], params: &LineParams) -> Result<(), Error> {
+    let LineParams { width_px, profile: _, taper, peak } = *params;
+    require("width_px", width_px, width_px > 0.0 && width_px <= 1000.0, "above 0, at most 1000")?;
+    require("taper", taper, (0.0..=1.0).contains(&taper), "between 0 and 1")?;
     require("peak", f64::from(peak), peak > 0.0, "above 0")?;
     assert!(
         width > 0 && image.len().is_multiple_of(width),
@@ -84,38 +59,23 @@ pub fn draw_into(
 
 #[multiversion::multiversion(targets = "simd")]
 fn draw(image: &mut [f32], width: usize, river: &River, params: &LineParams) {
-    let LineParams {
-        width_px,
-        profile,
-        taper,
-        peak,
-    } = *params;
+    let LineParams { width_px, profile, taper, peak } = *params;
     let half = |height: f64| width_px / 2.0 * (1.0 - taper * (1.0 - height));
     for (points, heights) in river.points.windows(2).zip(river.heights.windows(2)) {
         let halves = [half(heights[0]), half(heights[1])];
         match profile {
             Profile::Flat => splat(image, width, points, halves, 0.5, |distance2, half| {
                 let distance = distance2.sqrt();
-                peak * larger(
-                    smaller(distance + 0.5, half) - larger(distance - 0.5, -half),
-                    0.0,
-                )
+                peak * larger(smaller(distance + 0.5, half) - larger(distance - 0.5, -half), 0.0)
             }),
             Profile::Smooth => {
                 let narrowest = single(NARROWEST);
                 let radii = halves.map(|half| half * REACH);
-                splat(
-                    image,
-                    width,
-                    points,
-                    radii,
-                    NARROWEST,
-                    |distance2, radius| {
-                        let drawn = larger(radius, narrowest);
-                        let rest = larger(1.0 - distance2 / (drawn * drawn), 0.0);
-                        peak * (radius / drawn) * rest * rest
-                    },
-                );
+                splat(image, width, points, radii, NARROWEST, |distance2, radius| {
+                    let drawn = larger(radius, narrowest);
+                    let rest = larger(1.0 - distance2 / (drawn * drawn), 0.0);
+                    peak * (radius / drawn) * rest * rest
+                });
             }
         }
     }
@@ -143,11 +103,7 @@ fn splat(
     let (a, b) = (ends[0], ends[1]);
     let d = [b[0] - a[0], b[1] - a[1]];
     let square = d[0] * d[0] + d[1] * d[1];
-    let inverse = if square > 0.0 {
-        single(1.0 / square)
-    } else {
-        0.0
-    };
+    let inverse = if square > 0.0 { single(1.0 / square) } else { 0.0 };
     let (dx, dy) = (single(d[0]), single(d[1]));
     let (from, growth) = (single(halves[0]), single(halves[1] - halves[0]));
 
@@ -185,11 +141,7 @@ fn smaller(a: f32, b: f32) -> f32 {
 
 /// The pixels of a row or column whose centres lie between two positions.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "`as` saturates, which clips to the image"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, which clips to the image")]
 fn pixels(from: f64, to: f64, count: usize) -> core::ops::Range<usize> {
     let start = (from.ceil() as usize).min(count);
     let end = ((to.floor() + 1.0) as usize).min(count);

@@ -25,9 +25,7 @@ pub enum Error {
         point: [f64; 2],
     },
     /// A polygon has fewer than three points or no area.
-    #[error(
-        "the {what} of {count} points has area {area}; it must have at least 3 points and an area above zero"
-    )]
+    #[error("the {what} of {count} points has area {area}; it must have at least 3 points and an area above zero")]
     Flat {
         /// The polygon: `window` or `outline`.
         what: &'static str,
@@ -53,9 +51,7 @@ pub enum Error {
         point: [f64; 2],
     },
     /// No site at all, or two in the same place.
-    #[error(
-        "{given} sites lie in {distinct} different places; there must be at least one, and no two in one place"
-    )]
+    #[error("{given} sites lie in {distinct} different places; there must be at least one, and no two in one place")]
     Sites {
         /// Number of sites given.
         given: usize,
@@ -65,21 +61,8 @@ pub enum Error {
 }
 
 /// `value`, if it is finite and `holds`.
-pub(crate) fn require(
-    field: &'static str,
-    value: f64,
-    holds: bool,
-    accepted: &'static str,
-) -> Result<f64, Error> {
-    if value.is_finite() && holds {
-        Ok(value)
-    } else {
-        Err(Error::OutOfRange {
-            field,
-            value,
-            accepted,
-        })
-    }
+pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<f64, Error> {
+    if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }
 
 /// Refuses coordinates whose products would lose what tells neighbours apart.
@@ -87,11 +70,7 @@ pub(crate) fn require_coordinates(what: &'static str, points: &[[f64; 2]]) -> Re
     const LARGEST: f64 = 1e9;
     let bad = |point: &[f64; 2]| !point.iter().all(|c| c.abs() <= LARGEST);
     match points.iter().position(bad) {
-        Some(index) => Err(Error::Coordinate {
-            what,
-            index,
-            point: points[index],
-        }),
+        Some(index) => Err(Error::Coordinate { what, index, point: points[index] }),
         None => Ok(()),
     }
 }

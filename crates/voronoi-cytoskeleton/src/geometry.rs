@@ -42,10 +42,7 @@ pub(crate) struct Moments {
 
 impl Moments {
     /// Exact, by the triangles between `about` and each side.
-    pub(crate) fn of(
-        corners: impl DoubleEndedIterator<Item = Point> + Clone,
-        about: Point,
-    ) -> Self {
+    pub(crate) fn of(corners: impl DoubleEndedIterator<Item = Point> + Clone, about: Point) -> Self {
         let mut moments = Self::default();
         let mut a = sub(corners.clone().next_back().unwrap_or(about), about);
         for corner in corners {

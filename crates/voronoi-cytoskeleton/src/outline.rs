@@ -46,15 +46,9 @@ struct Group {
 impl Outline {
     pub(crate) fn new(points: &[Point]) -> Result<Self, Error> {
         require_coordinates("outline point", points)?;
-        let area = points.first().map_or(0.0, |&about| {
-            Moments::of(points.iter().copied(), about).area
-        });
+        let area = points.first().map_or(0.0, |&about| Moments::of(points.iter().copied(), about).area);
         if points.len() < 3 || area == 0.0 {
-            return Err(Error::Flat {
-                what: "outline",
-                count: points.len(),
-                area,
-            });
+            return Err(Error::Flat { what: "outline", count: points.len(), area });
         }
         // The points of a block and the first of the next; a block that is not full repeats its end.
         let chains: Vec<[Point; LANES + 1]> = (0..points.len())
@@ -92,8 +86,7 @@ fn height(groups: &[Group], blocks: &[Block], point: Point) -> f64 {
             let reach = bound + group.radius[i];
             distance2[i] <= reach * reach
         });
-        let level: [bool; LANES] =
-            core::array::from_fn(|i| (group.low[i] <= point[1]) & (point[1] < group.high[i]));
+        let level: [bool; LANES] = core::array::from_fn(|i| (group.low[i] <= point[1]) & (point[1] < group.high[i]));
         for i in set(near) {
             nearest = smaller(nearest, blocks[i].distance2(point));
         }
@@ -120,9 +113,7 @@ fn smaller(a: Lanes, b: Lanes) -> Lanes {
 
 #[inline(always)]
 fn smallest(lanes: Lanes) -> f64 {
-    lanes
-        .into_iter()
-        .fold(f64::INFINITY, |a, b| if b < a { b } else { a })
+    lanes.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
 /// The indices of flags that are set. Few are, and a walk over bits has no branch to guess for the others.
@@ -176,9 +167,7 @@ impl Block {
             let x = self.ax[i] + (point[1] - self.ay[i]) * self.slope[i];
             spans & (point[0] < x)
         });
-        crossed
-            .into_iter()
-            .fold(false, |odd, crossed| odd ^ crossed)
+        crossed.into_iter().fold(false, |odd, crossed| odd ^ crossed)
     }
 }
 
@@ -195,10 +184,7 @@ impl Group {
         for (i, chain) in chains.iter().enumerate() {
             let [[left, right], [low, high]] = [0, 1].map(|axis| {
                 let values = chain.iter().map(|point| point[axis]);
-                [
-                    values.clone().fold(f64::INFINITY, f64::min),
-                    values.fold(f64::NEG_INFINITY, f64::max),
-                ]
+                [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)]
             });
             for (start, from) in group.start.iter_mut().zip(chain[0]) {
                 start[i] = from;

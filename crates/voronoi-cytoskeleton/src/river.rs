@@ -24,10 +24,7 @@ pub struct River {
 impl River {
     /// Its length.
     pub fn length(&self) -> f64 {
-        self.points
-            .windows(2)
-            .map(|pair| length(sub(pair[1], pair[0])))
-            .sum()
+        self.points.windows(2).map(|pair| length(sub(pair[1], pair[0]))).sum()
     }
 }
 
@@ -68,23 +65,11 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
                 }
             }
         }
-        Self {
-            diagram,
-            height,
-            heights,
-            highest,
-            ways,
-            trees: Trees::new(count),
-        }
+        Self { diagram, height, heights, highest, ways, trees: Trees::new(count) }
     }
 
     /// Runs a river from a spring, and its branches. `branches` is asked once for every vertex of a river but its last.
-    pub(crate) fn run(
-        &mut self,
-        spring: usize,
-        branches: &mut impl FnMut() -> bool,
-        rivers: &mut Vec<River>,
-    ) {
+    pub(crate) fn run(&mut self, spring: usize, branches: &mut impl FnMut() -> bool, rivers: &mut Vec<River>) {
         if self.trees.is_taken(spring) {
             return;
         }
@@ -164,11 +149,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
             *below = self.shore(*above, *below, *from * self.highest, *to * self.highest);
             *to = 0.0;
         }
-        River {
-            points,
-            heights,
-            mouth: course.mouth,
-        }
+        River { points, heights, mouth: course.mouth }
     }
 
     /// The point of height zero between one above and one below it: false position with the Illinois rule.
@@ -210,10 +191,7 @@ struct Trees {
 
 impl Trees {
     fn new(count: usize) -> Self {
-        Self {
-            parents: (0..count).collect(),
-            taken: vec![false; count],
-        }
+        Self { parents: (0..count).collect(), taken: vec![false; count] }
     }
 
     fn is_taken(&self, vertex: usize) -> bool {

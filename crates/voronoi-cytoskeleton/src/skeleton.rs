@@ -25,13 +25,7 @@ pub struct SkeletonParams {
 
 impl Default for SkeletonParams {
     fn default() -> Self {
-        Self {
-            sites: 300,
-            lloyd_passes: 2,
-            rivers: 15,
-            branch_probability: 0.2,
-            start_above: 0.5,
-        }
+        Self { sites: 300, lloyd_passes: 2, rivers: 15, branch_probability: 0.2, start_above: 0.5 }
     }
 }
 
@@ -48,35 +42,11 @@ impl Skeleton {
     /// # Errors
     /// [`Error::OutOfRange`] for a parameter outside the range its field states.
     pub fn new(params: &SkeletonParams) -> Result<Self, Error> {
-        let SkeletonParams {
-            sites,
-            lloyd_passes,
-            rivers: _,
-            branch_probability,
-            start_above,
-        } = *params;
-        require(
-            "sites",
-            sites as f64,
-            (1..=1_000_000).contains(&sites),
-            "between 1 and 1000000",
-        )?;
-        require(
-            "lloyd_passes",
-            lloyd_passes as f64,
-            lloyd_passes <= 10_000,
-            "at most 10000",
-        )?;
-        for (field, value) in [
-            ("branch_probability", branch_probability),
-            ("start_above", start_above),
-        ] {
-            require(
-                field,
-                value,
-                (0.0..=1.0).contains(&value),
-                "between 0 and 1",
-            )?;
+        let SkeletonParams { sites, lloyd_passes, rivers: _, branch_probability, start_above } = *params;
+        require("sites", sites as f64, (1..=1_000_000).contains(&sites), "between 1 and 1000000")?;
+        require("lloyd_passes", lloyd_passes as f64, lloyd_passes <= 10_000, "at most 10000")?;
+        for (field, value) in [("branch_probability", branch_probability), ("start_above", start_above)] {
+            require(field, value, (0.0..=1.0).contains(&value), "between 0 and 1")?;
         }
         Ok(Self { params: *params })
     }
@@ -86,11 +56,7 @@ impl Skeleton {
     ///
     /// # Errors
     /// [`Error::Coordinate`] or [`Error::Flat`] for an outline that is none.
-    pub fn grow<R: Rng + ?Sized>(
-        &self,
-        outline: &[Point],
-        rng: &mut R,
-    ) -> Result<Vec<River>, Error> {
+    pub fn grow<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Vec<River>, Error> {
         let edge = Outline::new(outline)?;
         self.grow_on(&Window::around(outline)?, |point| edge.height(point), rng)
     }
@@ -129,19 +95,12 @@ impl Skeleton {
     /// each vertex to the next. Where it branches, the branch takes the other way down, and then the steepest that does not lead
     /// back into its own tree. A river that meets another tree ends there. One that ends in a pit, which a landscape
     /// that is not concave may have, is left out, and so is a branch that cannot but return to its own tree.
-    pub fn rivers<R: Rng + ?Sized>(
-        &self,
-        diagram: &Diagram,
-        height: impl Fn(Point) -> f64,
-        rng: &mut R,
-    ) -> Vec<River> {
+    pub fn rivers<R: Rng + ?Sized>(&self, diagram: &Diagram, height: impl Fn(Point) -> f64, rng: &mut R) -> Vec<River> {
         let mut landscape = Landscape::new(diagram, height);
         let lowest = self.params.start_above * landscape.highest;
         let mut springs: Vec<usize> = (0..diagram.vertices().len())
             .filter(|&vertex| !diagram.is_on_border(vertex))
-            .filter(|&vertex| {
-                landscape.heights[vertex] > 0.0 && landscape.heights[vertex] >= lowest
-            })
+            .filter(|&vertex| landscape.heights[vertex] > 0.0 && landscape.heights[vertex] >= lowest)
             .collect();
         let mut rivers = Vec::new();
         for _ in 0..self.params.rivers.min(springs.len()) {

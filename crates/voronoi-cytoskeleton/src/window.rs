@@ -30,21 +30,12 @@ impl Window {
     pub fn around(points: &[Point]) -> Result<Self, Error> {
         require_coordinates("outline point", points)?;
         let bound = |of: fn(f64, f64) -> f64, from: f64| {
-            points.iter().fold([from; 2], |bound, point| {
-                [of(bound[0], point[0]), of(bound[1], point[1])]
-            })
+            points.iter().fold([from; 2], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])])
         };
         if points.is_empty() {
-            return Err(Error::Flat {
-                what: "outline",
-                count: 0,
-                area: 0.0,
-            });
+            return Err(Error::Flat { what: "outline", count: 0, area: 0.0 });
         }
-        Self::rectangle(
-            bound(f64::min, f64::INFINITY),
-            bound(f64::max, f64::NEG_INFINITY),
-        )
+        Self::rectangle(bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY))
     }
 
     /// A convex polygon, its corners in either order.
@@ -65,18 +56,12 @@ impl Window {
             area = -area;
         }
         if corners.len() < 3 || area == 0.0 {
-            return Err(Error::Flat {
-                what: "window",
-                count: corners.len(),
-                area,
-            });
+            return Err(Error::Flat { what: "window", count: corners.len(), area });
         }
         // What rounding may push a corner on a straight run to the wrong side of it.
         let slack = area * 1e-12;
         let count = corners.len();
-        let sides: Vec<Point> = (0..count)
-            .map(|side| sub(corners[(side + 1) % count], corners[side]))
-            .collect();
+        let sides: Vec<Point> = (0..count).map(|side| sub(corners[(side + 1) % count], corners[side])).collect();
         for side in 0..count {
             for (corner, &point) in corners.iter().enumerate() {
                 if cross(sides[side], sub(point, corners[side])) < -slack {
@@ -88,12 +73,7 @@ impl Window {
         for &side in &sides {
             reach.push(reach[reach.len() - 1] + length(side));
         }
-        Ok(Self {
-            corners,
-            sides,
-            reach,
-            area,
-        })
+        Ok(Self { corners, sides, reach, area })
     }
 
     /// The corners, in the order in which the area is positive with x right and y down.
@@ -108,8 +88,7 @@ impl Window {
 
     /// Whether a point lies in the window or on its border.
     pub fn contains(&self, point: Point) -> bool {
-        self.sides()
-            .all(|(from, side)| cross(side, sub(point, from)) >= 0.0)
+        self.sides().all(|(from, side)| cross(side, sub(point, from)) >= 0.0)
     }
 
     /// A point drawn uniformly.
@@ -134,12 +113,7 @@ impl Window {
     }
 
     /// The part of the line `origin + t · direction` inside the window and within a range of t.
-    pub(crate) fn clip(
-        &self,
-        origin: Point,
-        direction: Point,
-        range: [f64; 2],
-    ) -> Option<[f64; 2]> {
+    pub(crate) fn clip(&self, origin: Point, direction: Point, range: [f64; 2]) -> Option<[f64; 2]> {
         let [mut from, mut to] = range;
         for (corner, side) in self.sides() {
             let inside = cross(side, sub(origin, corner));
@@ -161,10 +135,7 @@ impl Window {
             let growth = cross(side, direction);
             (growth < 0.0).then(|| -cross(side, sub(origin, corner)) / growth)
         };
-        self.sides()
-            .filter_map(leaves)
-            .fold(f64::INFINITY, f64::min)
-            .max(0.0)
+        self.sides().filter_map(leaves).fold(f64::INFINITY, f64::min).max(0.0)
     }
 
     /// How far along the border a point on it lies.
@@ -173,17 +144,13 @@ impl Window {
             let way = sub(point, corner);
             let beside = cross(side, way) * cross(side, way) / dot(side, side);
             // Beyond an end of the side, the distance to that end counts.
-            let beyond = (dot(side, way) - dot(side, side))
-                .max(-dot(side, way))
-                .max(0.0);
+            let beyond = (dot(side, way) - dot(side, side)).max(-dot(side, way)).max(0.0);
             beside + beyond * beyond / dot(side, side)
         };
         self.sides()
             .enumerate()
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .map_or(0.0, |(number, (corner, side))| {
-                self.reach[number] + dot(sub(point, corner), side) / length(side)
-            })
+            .map_or(0.0, |(number, (corner, side))| self.reach[number] + dot(sub(point, corner), side) / length(side))
     }
 
     /// How far along the border a corner lies.

@@ -23,17 +23,9 @@ pub(crate) struct Look {
 }
 
 /// Corners, straight and crenulated sides: a stand-in for a cell.
-pub(crate) const CELL: Look = Look {
-    sway: 0.18,
-    bend: 0.16,
-    levels: 5,
-};
+pub(crate) const CELL: Look = Look { sway: 0.18, bend: 0.16, levels: 5 };
 /// Blunt and nearly round: a stand-in for a nucleus.
-pub(crate) const NUCLEUS: Look = Look {
-    sway: 0.07,
-    bend: 0.02,
-    levels: 2,
-};
+pub(crate) const NUCLEUS: Look = Look { sway: 0.07, bend: 0.02, levels: 2 };
 
 /// A polygon of 5 to 9 corners round a jittered ellipse, its sides broken up again and again at a displaced middle.
 pub(crate) fn polygon<R: Rng + ?Sized>(radius: f64, look: &Look, rng: &mut R) -> Vec<Point> {
@@ -49,19 +41,13 @@ pub(crate) fn polygon<R: Rng + ?Sized>(radius: f64, look: &Look, rng: &mut R) ->
             rotate([r * cos * stretch, r * sin / stretch], turned)
         })
         .collect();
-    let mut bends: Vec<f64> = outline
-        .iter()
-        .map(|_| look.bend * sway(rng).abs())
-        .collect();
+    let mut bends: Vec<f64> = outline.iter().map(|_| look.bend * sway(rng).abs()).collect();
     for _ in 0..look.levels {
         let count = outline.len();
         let halves = (0..count).flat_map(|k| {
             let (p, q) = (outline[k], outline[(k + 1) % count]);
             let by = bends[k] * sway(rng);
-            let middle = [
-                (p[0] + q[0]) / 2.0 + by * (q[1] - p[1]),
-                (p[1] + q[1]) / 2.0 - by * (q[0] - p[0]),
-            ];
+            let middle = [(p[0] + q[0]) / 2.0 + by * (q[1] - p[1]), (p[1] + q[1]) / 2.0 - by * (q[0] - p[0])];
             [p, middle]
         });
         outline = halves.collect();
@@ -71,12 +57,7 @@ pub(crate) fn polygon<R: Rng + ?Sized>(radius: f64, look: &Look, rng: &mut R) ->
 }
 
 /// `count` polygons of spread size.
-pub(crate) fn polygons<R: Rng + ?Sized>(
-    count: usize,
-    radius: f64,
-    look: &Look,
-    rng: &mut R,
-) -> Vec<Vec<Point>> {
+pub(crate) fn polygons<R: Rng + ?Sized>(count: usize, radius: f64, look: &Look, rng: &mut R) -> Vec<Vec<Point>> {
     (0..count)
         .map(|_| {
             let size = radius * libm::exp(0.2 * sway(rng));
@@ -94,10 +75,7 @@ pub(crate) fn read_outlines(path: &Path) -> Result<Vec<Vec<Point>>, Box<dyn std:
         let [outline, _, x, y] = fields[..] else {
             return Err(format!("not four fields: {line}").into());
         };
-        outlines
-            .entry(outline.parse()?)
-            .or_default()
-            .push([x.parse()?, y.parse()?]);
+        outlines.entry(outline.parse()?).or_default().push([x.parse()?, y.parse()?]);
     }
     Ok(outlines.into_values().collect())
 }

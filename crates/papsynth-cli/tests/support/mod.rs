@@ -8,31 +8,31 @@ use std::process::{Command, Stdio};
 use std::time::SystemTime;
 
 /// A field that is made in a moment.
-pub const TINY: &str = "--set field.width_px=96 --set field.height_px=80 --set layout.kind=uniform \
+pub(crate) const TINY: &str = "--set field.width_px=96 --set field.height_px=80 --set layout.kind=uniform \
     --set cells.intermediate.count=2 --set cells.superficial.count=0 --set debris.leukocytes.clusters=1 \
     --set debris.bacilli.clusters=1 --set debris.speckles.count=3 --set debris.out_of_focus.count=0";
 
 /// A folder that is removed afterwards.
-pub struct Bench {
+pub(crate) struct Bench {
     root: PathBuf,
 }
 
 /// What a run of the program left.
-pub struct Outcome {
-    pub code: i32,
-    pub out: String,
-    pub err: String,
+pub(crate) struct Outcome {
+    pub(crate) code: i32,
+    pub(crate) out: String,
+    pub(crate) err: String,
 }
 
 impl Bench {
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
         let _ = fs::remove_dir_all(&root);
         fs::create_dir_all(&root).unwrap();
         Self { root }
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.root.join(name)
     }
 
@@ -43,21 +43,21 @@ impl Bench {
         command
     }
 
-    pub fn run(&self, words: &str) -> Outcome {
+    pub(crate) fn run(&self, words: &str) -> Outcome {
         let output = self.command(words).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
     }
 
     /// A run that must succeed.
-    pub fn good(&self, words: &str) -> Outcome {
+    pub(crate) fn good(&self, words: &str) -> Outcome {
         let outcome = self.run(words);
         assert_eq!(outcome.code, 0, "papsynth {words}\n{}{}", outcome.out, outcome.err);
         outcome
     }
 
     /// The exit code of a run whose standard output nobody reads.
-    pub fn run_into_closed_pipe(&self, words: &str) -> Option<i32> {
+    pub(crate) fn run_into_closed_pipe(&self, words: &str) -> Option<i32> {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
         self.command(words).stdout(writer).stderr(Stdio::null()).status().unwrap().code()
@@ -65,7 +65,7 @@ impl Bench {
 
     /// Interrupts a run as Ctrl-C does once it has said something.
     #[cfg(unix)]
-    pub fn interrupt_after_first_line(&self, words: &str) -> Outcome {
+    pub(crate) fn interrupt_after_first_line(&self, words: &str) -> Outcome {
         let mut child = self.command(words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut out = BufReader::new(child.stdout.take().unwrap());
         let mut text = String::new();
@@ -81,12 +81,12 @@ impl Bench {
     }
 
     /// The content of every file below a folder, by its name.
-    pub fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
+    pub(crate) fn files(&self, folder: &str) -> BTreeMap<String, Vec<u8>> {
         self.walk(folder).into_iter().map(|(name, path)| (name, fs::read(path).unwrap())).collect()
     }
 
     /// When every file below a folder was written.
-    pub fn times(&self, folder: &str) -> BTreeMap<String, SystemTime> {
+    pub(crate) fn times(&self, folder: &str) -> BTreeMap<String, SystemTime> {
         self.walk(folder).into_iter().map(|(name, path)| (name, fs::metadata(path).unwrap().modified().unwrap())).collect()
     }
 
@@ -108,7 +108,7 @@ impl Bench {
     }
 
     /// Writes a grey PNG.
-    pub fn grey_png(&self, name: &str, width: u32, height: u32, grey: impl Fn(u32, u32) -> u8) {
+    pub(crate) fn grey_png(&self, name: &str, width: u32, height: u32, grey: impl Fn(u32, u32) -> u8) {
         let file = BufWriter::new(fs::File::create(self.path(name)).unwrap());
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_color(png::ColorType::Grayscale);
@@ -125,7 +125,7 @@ impl Drop for Bench {
 }
 
 /// Outlines as a table: circles with lobes, each a little different.
-pub fn outlines(count: usize, points: usize, radius_px: f64) -> String {
+pub(crate) fn outlines(count: usize, points: usize, radius_px: f64) -> String {
     let mut text = String::from("outline,k,x_px,y_px\n");
     for outline in 0..count {
         for k in 0..points {

@@ -38,7 +38,10 @@ impl GreyImage {
             Samples::U8(samples) => (samples.into_iter().map(u16::from).collect(), u8::MAX.into()),
             Samples::U16(samples) => (samples, u16::MAX),
             Samples::U32(_) => {
-                return Err(Problem::Samples { found: "32 bit samples".to_owned(), accepted: "8 or 16 bit grey images" });
+                return Err(Problem::Samples {
+                    found: "32 bit samples".to_owned(),
+                    accepted: "8 or 16 bit grey images",
+                });
             }
         };
         Ok(Self { width, grey, white })

@@ -91,7 +91,9 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
 /// If there is none, or two differ only in their endings.
 pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(Problem::Missing { wanted: "folder" }),
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+            Error::input(folder)(Problem::Missing { wanted: "folder" })
+        }
         _ => Error::io("read", folder)(e),
     };
     let mut found = BTreeMap::new();

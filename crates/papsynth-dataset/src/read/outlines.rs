@@ -52,14 +52,21 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
         }
         let Some(last) = outlines.last_mut() else { continue };
         if k.parse() != Ok(last.points.len()) {
-            return Err(wrong(format!("k is `{k}`; {} is wanted, the next point of outline `{name}`", last.points.len())));
+            return Err(wrong(format!(
+                "k is `{k}`; {} is wanted, the next point of outline `{name}`",
+                last.points.len()
+            )));
         }
         last.points.push(point);
     }
     match outlines.iter().find(|o| o.points.len() < MIN_POINTS) {
         Some(short) => Err(Problem::Broken {
             format: "CSV",
-            message: format!("outline `{}` has {} points; at least {MIN_POINTS} are wanted", short.name, short.points.len()),
+            message: format!(
+                "outline `{}` has {} points; at least {MIN_POINTS} are wanted",
+                short.name,
+                short.points.len()
+            ),
         }),
         None if outlines.is_empty() => Err(Problem::Broken { format: "CSV", message: "it has no outline".to_owned() }),
         None => Ok(outlines),

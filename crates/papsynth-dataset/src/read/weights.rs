@@ -23,7 +23,10 @@ pub fn weights(image: &GreyImage) -> Result<WeightMap, Problem> {
 /// # Errors
 /// If there is no label.
 pub fn label_weights(labels: &LabelMap) -> Result<WeightMap, Problem> {
-    possible(WeightMap { width: labels.width, weights: labels.ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect() })
+    possible(WeightMap {
+        width: labels.width,
+        weights: labels.ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect(),
+    })
 }
 
 fn possible(map: WeightMap) -> Result<WeightMap, Problem> {

@@ -12,13 +12,17 @@ pub(crate) fn description(geometry: &Geometry) -> String {
     let bits = *bits;
     let kind = if bits <= 8 { "uint8" } else { "uint16" };
     let step = match planes.as_slice() {
-        [first, second, ..] => format!(" PhysicalSizeZ=\"{}\" PhysicalSizeZUnit=\"{MICROMETRE}\"", (second - first).abs()),
+        [first, second, ..] => {
+            format!(" PhysicalSizeZ=\"{}\" PhysicalSizeZUnit=\"{MICROMETRE}\"", (second - first).abs())
+        }
         _ => String::new(),
     };
     let positions: String = planes
         .iter()
         .enumerate()
-        .map(|(z, um)| format!("<Plane TheZ=\"{z}\" TheC=\"0\" TheT=\"0\" PositionZ=\"{um}\" PositionZUnit=\"{MICROMETRE}\"/>"))
+        .map(|(z, um)| {
+            format!("<Plane TheZ=\"{z}\" TheC=\"0\" TheT=\"0\" PositionZ=\"{um}\" PositionZUnit=\"{MICROMETRE}\"/>")
+        })
         .collect();
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\

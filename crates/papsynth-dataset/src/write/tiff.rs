@@ -31,11 +31,21 @@ pub(crate) enum PageWriter<W: Write + Seek> {
 impl<W: Write + Seek> PageWriter<W> {
     /// A file that will hold about `bytes` bytes of pixels.
     pub(crate) fn new(writer: W, bytes: u64) -> TiffResult<Self> {
-        Ok(if bytes < CLASSIC_BYTES { Self::Classic(TiffEncoder::new(writer)?) } else { Self::Big(TiffEncoder::new_big(writer)?) })
+        Ok(if bytes < CLASSIC_BYTES {
+            Self::Classic(TiffEncoder::new(writer)?)
+        } else {
+            Self::Big(TiffEncoder::new_big(writer)?)
+        })
     }
 
     /// Writes a page; `description` is ASCII.
-    pub(crate) fn write(&mut self, pixels: Pixels, width: usize, pixel_um: f64, description: Option<&str>) -> TiffResult<()> {
+    pub(crate) fn write(
+        &mut self,
+        pixels: Pixels,
+        width: usize,
+        pixel_um: f64,
+        description: Option<&str>,
+    ) -> TiffResult<()> {
         match self {
             Self::Classic(encoder) => page(encoder, pixels, width, pixel_um, description),
             Self::Big(encoder) => page(encoder, pixels, width, pixel_um, description),

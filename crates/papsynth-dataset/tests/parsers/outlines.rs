@@ -9,12 +9,6 @@ pub(crate) fn check(bytes: &[u8]) {
     };
     for outline in outlines {
         assert!(outline.points.len() >= 3);
-        assert!(
-            outline
-                .points
-                .iter()
-                .flatten()
-                .all(|coordinate| coordinate.is_finite())
-        );
+        assert!(outline.points.iter().flatten().all(|coordinate| coordinate.is_finite()));
     }
 }

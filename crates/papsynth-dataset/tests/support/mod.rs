@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 
 use papsynth::key::Key;
 use papsynth::recipe::{PhotonNoise, Recipe, Restore};
-use papsynth::scene::{
-    Kind, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View,
-};
+use papsynth::scene::{Kind, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View};
 use papsynth::truth::{Mask, ObjectTruth, Part, Truth, front_masks, layers};
 use papsynth::{Finished, Frame, Plane};
 
@@ -21,8 +19,7 @@ pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
-        let path =
-            std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}", std::process::id()));
+        let path = std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}", std::process::id()));
         let _ = fs::remove_dir_all(&path);
         fs::create_dir_all(&path).unwrap();
         Self(path)
@@ -78,11 +75,7 @@ pub(crate) fn class() -> String {
 pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
-        view: View {
-            width: WIDTH,
-            height: HEIGHT,
-            pixel_um: 0.25,
-        },
+        view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
         background: SceneBackground {
             level: 0.9,
@@ -103,7 +96,6 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             offset_dn: 0.0,
             photon_noise: PhotonNoise::Exact,
         },
-        overlap: 1.0,
         objects: Vec::new(),
     }
 }
@@ -112,35 +104,19 @@ fn disc(x: f32, y: f32, radius: f32) -> Mask {
     let tile: Vec<f32> = (0..WIDTH * HEIGHT)
         .map(|i| {
             let (dx, dy) = ((i % WIDTH) as f32 - x, (i / WIDTH) as f32 - y);
-            if dx * dx + dy * dy <= radius * radius {
-                1.0
-            } else {
-                0.0
-            }
+            if dx * dx + dy * dy <= radius * radius { 1.0 } else { 0.0 }
         })
         .collect();
     Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
 }
 
-fn object(
-    id: u32,
-    part: Part,
-    kind: Kind,
-    class: &str,
-    depth_um: f64,
-    planes: &[f64],
-    amodal: Mask,
-) -> ObjectTruth {
+fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
     ObjectTruth {
         id,
         part,
         kind,
         class: class.to_owned(),
-        bethesda: if kind == Kind::Cell {
-            "NILM".to_owned()
-        } else {
-            String::new()
-        },
+        bethesda: if kind == Kind::Cell { "NILM".to_owned() } else { String::new() },
         traits: "flap;pyknotic".to_owned(),
         cluster: 1,
         centre_um: [3.25, 7.5],
@@ -152,10 +128,7 @@ fn object(
         front: Mask::default(),
         amodal,
         defocus_um: planes.iter().map(|z| z - depth_um).collect(),
-        detectability: planes
-            .iter()
-            .map(|z| 10.0 / (1.0 + (z - depth_um).abs()))
-            .collect(),
+        detectability: planes.iter().map(|z| 10.0 / (1.0 + (z - depth_um).abs())).collect(),
     }
 }
 
@@ -166,72 +139,19 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
     let shift = (index % 7) as f32;
     let near = first_id + 1;
     let mut objects = vec![
-        object(
-            first_id,
-            Part::Cytoplasm,
-            Kind::Cell,
-            &class,
-            -0.5,
-            z,
-            disc(18.0 + shift, 22.0, 17.0),
-        ),
-        object(
-            first_id,
-            Part::Nucleus,
-            Kind::Cell,
-            &class,
-            -0.5,
-            z,
-            disc(18.0 + shift, 22.0, 5.0),
-        ),
-        object(
-            near,
-            Part::Cytoplasm,
-            Kind::Cell,
-            &class,
-            0.5,
-            z,
-            disc(40.0, 24.0, 16.0),
-        ),
-        object(
-            near,
-            Part::Nucleus,
-            Kind::Cell,
-            &class,
-            0.5,
-            z,
-            disc(42.0, 24.0, 4.0),
-        ),
-        object(
-            near + 1,
-            Part::Whole,
-            Kind::Leukocyte,
-            "leukocyte",
-            0.0,
-            z,
-            disc(0.0, 45.0, 6.0),
-        ),
-        object(
-            near + 2,
-            Part::Whole,
-            Kind::Speckle,
-            "speckle",
-            1.0,
-            z,
-            disc(60.0, 6.0, 0.5),
-        ),
+        object(first_id, Part::Cytoplasm, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
+        object(first_id, Part::Nucleus, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
+        object(near, Part::Cytoplasm, Kind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
+        object(near, Part::Nucleus, Kind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
+        object(near + 1, Part::Whole, Kind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
+        object(near + 2, Part::Whole, Kind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
     ];
     let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
-        (0..objects.len())
-            .filter(|&i| objects[i].part == part)
-            .collect()
+        (0..objects.len()).filter(|&i| objects[i].part == part).collect()
     };
     let labels = [Part::Cytoplasm, Part::Nucleus, Part::Whole].map(|part| {
         let members = of_part(&objects, part);
-        let stack: Vec<_> = members
-            .iter()
-            .map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal))
-            .collect();
+        let stack: Vec<_> = members.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
         let (labels, fronts) = front_masks(&stack, WIDTH, HEIGHT);
         for (i, front) in members.into_iter().zip(fronts) {
             objects[i].front = front;
@@ -249,37 +169,15 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
         .collect();
     let planes = (0..planes)
         .map(|z| {
-            let noise_free: Vec<f32> = all_in_focus
-                .iter()
-                .map(|v| v * (1.0 - 0.05 * z as f32))
-                .collect();
+            let noise_free: Vec<f32> = all_in_focus.iter().map(|v| v * (1.0 - 0.05 * z as f32)).collect();
             let mut state = index.wrapping_mul(31) + z as u64 + 1;
             let grey = noise_free.iter().map(|v| {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 let noise = (state >> 40) as f32 / (1 << 24) as f32 - 0.5;
                 (v + noise * 0.05 * f32::from(white)).clamp(0.0, f32::from(white)) as u16
             });
-            Plane {
-                index: z,
-                depth_um: scene.planes_um[z],
-                grey: grey.collect(),
-                noise_free,
-                saturated: z,
-            }
+            Plane { index: z, depth_um: scene.planes_um[z], grey: grey.collect(), noise_free, saturated: z }
         })
         .collect();
-    Frame {
-        planes,
-        finished: Finished {
-            scene,
-            truth: Truth {
-                objects,
-                labels,
-                layers,
-            },
-            all_in_focus,
-        },
-    }
+    Frame { planes, finished: Finished { scene, truth: Truth { objects, labels, layers }, all_in_focus } }
 }

@@ -71,24 +71,19 @@ fn detrended(nucleus: &Measured) -> Vec<f64> {
 
 /// The Matérn covariance whose image through the microscope comes nearest to an autocorrelation: (ν, length in µm).
 ///
-/// Subtracting the mean of a small window lowers every correlation by about the same share c, which is fitted along:
-/// ρ′ = (ρ − c) / (1 − c).
-pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64) -> (f64, f64) {
+/// Subtracting mean and slope takes the three slowest modes out of a nucleus of `area_um2`. Modes of a window of area a
+/// lie 1/a apart in the frequency plane, so those three fill a disc of radius √(3/(π a)): the spectrum counts from there.
+pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64, area_um2: f64) -> (f64, f64) {
+    let lowest = (3.0 / (core::f64::consts::PI * area_um2)).sqrt();
     let mut best = (f64::INFINITY, NUS[0], 0.5);
     for nu in NUS {
         // Lengths from 0.1 to 2.5 µm in steps of three per cent.
         let mut length = 0.1;
         while length < 2.5 {
-            let model = imaged_autocorrelation(nu, length, pixel_um);
-            for step in 0..40 {
-                let c = f64::from(step) * 0.015;
-                let error: f64 = model.iter().zip(measured).map(|(rho, m)| {
-                    let e = (rho - c) / (1.0 - c) - m;
-                    e * e
-                }).sum();
-                if error < best.0 {
-                    best = (error, nu, length);
-                }
+            let model = imaged_autocorrelation(nu, length, pixel_um, lowest);
+            let error: f64 = model.iter().zip(measured).map(|(rho, m)| (rho - m) * (rho - m)).sum();
+            if error < best.0 {
+                best = (error, nu, length);
             }
             length *= 1.03;
         }
@@ -96,14 +91,15 @@ pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64) -> (f64, f64) {
     (best.1, best.2)
 }
 
-/// Autocorrelation at lags 1 to 6 px of a Matérn field after the microscope's Gaussian.
-fn imaged_autocorrelation(nu: f64, length_um: f64, pixel_um: f64) -> [f64; LAGS] {
+/// Autocorrelation at lags 1 to 6 px of what is left of a Matérn field above a frequency (cycles per µm) after the
+/// microscope's Gaussian.
+fn imaged_autocorrelation(nu: f64, length_um: f64, pixel_um: f64, lowest: f64) -> [f64; LAGS] {
     const HIGHEST: f64 = 4.0;
     const STEPS: usize = 400;
     let spectrum = Spectrum::Matern { nu, length_px: length_um };
     let mut sums = [0.0; LAGS + 1];
     for step in 0..STEPS {
-        let f = HIGHEST * (step as f64 + 0.5) / STEPS as f64;
+        let f = lowest + (HIGHEST - lowest) * (step as f64 + 0.5) / STEPS as f64;
         let spread = 2.0 * core::f64::consts::PI * SIGMA_UM * f;
         let power = spectrum.density(f) * f * libm::exp(-spread * spread);
         for (lag, sum) in sums.iter_mut().enumerate() {
@@ -120,9 +116,8 @@ mod tests {
     #[test]
     fn the_fit_finds_the_field_it_was_made_from() {
         for (nu, length) in [(0.5, 0.7), (1.0, 0.5)] {
-            let c = 0.12;
-            let seen = imaged_autocorrelation(nu, length, 0.25).map(|rho| (rho - c) / (1.0 - c));
-            let (found_nu, found) = fit_matern(&seen, 0.25);
+            let lowest = (3.0 / (core::f64::consts::PI * 50.0)).sqrt();
+            let (found_nu, found) = fit_matern(&imaged_autocorrelation(nu, length, 0.25, lowest), 0.25, 50.0);
             assert_eq!(found_nu, nu);
             assert!((found / length - 1.0).abs() < 0.05, "{found} for {length}");
         }

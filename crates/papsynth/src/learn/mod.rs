@@ -140,7 +140,10 @@ fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnPar
     chromatin.sd = normal(measured.iter().map(|m| m.sd));
     chromatin.skewness = rounded(normal(measured.iter().map(|m| m.skewness)).mean);
     chromatin.rim_to_centre = nucleus::mean_profile(measured).into_iter().map(rounded).collect();
-    let (nu, length_um) = chromatin::fit_matern(&chromatin::mean_autocorrelation(measured), params.pixel_um);
+    let pixels: usize = measured.iter().map(|m| m.absorbance.iter().filter(|a| !a.is_nan()).count()).sum();
+    let area_um2 = pixels as f64 / measured.len() as f64 * params.pixel_um * params.pixel_um;
+    let (nu, length_um) =
+        chromatin::fit_matern(&chromatin::mean_autocorrelation(measured), params.pixel_um, area_um2);
     chromatin.nu = nu;
     chromatin.length_um = rounded(length_um);
     nucleus.donors = match params.donors {

@@ -1,9 +1,6 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
 
-use cloth_verlet::{Sheet, View};
-#[derive(Clone)] struct Crease { point: Point, direction_rad: f64, radius: f64, turn: Turn }
-#[derive(Clone)] enum Turn { Flap, Roll { turns: f64 } }
-fn crease_outline(p: &[Point], _c: &Crease) -> Vec<Vec<Point>> { vec![p.to_vec()] }
+use cloth_verlet::{Crease, Sheet, Turn, View, crease_outline};
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use super::chromatin::interpolate;
@@ -25,6 +22,9 @@ const GRANULE_UM: f64 = 0.28;
 
 /// Absorbance of a granule relative to the cytoplasm's.
 const GRANULE: f64 = 0.75;
+
+/// Largest angle between the two creases of a cell that is folded from both sides, radians.
+const SKEW: f64 = 0.45;
 
 /// Makes cells, sixteen sheets at a time.
 pub(super) fn make(studio: &Studio, scene: &Scene, pools: &Pools, cells: &[(&Object, &CellBody)]) -> Result<Vec<Phantom>, String> {
@@ -86,11 +86,12 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
         let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
         let turn = match fold.form {
             FoldForm::Flap | FoldForm::Cigar => Turn::Flap,
-            FoldForm::Roll => Turn::Roll { turns: 1.5 },
+            FoldForm::Roll => Turn::Roll { turns: 1 },
         };
         Crease {
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
-            direction_rad: direction,
+            // The line runs a quarter turn before the direction that leads beyond it.
+            direction_rad: direction - core::f64::consts::FRAC_PI_2,
             radius: fold.radius_um / scene.view.pixel_um,
             turn,
         }
@@ -101,7 +102,8 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
         direction += core::f64::consts::PI;
     }
     match fold.form {
-        FoldForm::Cigar => vec![crease(direction), crease(direction + core::f64::consts::PI)],
+        // The second side is never turned in quite parallel to the first.
+        FoldForm::Cigar => vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))],
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
     }
 }
@@ -133,9 +135,11 @@ fn finish(
 ) -> Result<Phantom, String> {
     let mut rng = scene.key.stream("cell", object.number, "detail");
     let pixel_um = scene.view.pixel_um;
-    let pieces = plan.creases.iter().fold(vec![plan.outline.clone()], |pieces, crease| {
-        pieces.iter().flat_map(|piece| crease_outline(piece, crease)).collect()
-    });
+    let mut pieces = vec![plan.outline.clone()];
+    for crease in &plan.creases {
+        let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
+        pieces = folded.map_err(|e| e.to_string())?.concat();
+    }
     let rough: Vec<Vec<Point>> =
         pieces.iter().map(|piece| roughened(piece, body.detail.fray_um / pixel_um, &mut rng)).collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
@@ -148,7 +152,7 @@ fn finish(
     match sheet {
         Some(mut sheet) => {
             for crease in &plan.creases {
-                let _ = (crease.point, crease.direction_rad, crease.radius, matches!(crease.turn, Turn::Roll{turns} if turns>0.)); let _ = &mut sheet;
+                sheet.fold(crease).map_err(|e| e.to_string())?;
             }
             let view = View { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel: 1.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| interpolate(profile, 1.0 - radius));

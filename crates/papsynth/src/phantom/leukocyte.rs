@@ -14,9 +14,9 @@ const NOISE_CELL: f64 = 0.9;
 /// Strength of that noise relative to the absorbance.
 const NOISE_STRENGTH: f32 = 0.45;
 /// Radius of a lobe relative to a round nucleus of the same cell.
-const LOBE: f64 = 0.60;
+const LOBE: f64 = 0.66;
 /// Radius of the cell relative to its nucleus.
-const HALO: f64 = 1.75;
+const HALO: f64 = 1.6;
 /// A cytoplasm fainter than this cannot be told from the background.
 const FAINTEST_HALO: f64 = 0.02;
 
@@ -35,7 +35,7 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
         vec![place(wobbled_circle(radius, alpha, beta, &mut rng), [0.0, 0.0])]
     } else {
         // Lobes lie along an arc, so near to each other that they touch.
-        let spread = random::between(0.75, 1.25, &mut rng);
+        let spread = random::between(0.7, 1.1, &mut rng);
         let bend = random::between(0.6, 1.4, &mut rng);
         (0..lobes)
             .map(|lobe| {
@@ -47,7 +47,7 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
             .collect()
     };
     let body = (halo >= FAINTEST_HALO)
-        .then(|| place(wobbled_circle(radius * HALO, 0.06, 0.06, &mut rng), [0.0, 0.0]));
+        .then(|| place(wobbled_circle(radius * HALO, 0.10, 0.10, &mut rng), [0.0, 0.0]));
     let mut nucleus = Tile::around(shapes.iter().chain(&body).flatten(), 2.0);
     let mut coverage = nucleus.blank();
     for shape in &shapes {

@@ -15,6 +15,9 @@ const POINTS: usize = 64;
 /// Width of the dark rim, µm: the nuclear membrane and the chromatin that lies against it, as a microscope shows them.
 const RIM_UM: f64 = 0.45;
 
+/// Absorbance of the palest chromatin relative to the nucleus: what lies above and below a gap is stained too.
+const PALEST: f32 = 0.3;
+
 /// Harmonics that wrinkle a nucleus.
 const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 
@@ -65,7 +68,7 @@ pub(super) fn make(
     for (i, value) in absorbance.values.iter_mut().enumerate() {
         let rim = (coverage.values[i] - inner.values[i]).max(0.0) * nucleus.rim as f32;
         let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
-        *value *= level.max(0.0);
+        *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
     Ok(Piece { part: Part::Nucleus, absorbance, coverage, area_px: area(&outline), imaged })
 }

@@ -71,12 +71,6 @@ impl Tile {
         let values = &mut self.values;
         rasterizer.for_each_pixel(|index, share| values[index] = values[index].max(share.min(1.0)));
     }
-
-    /// Adds another tile where both overlap.
-    pub(crate) fn add(&mut self, other: &Self) {
-        let height = self.height();
-        add_tile(&mut self.values, self.width, height, self.origin, other);
-    }
 }
 
 /// Adds a tile to an image of `width` x `height` whose upper left pixel is pixel `origin` of the large image.

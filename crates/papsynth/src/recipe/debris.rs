@@ -66,8 +66,8 @@ impl Default for Leukocytes {
             radius_um: Number::normal(2.6, 0.25),
             alpha: 0.10.into(),
             beta: 0.10.into(),
-            absorbance: Number::normal(0.55, 0.08),
-            halo: Number::uniform(0.0, 0.10),
+            absorbance: Number::normal(0.42, 0.07),
+            halo: Number::uniform(0.0, 0.12),
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct Slide {
 impl Default for Slide {
     fn default() -> Self {
         Self {
-            depth_um: Number::uniform(2.0, 6.0),
+            depth_um: Number::uniform(1.0, 4.0),
             relief_um: 90.0.into(),
             median_um: 20.0.into(),
             stacking_um: 0.6.into(),
@@ -178,15 +178,15 @@ impl Default for Cytoplasm {
             sheet: Sheet::Xpbd,
             excess: Number::uniform(1.04, 1.16),
             folds: Folds::default(),
-            clouds: Number::uniform(0.06, 0.16),
+            clouds: Number::uniform(0.03, 0.10),
             clouds_um: 3.0.into(),
-            flecks: Number::log_normal(0.25, 0.5),
+            flecks: Number::log_normal(0.14, 0.6),
             flecks_threshold: Number::uniform(0.55, 0.85),
             cytoskeleton: Number::uniform(0.05, 0.18),
-            grain: Number::uniform(0.08, 0.2),
+            grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::uniform(0.2, 0.9),
+            fray_um: Number::uniform(0.1, 0.6),
         }
     }
 }

@@ -105,14 +105,18 @@ fn draw_body(recipe: &Recipe, name: &str, class: &CellClass, mix: &CellMix, stai
     let angle = random::direction(rng);
     let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
     let wrinkled = random::chance(recipe.nucleus.wrinkled.draw(rng), rng);
+    let nucleus_absorbance = normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
+        * stain.nucleus
+        * mix.nucleus_stain.draw(rng);
+    // Chromatin that takes up more stain varies more: what is typical of a class is the contrast, sd over mean.
+    let contrast = normal_at_least(nucleus.chromatin.sd.mean, CONTRAST_SPREAD * nucleus.chromatin.sd.sd, 0.3, rng)
+        / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let mut body = NucleusBody {
         radius_um: nucleus_um,
         off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
         rotation_deg: random::between(0.0, 360.0, rng),
-        absorbance: normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
-            * stain.nucleus
-            * mix.nucleus_stain.draw(rng),
-        texture: normal_at_least(nucleus.chromatin.sd.mean, nucleus.chromatin.sd.sd, 0.25, rng) * stain.texture,
+        absorbance: nucleus_absorbance,
+        texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
@@ -125,6 +129,9 @@ fn draw_body(recipe: &Recipe, name: &str, class: &CellClass, mix: &CellMix, stai
     }
     CellBody { class: name.to_owned(), radius_um, cytoplasm_absorbance, detail, fold, nucleus: body }
 }
+
+/// Share of the spread of chromatin's standard deviation that is left when the absorbance is known.
+const CONTRAST_SPREAD: f64 = 0.6;
 
 /// A normal cut off below a share of its mean, so that no stain vanishes or turns negative.
 fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {

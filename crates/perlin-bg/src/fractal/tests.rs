@@ -4,11 +4,7 @@ use crate::{Fade, Window};
 const KEY: u64 = 42;
 
 fn fractal(octaves: usize, persistence: f64) -> Fractal {
-    let params = FractalParams {
-        octaves,
-        persistence,
-        ..FractalParams::default()
-    };
+    let params = FractalParams { octaves, persistence, ..FractalParams::default() };
     Fractal::new(&params, KEY).unwrap()
 }
 
@@ -26,10 +22,7 @@ fn one_octave_is_perlin() {
 #[test]
 fn an_image_has_the_bits_of_its_points() {
     let noise = fractal(5, 0.6);
-    let window = Window {
-        origin: [-3.3, 8.8],
-        ..Window::with_cell_px(37.0)
-    };
+    let window = Window { origin: [-3.3, 8.8], ..Window::with_cell_px(37.0) };
     let (width, height) = (83, 59);
     let (mut image, mut unit) = (vec![0.0; width * height], vec![9.0; width * height]);
     noise.add_into(&mut image, width, &window, 1.0);
@@ -64,11 +57,7 @@ fn bound_is_the_sum_of_amplitudes() {
         let window = Window::with_cell_px(16.0);
         let mut image = vec![0.0; 512 * 512];
         noise.add_into(&mut image, 512, &window, 1.0);
-        assert!(
-            image
-                .iter()
-                .all(|&v| f64::from(v.abs()) <= noise.amplitude_bound())
-        );
+        assert!(image.iter().all(|&v| f64::from(v.abs()) <= noise.amplitude_bound()));
     }
 }
 
@@ -78,17 +67,10 @@ fn variance_is_the_sum_of_squared_amplitudes() {
     let mut image = vec![0.0; 2048 * 2048];
     noise.add_into(&mut image, 2048, &Window::with_cell_px(16.0), 1.0);
     let count = image.len() as f64;
-    let variance = image
-        .iter()
-        .map(|&v| f64::from(v) * f64::from(v))
-        .sum::<f64>()
-        / count;
+    let variance = image.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>() / count;
     let expected = 0.0462 * (1.0 + 0.25 + 1.0 / 16.0 + 1.0 / 64.0);
     // 128 x 128 cells of the coarsest layer: standard error about 1.2 %; bound 4 standard errors.
-    assert!(
-        (variance / expected - 1.0).abs() < 0.05,
-        "{variance} {expected}"
-    );
+    assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
 }
 
 #[test]
@@ -118,32 +100,11 @@ fn every_option_changes_the_noise() {
     let base = FractalParams::default();
     let reference = Fractal::new(&base, KEY).unwrap();
     let variants = [
-        FractalParams {
-            octaves: 3,
-            ..base.clone()
-        },
-        FractalParams {
-            persistence: 0.4,
-            ..base.clone()
-        },
-        FractalParams {
-            lacunarity: 1.9,
-            ..base.clone()
-        },
-        FractalParams {
-            base: PerlinParams {
-                fade: Fade::Cubic,
-                ..PerlinParams::default()
-            },
-            ..base.clone()
-        },
-        FractalParams {
-            base: PerlinParams {
-                gradients: 8,
-                ..PerlinParams::default()
-            },
-            ..base
-        },
+        FractalParams { octaves: 3, ..base.clone() },
+        FractalParams { persistence: 0.4, ..base.clone() },
+        FractalParams { lacunarity: 1.9, ..base.clone() },
+        FractalParams { base: PerlinParams { fade: Fade::Cubic, ..PerlinParams::default() }, ..base.clone() },
+        FractalParams { base: PerlinParams { gradients: 8, ..PerlinParams::default() }, ..base },
     ];
     for params in variants {
         let noise = Fractal::new(&params, KEY).unwrap();
@@ -155,65 +116,14 @@ fn every_option_changes_the_noise() {
 fn parameters_out_of_range_are_named() {
     let base = FractalParams::default();
     let cases = [
-        (
-            "octaves",
-            FractalParams {
-                octaves: 0,
-                ..base.clone()
-            },
-        ),
-        (
-            "octaves",
-            FractalParams {
-                octaves: 33,
-                ..base.clone()
-            },
-        ),
-        (
-            "persistence",
-            FractalParams {
-                persistence: f64::NAN,
-                ..base.clone()
-            },
-        ),
-        (
-            "persistence",
-            FractalParams {
-                persistence: 0.0,
-                ..base.clone()
-            },
-        ),
-        (
-            "persistence",
-            FractalParams {
-                persistence: -0.5,
-                ..base.clone()
-            },
-        ),
-        (
-            "lacunarity",
-            FractalParams {
-                lacunarity: f64::INFINITY,
-                ..base.clone()
-            },
-        ),
-        (
-            "lacunarity",
-            FractalParams {
-                lacunarity: 0.5,
-                ..base.clone()
-            },
-        ),
-        (
-            "gradients",
-            FractalParams {
-                base: PerlinParams {
-                    gradients: 1,
-                    ..PerlinParams::default()
-                },
-                ..base
-            },
-        ),
+        ("octaves", FractalParams { octaves: 0, ..base.clone() }),
+        ("octaves", FractalParams { octaves: 33, ..base.clone() }),
+        ("persistence", FractalParams { persistence: f64::NAN, ..base.clone() }),
+        ("persistence", FractalParams { persistence: 0.0, ..base.clone() }),
+        ("persistence", FractalParams { persistence: -0.5, ..base.clone() }),
+        ("lacunarity", FractalParams { lacunarity: f64::INFINITY, ..base.clone() }),
+        ("lacunarity", FractalParams { lacunarity: 0.5, ..base.clone() }),
+        ("gradients", FractalParams { base: PerlinParams { gradients: 1, ..PerlinParams::default() }, ..base }),
     ];
     for (field, params) in cases {
         let message = Fractal::new(&params, KEY).unwrap_err().to_string();

@@ -27,9 +27,7 @@ fn border_distance_is_the_distance_transform() {
             }
             nearest
         };
-        let distances: Vec<f64> = (0..width * height)
-            .map(|i| distance(i % width, i / width))
-            .collect();
+        let distances: Vec<f64> = (0..width * height).map(|i| distance(i % width, i / width)).collect();
         let largest = distances.iter().copied().fold(0.0, f64::max);
         for (value, distance) in found.iter().zip(distances) {
             assert_eq!(*value, single(libm::pow(distance / largest, exponent)));
@@ -46,11 +44,7 @@ fn exponent_zero_is_even() {
 
 #[test]
 fn bowl_has_its_curvatures_and_tilts() {
-    let bowl = Illumination::Bowl {
-        x2: 0.0325,
-        y2: 0.0112,
-        tilt: [0.01, -0.02],
-    };
+    let bowl = Illumination::Bowl { x2: 0.0325, y2: 0.0112, tilt: [0.01, -0.02] };
     let (width, height) = (101, 51);
     let found = image(&bowl, width, height);
     let at = |x: usize, y: usize| f64::from(found[y * width + x]);
@@ -72,30 +66,17 @@ fn a_field_of_one_pixel_is_at_the_centre() {
 
 #[test]
 fn lowest_is_the_minimum() {
-    let rising = Illumination::Bowl {
-        x2: -0.3,
-        y2: 0.1,
-        tilt: [0.0, 0.4],
-    };
+    let rising = Illumination::Bowl { x2: -0.3, y2: 0.1, tilt: [0.0, 0.4] };
     for shape in [rising, Illumination::BorderDistance { exponent: 0.5 }] {
         let lowest = Shade::new(&shape, 40, 30).unwrap().lowest();
-        let minimum = image(&shape, 40, 30)
-            .into_iter()
-            .fold(f32::INFINITY, f32::min);
+        let minimum = image(&shape, 40, 30).into_iter().fold(f32::INFINITY, f32::min);
         assert_eq!(lowest, minimum);
     }
 }
 
 #[test]
 fn a_bowl_that_reaches_zero_is_refused() {
-    let deep = Illumination::Bowl {
-        x2: 0.6,
-        y2: 0.5,
-        tilt: [0.0, 0.0],
-    };
+    let deep = Illumination::Bowl { x2: 0.6, y2: 0.5, tilt: [0.0, 0.0] };
     let message = Shade::new(&deep, 10, 10).unwrap_err().to_string();
-    assert!(
-        message.contains("0.6") && message.contains("-0.1"),
-        "{message}"
-    );
+    assert!(message.contains("0.6") && message.contains("-0.1"), "{message}");
 }

@@ -11,20 +11,14 @@ fn quintic() -> Perlin {
 }
 
 fn with_fade(fade: Fade, key: u64) -> Perlin {
-    let params = PerlinParams {
-        fade,
-        ..PerlinParams::default()
-    };
+    let params = PerlinParams { fade, ..PerlinParams::default() };
     Perlin::new(&params, key).unwrap()
 }
 
 fn sampled(noise: &Perlin, side: usize, cell_px: f64) -> Vec<f32> {
     let mut image = vec![0.0; side * side];
     // Half a pixel off the lattice, so that samples lie evenly in a cell.
-    let window = Window {
-        origin: [0.5 / cell_px; 2],
-        ..Window::with_cell_px(cell_px)
-    };
+    let window = Window { origin: [0.5 / cell_px; 2], ..Window::with_cell_px(cell_px) };
     noise.add_into(&mut image, side, &window, 1.0);
     image
 }
@@ -32,9 +26,7 @@ fn sampled(noise: &Perlin, side: usize, cell_px: f64) -> Vec<f32> {
 fn variance(image: &[f32]) -> f64 {
     let count = image.len() as f64;
     let mean = image.iter().map(|&v| f64::from(v)).sum::<f64>() / count;
-    let squares = image
-        .iter()
-        .map(|&v| (f64::from(v) - mean) * (f64::from(v) - mean));
+    let squares = image.iter().map(|&v| (f64::from(v) - mean) * (f64::from(v) - mean));
     squares.sum::<f64>() / count
 }
 
@@ -60,9 +52,7 @@ fn zero_on_the_lattice() {
 fn stays_within_its_bound_and_comes_near_it() {
     for fade in [Fade::Cubic, Fade::Quintic] {
         let noise = with_fade(fade, SEED);
-        let largest = sampled(&noise, 2048, 8.0)
-            .iter()
-            .fold(0.0f32, |largest, v| largest.max(v.abs()));
+        let largest = sampled(&noise, 2048, 8.0).iter().fold(0.0f32, |largest, v| largest.max(v.abs()));
         assert!(f64::from(largest) <= Perlin::BOUND, "{largest}");
         assert!(largest > 0.68, "{largest}");
     }
@@ -99,16 +89,8 @@ fn agrees_with_the_textbook() {
 #[test]
 fn a_row_has_the_bits_of_its_points() {
     let noise = quintic();
-    for (cell_px, origin) in [
-        (64.0, [0.0, 0.0]),
-        (7.3, [-4.2, 1e6]),
-        (0.4, [3.1, -2.7]),
-        (-5.0, [0.0, 0.25]),
-    ] {
-        let window = Window {
-            origin,
-            ..Window::with_cell_px(cell_px)
-        };
+    for (cell_px, origin) in [(64.0, [0.0, 0.0]), (7.3, [-4.2, 1e6]), (0.4, [3.1, -2.7]), (-5.0, [0.0, 0.25])] {
+        let window = Window { origin, ..Window::with_cell_px(cell_px) };
         let (width, height) = (101, 67);
         let mut image = vec![0.0; width * height];
         noise.add_into(&mut image, width, &window, 1.0);
@@ -126,20 +108,14 @@ fn amplitude_scales_and_adds() {
     let mut image = vec![2.0; 40 * 30];
     noise.add_into(&mut image, 40, &window, 0.5);
     for (i, &value) in image.iter().enumerate() {
-        assert_eq!(
-            value,
-            2.0 + 0.5 * noise.at(window.x(i % 40), window.y(i / 40))
-        );
+        assert_eq!(value, 2.0 + 0.5 * noise.at(window.x(i % 40), window.y(i / 40)));
     }
 }
 
 #[test]
 fn tiles_agree_with_the_whole() {
     let noise = quintic();
-    let plane = Window {
-        origin: [0.123, -9.7],
-        ..Window::with_cell_px(13.7)
-    };
+    let plane = Window { origin: [0.123, -9.7], ..Window::with_cell_px(13.7) };
     // Far away on a slide of 10^10 pixels, where a tile of f32 coordinates would have lost its place.
     for corner in [[0, 0], [-70, 12_345], [10_000_000_000, 9_999_999_999]] {
         let (width, height) = (96, 60);
@@ -213,10 +189,7 @@ fn quintic_bends_smoothly_across_lattice_lines_and_cubic_does_not() {
         });
         jumps.fold(0.0, f64::max)
     };
-    let (smooth, broken) = (
-        jump(&with_fade(Fade::Quintic, 2)),
-        jump(&with_fade(Fade::Cubic, 2)),
-    );
+    let (smooth, broken) = (jump(&with_fade(Fade::Quintic, 2)), jump(&with_fade(Fade::Cubic, 2)));
     assert!(smooth < 0.3, "{smooth}");
     assert!(broken > 6.0, "{broken}");
 }
@@ -224,9 +197,7 @@ fn quintic_bends_smoothly_across_lattice_lines_and_cubic_does_not() {
 /// Power spectrum under a Hann window, averaged over keys; `side` x `side`, frequency zero first.
 fn spectrum(params: &PerlinParams, side: usize, cell_px: f64, keys: u64) -> Vec<f64> {
     let angle = |k: usize| TAU * k as f64 / side as f64;
-    let table: Vec<[f64; 2]> = (0..side)
-        .map(|k| [libm::cos(angle(k)), libm::sin(angle(k))])
-        .collect();
+    let table: Vec<[f64; 2]> = (0..side).map(|k| [libm::cos(angle(k)), libm::sin(angle(k))]).collect();
     // A DFT of each row by its definition, the result transposed: twice makes the two dimensions.
     let transform = |input: &[[f64; 2]]| {
         let mut output = vec![[0.0; 2]; side * side];
@@ -247,11 +218,8 @@ fn spectrum(params: &PerlinParams, side: usize, cell_px: f64, keys: u64) -> Vec<
     for key in 0..keys {
         let image = sampled(&Perlin::new(params, SEED ^ key).unwrap(), side, cell_px);
         let hann = |k: usize| 0.5 - 0.5 * libm::cos(angle(k));
-        let windowed: Vec<[f64; 2]> = image
-            .iter()
-            .enumerate()
-            .map(|(i, &v)| [f64::from(v) * hann(i % side) * hann(i / side), 0.0])
-            .collect();
+        let windowed: Vec<[f64; 2]> =
+            image.iter().enumerate().map(|(i, &v)| [f64::from(v) * hann(i % side) * hann(i / side), 0.0]).collect();
         for (p, z) in power.iter_mut().zip(transform(&transform(&windowed))) {
             *p += z[0] * z[0] + z[1] * z[1];
         }
@@ -290,16 +258,12 @@ fn spectrum_peaks_below_half_a_cycle_a_cell() {
     for (i, p) in power.iter().enumerate() {
         let [fx, fy] = frequencies(i, side, cell_px);
         // Rings of 0.05 cycles a cell.
-        let ring = (1..side)
-            .take_while(|&ring| (fx * fx + fy * fy).sqrt() >= ring as f64 * 0.05)
-            .count();
+        let ring = (1..side).take_while(|&ring| (fx * fx + fy * fy).sqrt() >= ring as f64 * 0.05).count();
         rings[ring].0 += p;
         rings[ring].1 += 1.0;
     }
     let density = |ring: usize| rings[ring].0 / f64::max(rings[ring].1, 1.0);
-    let peak = (0..side)
-        .max_by(|&a, &b| density(a).total_cmp(&density(b)))
-        .unwrap();
+    let peak = (0..side).max_by(|&a, &b| density(a).total_cmp(&density(b))).unwrap();
     let peak = (peak as f64 + 0.5) * 0.05;
     assert!((peak - 0.45).abs() <= 0.08, "{peak}");
 }
@@ -308,10 +272,7 @@ fn spectrum_peaks_below_half_a_cycle_a_cell() {
 fn power_is_nearly_even_over_directions_whatever_the_number_of_gradients() {
     // The spectrum depends on the gradients' second moments alone, which any three even directions share.
     for gradients in [3, 8, 256] {
-        let params = PerlinParams {
-            gradients,
-            ..PerlinParams::default()
-        };
+        let params = PerlinParams { gradients, ..PerlinParams::default() };
         let ratio = axis_over_diagonal(&spectrum(&params, 128, 4.0, 12), 128, 4.0);
         // Expectation 1.13 (average over 40 keys of another program); standard error over 12 keys 0.02.
         assert!((ratio - 1.13).abs() < 0.08, "{gradients}: {ratio}");
@@ -322,11 +283,7 @@ fn power_is_nearly_even_over_directions_whatever_the_number_of_gradients() {
 fn a_key_is_a_field() {
     let [a, b, again] = [1, 2, 1].map(|key| sampled(&with_fade(Fade::Quintic, key), 256, 8.0));
     assert_eq!(a, again);
-    let product = a
-        .iter()
-        .zip(&b)
-        .map(|(&x, &y)| f64::from(x * y))
-        .sum::<f64>();
+    let product = a.iter().zip(&b).map(|(&x, &y)| f64::from(x * y)).sum::<f64>();
     let correlation = product / (a.len() as f64 * (variance(&a) * variance(&b)).sqrt());
     // 32 x 32 independent cells: standard error about 1/32; bound 4 standard errors.
     assert!(correlation.abs() < 0.125, "{correlation}");
@@ -336,23 +293,16 @@ fn a_key_is_a_field() {
 fn bits_are_the_same_everywhere() {
     // Recorded once; a change here changes every image made from a seed.
     let noise = quintic();
-    let bits = [[0.5, 0.5], [-3.25, 17.75], [1e9 + 0.125, -1e9 - 0.375]]
-        .map(|[x, y]| noise.at(x, y).to_bits());
+    let bits = [[0.5, 0.5], [-3.25, 17.75], [1e9 + 0.125, -1e9 - 0.375]].map(|[x, y]| noise.at(x, y).to_bits());
     assert_eq!(bits, [3_202_643_538, 1_051_042_590, 973_699_328]);
 }
 
 #[test]
 fn parameters_out_of_range_are_named() {
     for gradients in [0, 1, 2, (1 << 16) + 1, usize::MAX] {
-        let params = PerlinParams {
-            gradients,
-            ..PerlinParams::default()
-        };
+        let params = PerlinParams { gradients, ..PerlinParams::default() };
         let message = Perlin::new(&params, 0).unwrap_err().to_string();
-        assert!(
-            message.contains("gradients") && message.contains("between 3 and 65536"),
-            "{message}"
-        );
+        assert!(message.contains("gradients") && message.contains("between 3 and 65536"), "{message}");
     }
 }
 

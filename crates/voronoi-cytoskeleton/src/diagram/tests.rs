@@ -10,14 +10,7 @@ fn windows() -> Vec<Window> {
     vec![
         Window::rectangle([0.0, 0.0], [200.0, 120.0]).unwrap(),
         Window::rectangle([-1000.5, 3000.0], [-900.0, 3000.25]).unwrap(),
-        Window::convex(&[
-            [0.0, 0.0],
-            [10.0, -2.0],
-            [14.0, 6.0],
-            [6.0, 12.0],
-            [-1.0, 8.0],
-        ])
-        .unwrap(),
+        Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap(),
         Window::convex(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap(),
     ]
 }
@@ -31,27 +24,21 @@ fn random(window: &Window, count: usize, seed: u64) -> Diagram {
 /// Sites on a lattice: every circumcircle passes through four of them, and many edges end in the border at right angles.
 fn lattice() -> Diagram {
     let window = Window::rectangle([0.0, 0.0], [9.0, 7.0]).unwrap();
-    let sites: Vec<Point> = (0..63)
-        .map(|i| [f64::from(i % 9) + 0.5, f64::from(i / 9) + 0.5])
-        .collect();
+    let sites: Vec<Point> = (0..63).map(|i| [f64::from(i % 9) + 0.5, f64::from(i / 9) + 0.5]).collect();
     Diagram::new(&sites, &window).unwrap()
 }
 
 fn diagrams() -> Vec<Diagram> {
     let mut diagrams: Vec<Diagram> = windows()
         .iter()
-        .flat_map(|window| {
-            [1, 2, 3, 4, 7, 50, 300].map(|count| random(window, count, count as u64))
-        })
+        .flat_map(|window| [1, 2, 3, 4, 7, 50, 300].map(|count| random(window, count, count as u64)))
         .collect();
     diagrams.push(lattice());
     // Sites on one line, and close to the border.
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let line: Vec<Point> = (0..10).map(|i| [f64::from(i) + 0.25, 5.0]).collect();
     diagrams.push(Diagram::new(&line, &window).unwrap());
-    let rim: Vec<Point> = (0..40)
-        .map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0])
-        .collect();
+    let rim: Vec<Point> = (0..40).map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0]).collect();
     diagrams.push(Diagram::new(&rim, &window).unwrap());
     diagrams
 }
@@ -59,9 +46,7 @@ fn diagrams() -> Vec<Diagram> {
 #[test]
 fn areas_sum_to_the_window() {
     for diagram in diagrams() {
-        let sum: f64 = (0..diagram.sites().len())
-            .map(|cell| diagram.area(cell))
-            .sum();
+        let sum: f64 = (0..diagram.sites().len()).map(|cell| diagram.area(cell)).sum();
         assert!((sum / diagram.window().area() - 1.0).abs() < 1e-9);
     }
 }
@@ -92,11 +77,7 @@ fn vertices_are_nearest_to_the_sites_of_their_cells() {
         let distance = |vertex: usize, site: Point| length(sub(diagram.vertices()[vertex], site));
         for (cell, &site) in diagram.sites().iter().enumerate() {
             for &vertex in diagram.cell(cell) {
-                let nearest = diagram
-                    .sites()
-                    .iter()
-                    .map(|&site| distance(vertex, site))
-                    .fold(f64::INFINITY, f64::min);
+                let nearest = diagram.sites().iter().map(|&site| distance(vertex, site)).fold(f64::INFINITY, f64::min);
                 assert!(distance(vertex, site) - nearest < 1e-8 * scale);
             }
         }
@@ -114,9 +95,7 @@ fn points_lie_in_the_cells_of_their_nearest_sites() {
                 let way = sub(diagram.sites()[cell], point);
                 dot(way, way)
             };
-            let nearest = (0..80)
-                .min_by(|a, b| square(a).total_cmp(&square(b)))
-                .unwrap();
+            let nearest = (0..80).min_by(|a, b| square(a).total_cmp(&square(b))).unwrap();
             let corners: Vec<Point> = diagram.corners(nearest).collect();
             for (i, &corner) in corners.iter().enumerate() {
                 let side = sub(corners[(i + 1) % corners.len()], corner);
@@ -129,11 +108,7 @@ fn points_lie_in_the_cells_of_their_nearest_sites() {
 #[test]
 fn euler() {
     for diagram in diagrams() {
-        let (v, e, f) = (
-            diagram.vertices().len(),
-            diagram.edges().len(),
-            diagram.sites().len(),
-        );
+        let (v, e, f) = (diagram.vertices().len(), diagram.edges().len(), diagram.sites().len());
         assert_eq!(v + f, e + 1, "{v} vertices, {e} edges, {f} cells");
     }
 }
@@ -145,10 +120,7 @@ fn edges_and_cells_tell_the_same() {
         for cell in 0..diagram.sites().len() {
             let vertices = diagram.cell(cell);
             for (i, &vertex) in vertices.iter().enumerate() {
-                assert_eq!(
-                    sides.insert([vertex, vertices[(i + 1) % vertices.len()]], cell),
-                    None
-                );
+                assert_eq!(sides.insert([vertex, vertices[(i + 1) % vertices.len()]], cell), None);
             }
         }
         let mut uses = 0;
@@ -201,8 +173,7 @@ fn relaxing_never_raises_the_energy_and_evens_the_cells() {
         let mut diagram = random(window, 200, seed as u64);
         let spread = |diagram: &Diagram| {
             let mean = window.area() / 200.0;
-            let squares = (0..200)
-                .map(|cell| (diagram.area(cell) / mean - 1.0) * (diagram.area(cell) / mean - 1.0));
+            let squares = (0..200).map(|cell| (diagram.area(cell) / mean - 1.0) * (diagram.area(cell) / mean - 1.0));
             (squares.sum::<f64>() / 200.0).sqrt()
         };
         let (before, mut energy) = (spread(&diagram), diagram.energy());

@@ -5,9 +5,7 @@ fn river(points: &[Point]) -> River {
     let count = points.len() as f64;
     River {
         points: points.to_vec(),
-        heights: (0..points.len())
-            .map(|i| 1.0 - i as f64 / (count - 1.0))
-            .collect(),
+        heights: (0..points.len()).map(|i| 1.0 - i as f64 / (count - 1.0)).collect(),
         mouth: Mouth::Border,
     }
 }
@@ -34,9 +32,7 @@ fn oracle(rivers: &[River], params: &LineParams) -> Vec<f32> {
                 let height = river.heights[k - 1] + t * (river.heights[k] - river.heights[k - 1]);
                 let half = params.width_px / 2.0 * (1.0 - params.taper * (1.0 - height));
                 value = value.max(match params.profile {
-                    Profile::Flat => {
-                        ((distance + 0.5).min(half) - (distance - 0.5).max(-half)).max(0.0)
-                    }
+                    Profile::Flat => ((distance + 0.5).min(half) - (distance - 0.5).max(-half)).max(0.0),
                     Profile::Smooth => {
                         let radius = half * REACH;
                         let drawn = radius.max(NARROWEST);
@@ -62,23 +58,10 @@ fn agrees_with_every_pixel_against_every_segment() {
         river(&[[-50.0, -20.0], [-9.0, -60.0]]),
     ];
     for profile in [Profile::Flat, Profile::Smooth] {
-        for (width_px, taper, peak) in [
-            (1.7, 0.5, 1.0),
-            (0.4, 0.0, 1.0),
-            (6.0, 1.0, 0.3),
-            (30.0, 0.2, 2.0),
-        ] {
-            let params = LineParams {
-                width_px,
-                profile,
-                taper,
-                peak,
-            };
+        for (width_px, taper, peak) in [(1.7, 0.5, 1.0), (0.4, 0.0, 1.0), (6.0, 1.0, 0.3), (30.0, 0.2, 2.0)] {
+            let params = LineParams { width_px, profile, taper, peak };
             for (found, expected) in drawn(&rivers, &params).iter().zip(oracle(&rivers, &params)) {
-                assert!(
-                    (found - expected).abs() < 2e-4 * peak,
-                    "{params:?}: {found} {expected}"
-                );
+                assert!((found - expected).abs() < 2e-4 * peak, "{params:?}: {found} {expected}");
             }
         }
     }
@@ -86,11 +69,7 @@ fn agrees_with_every_pixel_against_every_segment() {
 
 #[test]
 fn smooth_lines_are_half_as_bright_at_half_their_width() {
-    let params = LineParams {
-        width_px: 10.0,
-        taper: 0.0,
-        ..LineParams::default()
-    };
+    let params = LineParams { width_px: 10.0, taper: 0.0, ..LineParams::default() };
     let image = drawn(&[river(&[[-10.0, 20.0], [70.0, 20.0]])], &params);
     assert_eq!(image[20 * 60 + 30], 1.0);
     assert!((image[25 * 60 + 30] - 0.5).abs() < 1e-6);
@@ -100,12 +79,7 @@ fn smooth_lines_are_half_as_bright_at_half_their_width() {
 #[test]
 fn flat_lines_cover_their_width() {
     for (width_px, y) in [(3.0, 20.0), (2.6, 20.4), (0.3, 19.8)] {
-        let params = LineParams {
-            width_px,
-            profile: Profile::Flat,
-            taper: 0.0,
-            peak: 1.0,
-        };
+        let params = LineParams { width_px, profile: Profile::Flat, taper: 0.0, peak: 1.0 };
         let image = drawn(&[river(&[[-10.0, y], [70.0, y]])], &params);
         let sum: f64 = (0..50).map(|row| f64::from(image[row * 60 + 30])).sum();
         assert!((sum - width_px).abs() < 1e-5, "{sum}");
@@ -116,10 +90,7 @@ fn flat_lines_cover_their_width() {
 fn the_largest_stays() {
     let mut image = vec![0.6f32; 60 * 50];
     let line = river(&[[10.0, 25.0], [50.0, 25.0]]);
-    let params = LineParams {
-        taper: 0.0,
-        ..LineParams::default()
-    };
+    let params = LineParams { taper: 0.0, ..LineParams::default() };
     draw_into(&mut image, 60, std::slice::from_ref(&line), &params).unwrap();
     assert_eq!((image[0], image[25 * 60 + 30]), (0.6, 1.0));
     let once = image.clone();
@@ -131,11 +102,7 @@ fn the_largest_stays() {
 fn taper_thins_a_line_downhill() {
     let line = [river(&[[5.0, 25.0], [55.0, 25.0]])];
     let at = |taper: f64, x: usize| {
-        let params = LineParams {
-            width_px: 8.0,
-            taper,
-            ..LineParams::default()
-        };
+        let params = LineParams { width_px: 8.0, taper, ..LineParams::default() };
         let image = drawn(&line, &params);
         (0..50).map(|row| image[row * 60 + x]).sum::<f32>()
     };
@@ -147,48 +114,16 @@ fn taper_thins_a_line_downhill() {
 fn parameters_out_of_range_are_named() {
     let base = LineParams::default();
     let cases = [
-        (
-            "width_px is 0",
-            LineParams {
-                width_px: 0.0,
-                ..base
-            },
-        ),
-        (
-            "width_px is NaN",
-            LineParams {
-                width_px: f64::NAN,
-                ..base
-            },
-        ),
-        (
-            "width_px is inf",
-            LineParams {
-                width_px: f64::INFINITY,
-                ..base
-            },
-        ),
+        ("width_px is 0", LineParams { width_px: 0.0, ..base }),
+        ("width_px is NaN", LineParams { width_px: f64::NAN, ..base }),
+        ("width_px is inf", LineParams { width_px: f64::INFINITY, ..base }),
         ("taper is 1.1", LineParams { taper: 1.1, ..base }),
-        (
-            "taper is NaN",
-            LineParams {
-                taper: f64::NAN,
-                ..base
-            },
-        ),
+        ("taper is NaN", LineParams { taper: f64::NAN, ..base }),
         ("peak is -1", LineParams { peak: -1.0, ..base }),
-        (
-            "peak is NaN",
-            LineParams {
-                peak: f32::NAN,
-                ..base
-            },
-        ),
+        ("peak is NaN", LineParams { peak: f32::NAN, ..base }),
     ];
     for (start, params) in cases {
-        let message = draw_into(&mut [0.0; 4], 2, &[], &params)
-            .unwrap_err()
-            .to_string();
+        let message = draw_into(&mut [0.0; 4], 2, &[], &params).unwrap_err().to_string();
         assert!(message.starts_with(start), "{message}");
     }
 }

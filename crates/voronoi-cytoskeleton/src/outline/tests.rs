@@ -9,10 +9,7 @@ fn star(count: u32) -> Vec<Point> {
         .map(|k| {
             let angle = core::f64::consts::TAU * f64::from(k) / f64::from(count);
             let radius = 50.0 + 15.0 * libm::cos(5.0 * angle);
-            [
-                100.0 + radius * libm::cos(angle),
-                80.0 + radius * libm::sin(angle),
-            ]
+            [100.0 + radius * libm::cos(angle), 80.0 + radius * libm::sin(angle)]
         })
         .collect()
 }
@@ -34,23 +31,8 @@ fn oracle(points: &[Point], p: Point) -> f64 {
 #[test]
 fn agrees_with_a_look_at_every_segment() {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x006f_7574_6c69_6e65);
-    let square = vec![
-        [40.0, 40.0],
-        [140.0, 40.0],
-        [140.0, 40.0],
-        [140.0, 120.0],
-        [40.0, 120.0],
-    ];
-    let outlines = [
-        star(3),
-        star(7),
-        star(8),
-        star(9),
-        star(64),
-        star(65),
-        star(421),
-        square,
-    ];
+    let square = vec![[40.0, 40.0], [140.0, 40.0], [140.0, 40.0], [140.0, 120.0], [40.0, 120.0]];
+    let outlines = [star(3), star(7), star(8), star(9), star(64), star(65), star(421), square];
     let around = Window::rectangle([0.0, 0.0], [200.0, 160.0]).unwrap();
     for points in outlines {
         let outline = Outline::new(&points).unwrap();
@@ -59,10 +41,7 @@ fn agrees_with_a_look_at_every_segment() {
         let level: Vec<Point> = points.iter().map(|p| [p[0] - 7.25, p[1]]).collect();
         for point in random.chain(level) {
             let (found, expected) = (outline.height(point), oracle(&points, point));
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{point:?}: {found} {expected}"
-            );
+            assert!((found - expected).abs() < 1e-9, "{point:?}: {found} {expected}");
         }
     }
 }

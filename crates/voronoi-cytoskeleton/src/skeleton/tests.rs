@@ -16,20 +16,14 @@ fn outlines() -> [Vec<Point>; 2] {
             .map(|k| {
                 let angle = core::f64::consts::TAU * f64::from(k) / 420.0;
                 let radius = 70.0 * (1.0 + depth * libm::cos(5.0 * angle));
-                [
-                    100.0 + 1.2 * radius * libm::cos(angle),
-                    110.0 + radius * libm::sin(angle),
-                ]
+                [100.0 + 1.2 * radius * libm::cos(angle), 110.0 + radius * libm::sin(angle)]
             })
             .collect()
     })
 }
 
 fn grow(params: SkeletonParams, outline: &[Point], seed: u64) -> Vec<River> {
-    Skeleton::new(&params)
-        .unwrap()
-        .grow(outline, &mut rng(seed))
-        .unwrap()
+    Skeleton::new(&params).unwrap().grow(outline, &mut rng(seed)).unwrap()
 }
 
 /// A point as a key.
@@ -39,13 +33,7 @@ fn key(point: Point) -> [u64; 2] {
 
 #[test]
 fn the_papers_values() {
-    let paper = SkeletonParams {
-        sites: 300,
-        lloyd_passes: 2,
-        rivers: 15,
-        branch_probability: 0.2,
-        start_above: 0.5,
-    };
+    let paper = SkeletonParams { sites: 300, lloyd_passes: 2, rivers: 15, branch_probability: 0.2, start_above: 0.5 };
     assert_eq!(SkeletonParams::default(), paper);
 }
 
@@ -96,11 +84,7 @@ fn rivers_end_on_the_outline_or_in_another_tree() {
 #[test]
 fn rivers_are_trees() {
     for branch_probability in [0.0, 0.2, 1.0] {
-        let params = SkeletonParams {
-            branch_probability,
-            rivers: 40,
-            ..SkeletonParams::default()
-        };
+        let params = SkeletonParams { branch_probability, rivers: 40, ..SkeletonParams::default() };
         for outline in outlines() {
             for seed in 0..20 {
                 // A forest: edges that join two parts, never one that joins a part to itself.
@@ -127,18 +111,11 @@ fn rivers_are_trees() {
 fn rivers_run_along_edges_by_steepest_descent() {
     let window = Window::rectangle([0.0, 0.0], [100.0, 80.0]).unwrap();
     let height = |[x, y]: Point| 60.0 - length([x - 50.0, y - 40.0]) - 0.1 * x;
-    let params = SkeletonParams {
-        branch_probability: 0.0,
-        ..SkeletonParams::default()
-    };
+    let params = SkeletonParams { branch_probability: 0.0, ..SkeletonParams::default() };
     let skeleton = Skeleton::new(&params).unwrap();
     let diagram = skeleton.diagram(&window, &mut rng(1)).unwrap();
     let mut ways: BTreeMap<[u64; 2], Vec<Point>> = BTreeMap::new();
-    for edge in diagram
-        .edges()
-        .iter()
-        .filter(|edge| edge.neighbour.is_some())
-    {
+    for edge in diagram.edges().iter().filter(|edge| edge.neighbour.is_some()) {
         let [a, b] = edge.ends.map(|vertex| diagram.vertices()[vertex]);
         ways.entry(key(a)).or_default().push(b);
         ways.entry(key(b)).or_default().push(a);
@@ -148,10 +125,7 @@ fn rivers_run_along_edges_by_steepest_descent() {
     for river in rivers {
         for pair in river.points.windows(2) {
             let slope = |&to: &Point| (height(pair[0]) - height(to)) / length(sub(to, pair[0]));
-            let steepest = ways[&key(pair[0])]
-                .iter()
-                .max_by(|a, b| slope(a).total_cmp(&slope(b)))
-                .unwrap();
+            let steepest = ways[&key(pair[0])].iter().max_by(|a, b| slope(a).total_cmp(&slope(b))).unwrap();
             // Where the height falls below zero, the last point lies on the edge before its end.
             let way = sub(*steepest, pair[0]);
             let run = sub(pair[1], pair[0]);
@@ -179,11 +153,7 @@ fn rivers_reach_the_border_of_a_window_above_zero() {
 fn springs_lie_high() {
     let outline = &outlines()[0];
     for start_above in [0.0, 0.5, 0.9] {
-        let params = SkeletonParams {
-            start_above,
-            branch_probability: 0.0,
-            ..SkeletonParams::default()
-        };
+        let params = SkeletonParams { start_above, branch_probability: 0.0, ..SkeletonParams::default() };
         for seed in 0..10 {
             let rivers = grow(params, outline, seed);
             assert!(rivers.iter().all(|river| river.heights[0] >= start_above));
@@ -196,13 +166,8 @@ fn springs_lie_high() {
 fn branching_multiplies_rivers() {
     let outline = &outlines()[0];
     let count = |branch_probability: f64| {
-        let params = SkeletonParams {
-            branch_probability,
-            ..SkeletonParams::default()
-        };
-        (0..20)
-            .map(|seed| grow(params, outline, seed).len())
-            .sum::<usize>()
+        let params = SkeletonParams { branch_probability, ..SkeletonParams::default() };
+        (0..20).map(|seed| grow(params, outline, seed).len()).sum::<usize>()
     };
     let (none, some, all) = (count(0.0), count(0.2), count(1.0));
     assert!(none <= 20 * 15 && none > 20 * 5);
@@ -212,30 +177,19 @@ fn branching_multiplies_rivers() {
 #[test]
 fn no_rivers_where_none_are_asked_for_or_nothing_is_high() {
     let outline = &outlines()[0];
-    let none = SkeletonParams {
-        rivers: 0,
-        ..SkeletonParams::default()
-    };
+    let none = SkeletonParams { rivers: 0, ..SkeletonParams::default() };
     assert!(grow(none, outline, 0).is_empty());
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let skeleton = Skeleton::new(&SkeletonParams::default()).unwrap();
     for flat in [0.0, -3.0, 5.0, f64::NAN] {
-        assert!(
-            skeleton
-                .grow_on(&window, |_| flat, &mut rng(0))
-                .unwrap()
-                .is_empty()
-        );
+        assert!(skeleton.grow_on(&window, |_| flat, &mut rng(0)).unwrap().is_empty());
     }
 }
 
 #[test]
 fn few_sites_do() {
     for sites in 1..6 {
-        let params = SkeletonParams {
-            sites,
-            ..SkeletonParams::default()
-        };
+        let params = SkeletonParams { sites, ..SkeletonParams::default() };
         for seed in 0..20 {
             for river in grow(params, &outlines()[1], seed) {
                 assert!(river.heights.windows(2).all(|pair| pair[1] < pair[0]));
@@ -248,15 +202,8 @@ fn few_sites_do() {
 fn lloyd_passes_change_the_diagram() {
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let energies = [0, 1, 2].map(|lloyd_passes| {
-        let params = SkeletonParams {
-            lloyd_passes,
-            ..SkeletonParams::default()
-        };
-        Skeleton::new(&params)
-            .unwrap()
-            .diagram(&window, &mut rng(5))
-            .unwrap()
-            .energy()
+        let params = SkeletonParams { lloyd_passes, ..SkeletonParams::default() };
+        Skeleton::new(&params).unwrap().diagram(&window, &mut rng(5)).unwrap().energy()
     });
     assert!(energies[0] > energies[1] && energies[1] > energies[2]);
 }
@@ -276,11 +223,7 @@ fn bits_are_the_same_everywhere() {
     let hash = rivers
         .iter()
         .flat_map(|river| river.points.iter().flatten().chain(&river.heights))
-        .fold(0u64, |hash, value| {
-            (hash ^ value.to_bits())
-                .wrapping_mul(0x9E37_79B9_7F4A_7C15)
-                .rotate_left(29)
-        });
+        .fold(0u64, |hash, value| (hash ^ value.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29));
     assert_eq!((rivers.len(), hash), (17, 16_273_324_502_042_548_265));
 }
 
@@ -289,59 +232,19 @@ fn parameters_out_of_range_are_named() {
     let base = SkeletonParams::default();
     let cases = [
         ("sites is 0", SkeletonParams { sites: 0, ..base }),
-        (
-            "sites is",
-            SkeletonParams {
-                sites: usize::MAX,
-                ..base
-            },
-        ),
-        (
-            "lloyd_passes is",
-            SkeletonParams {
-                lloyd_passes: 10_001,
-                ..base
-            },
-        ),
-        (
-            "branch_probability is NaN",
-            SkeletonParams {
-                branch_probability: f64::NAN,
-                ..base
-            },
-        ),
-        (
-            "branch_probability is 1.5",
-            SkeletonParams {
-                branch_probability: 1.5,
-                ..base
-            },
-        ),
-        (
-            "start_above is -0.1",
-            SkeletonParams {
-                start_above: -0.1,
-                ..base
-            },
-        ),
-        (
-            "start_above is inf",
-            SkeletonParams {
-                start_above: f64::INFINITY,
-                ..base
-            },
-        ),
+        ("sites is", SkeletonParams { sites: usize::MAX, ..base }),
+        ("lloyd_passes is", SkeletonParams { lloyd_passes: 10_001, ..base }),
+        ("branch_probability is NaN", SkeletonParams { branch_probability: f64::NAN, ..base }),
+        ("branch_probability is 1.5", SkeletonParams { branch_probability: 1.5, ..base }),
+        ("start_above is -0.1", SkeletonParams { start_above: -0.1, ..base }),
+        ("start_above is inf", SkeletonParams { start_above: f64::INFINITY, ..base }),
     ];
     for (start, params) in cases {
         let message = Skeleton::new(&params).unwrap_err().to_string();
         assert!(message.starts_with(start), "{message}");
     }
     let skeleton = Skeleton::new(&base).unwrap();
-    assert!(
-        skeleton
-            .grow(&[[0.0, 0.0], [1.0, 1.0]], &mut rng(0))
-            .is_err()
-    );
+    assert!(skeleton.grow(&[[0.0, 0.0], [1.0, 1.0]], &mut rng(0)).is_err());
     assert!(skeleton.grow(&[[0.0, f64::NAN]; 5], &mut rng(0)).is_err());
     // Far out, where a window of 1e-7 holds few different numbers, sites fall together.
     let far = Window::rectangle([1e9 - 2e-7, 1e9 - 2e-7], [1e9, 1e9]).unwrap();

@@ -3,14 +3,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
 fn pentagon() -> Window {
-    Window::convex(&[
-        [0.0, 0.0],
-        [10.0, -2.0],
-        [14.0, 6.0],
-        [6.0, 12.0],
-        [-1.0, 8.0],
-    ])
-    .unwrap()
+    Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap()
 }
 
 #[test]
@@ -24,10 +17,7 @@ fn either_order_of_corners_gives_the_same_window() {
         assert!(window.contains([1.0, 0.0]) && window.contains([1.9, 1.9]));
         assert!(!window.contains([2.1, 1.0]) && !window.contains([1.0, -1e-9]));
     }
-    assert_eq!(
-        Window::rectangle([2.0, 0.0], [0.0, 2.0]).unwrap().area(),
-        4.0
-    );
+    assert_eq!(Window::rectangle([2.0, 0.0], [0.0, 2.0]).unwrap().area(), 4.0);
 }
 
 #[test]
@@ -40,15 +30,7 @@ fn around_holds_all_points() {
 
 #[test]
 fn repeated_and_straight_corners_are_welcome() {
-    let corners = [
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 0.0],
-        [2.0, 0.0],
-        [2.0, 1.0],
-        [0.0, 1.0],
-        [0.0, 0.0],
-    ];
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
     let window = Window::convex(&corners).unwrap();
     assert_eq!(window.corners().len(), 5);
     assert_eq!(window.area(), 2.0);

@@ -1,0 +1,137 @@
+//! The steps from an outline to a picture: outline, flat mesh, pressed mesh, thickness; then a flap, a rolled rim and both rims rolled
+//! in. Usage: `figure [path]`, default `target/cloth-verlet.png`.
+
+use cloth_verlet::{Cloth, ClothParams, Crease, Point, Sheet, Turn, View};
+use image::{GrayImage, Luma};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+use std::error::Error;
+
+const PANEL: u32 = 260;
+const COLUMNS: u32 = 4;
+const PAPER_WHITE: f32 = 235.0;
+/// Absorbance of the flat sheet's middle.
+const ABSORBANCE: f64 = 0.16;
+
+/// A crooked outline about 220 across, around the origin.
+const OUTLINE: [Point; 20] = [
+    [-98.0, -18.0],
+    [-80.0, -60.0],
+    [-52.0, -88.0],
+    [-20.0, -98.0],
+    [8.0, -86.0],
+    [30.0, -92.0],
+    [66.0, -84.0],
+    [88.0, -56.0],
+    [92.0, -30.0],
+    [76.0, -8.0],
+    [84.0, 16.0],
+    [104.0, 38.0],
+    [92.0, 66.0],
+    [58.0, 76.0],
+    [40.0, 94.0],
+    [6.0, 90.0],
+    [-26.0, 98.0],
+    [-62.0, 82.0],
+    [-72.0, 52.0],
+    [-94.0, 30.0],
+];
+
+/// Panels side by side, in grey levels.
+struct Figure {
+    levels: Vec<f32>,
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "grey levels and pixel numbers are in range"
+)]
+impl Figure {
+    const WIDTH: u32 = PANEL * COLUMNS;
+
+    /// Draws the segment from `a` to `b`, about one pixel wide, around the middle of a panel.
+    fn line(&mut self, panel: u32, a: Point, b: Point, ink: f32) {
+        let middle = f64::from(PANEL) / 2.0;
+        let steps = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()) * 2.0 + 1.0;
+        let mut step = 0.0;
+        while step <= steps {
+            let t = step / steps;
+            let (x, y) = (a[0] + t * (b[0] - a[0]) + middle, a[1] + t * (b[1] - a[1]) + middle);
+            let (left, top) = (x.floor(), y.floor());
+            for (column, row, part) in [
+                (left, top, (1.0 - x + left) * (1.0 - y + top)),
+                (left + 1.0, top, (x - left) * (1.0 - y + top)),
+                (left, top + 1.0, (1.0 - x + left) * (y - top)),
+                (left + 1.0, top + 1.0, (x - left) * (y - top)),
+            ] {
+                let (column, row) = (column as u32 + panel % COLUMNS * PANEL, row as u32 + panel / COLUMNS * PANEL);
+                self.levels[(row * Self::WIDTH + column) as usize] -= ink * part as f32;
+            }
+            step += 1.0;
+        }
+    }
+
+    fn mesh(&mut self, panel: u32, sheet: &Sheet, place: impl Fn(usize) -> Point) {
+        for t in sheet.triangles() {
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                self.line(panel, place(a as usize), place(b as usize), 16.0);
+            }
+        }
+    }
+
+    fn thickness(&mut self, panel: u32, sheet: &Sheet) {
+        let middle = f64::from(PANEL) / 2.0;
+        let mut tile = vec![0.0_f32; (PANEL * PANEL) as usize];
+        sheet.thickness_into(&mut tile, PANEL as usize, &View { origin: [-middle, -middle], pixel: 1.0 }, |r| {
+            1.0 - 0.45 * r * r
+        });
+        let (left, top) = (panel % COLUMNS * PANEL, panel / COLUMNS * PANEL);
+        for (row, line) in (top..).zip(tile.chunks_exact(PANEL as usize)) {
+            for (column, &t) in (left..).zip(line) {
+                let dark = libm::pow(10.0, -ABSORBANCE * f64::from(t));
+                self.levels[(row * Self::WIDTH + column) as usize] = PAPER_WHITE * dark as f32;
+            }
+        }
+    }
+
+    fn image(&self) -> GrayImage {
+        let height = self.levels.len() as u32 / Self::WIDTH;
+        GrayImage::from_fn(Self::WIDTH, height, |x, y| {
+            Luma([self.levels[(y * Self::WIDTH + x) as usize].clamp(0.0, 255.0).round() as u8])
+        })
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "target/cloth-verlet.png".to_owned());
+    let cloth = Cloth::new(&ClothParams::default())?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+    let sheet = cloth.crumple(&OUTLINE, &mut rng)?;
+    let paper = Cloth::new(&ClothParams::paper())?.crumple(&OUTLINE, &mut rng)?;
+
+    let mut figure = Figure { levels: vec![PAPER_WHITE; (Figure::WIDTH * PANEL * 2) as usize] };
+    for k in 0..OUTLINE.len() {
+        figure.line(0, OUTLINE[k], OUTLINE[(k + 1) % OUTLINE.len()], 80.0);
+    }
+    figure.mesh(1, &sheet, |v| sheet.rest()[v]);
+    figure.mesh(2, &sheet, |v| [sheet.vertices()[v][0], sheet.vertices()[v][1]]);
+    figure.thickness(3, &sheet);
+
+    figure.thickness(4, &paper);
+    let flap = Crease { point: [42.0, -20.0], direction_rad: -1.0, radius: 3.0, turn: Turn::Flap };
+    let roll = Crease { point: [0.0, 70.0], direction_rad: 0.15, radius: 2.5, turn: Turn::Roll { turns: 2 } };
+    let sides = [
+        Crease { point: [35.0, 0.0], direction_rad: -1.4, radius: 7.0, turn: Turn::Flap },
+        Crease { point: [-30.0, 0.0], direction_rad: 1.8, radius: 6.0, turn: Turn::Flap },
+    ];
+    for (panel, creases) in [(5, &[flap][..]), (6, &[roll]), (7, &sides)] {
+        let mut folded = sheet.clone();
+        for crease in creases {
+            folded.fold(crease)?;
+        }
+        figure.thickness(panel, &folded);
+    }
+    figure.image().save(path)?;
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! Golden images: every stage and two whole fields, each with its recipe beside it.
+//!
+//! `cargo xtask golden` runs this, `cargo xtask golden --bless` writes the images anew.
+//!
+//! Tolerance: no pixel may differ by more than one grey level and no more than one in a hundred may differ at all.
+//! Fourier transforms round differently on different instruction sets; everything else is exact.
+
+use std::path::{Path, PathBuf};
+
+use papsynth::key::Key;
+use papsynth::model::Model;
+use papsynth::recipe::Recipe;
+use papsynth::{Engine, Inputs};
+
+/// Largest difference of a pixel, grey levels.
+const LARGEST: u8 = 1;
+/// Largest share of pixels that may differ.
+const SHARE: f64 = 0.01;
+/// Seed of all golden images.
+const SEED: u64 = 20_150_212;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/golden")
+}
+
+#[test]
+fn every_stage_looks_as_it_did() {
+    let mut recipes: Vec<PathBuf> = std::fs::read_dir(folder())
+        .expect("fixtures/golden lies beside the crates")
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    recipes.sort();
+    assert!(recipes.len() >= 10, "golden recipes are missing");
+    let bless = std::env::var_os("PAPSYNTH_BLESS").is_some();
+    let failures: Vec<String> = recipes.iter().filter_map(|recipe| compare(recipe, bless).err()).collect();
+    assert!(failures.is_empty(), "{} of {} differ:\n{}", failures.len(), recipes.len(), failures.join("\n"));
+}
+
+fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
+    let name = recipe_path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let text = std::fs::read_to_string(recipe_path).map_err(|e| format!("{name}: {e}"))?;
+    let recipe: Recipe = toml::from_str(&text).map_err(|e| format!("{name}: {e}"))?;
+    let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default()).map_err(|e| format!("{name}: {e}"))?;
+    let frame = engine.frame(Key { seed: SEED, index: 0 }).map_err(|e| format!("{name}: {e}"))?;
+    let view = frame.finished.scene.view;
+    let actual: Vec<u8> = frame.planes[0].grey.iter().map(|g| u8::try_from(*g).unwrap_or(u8::MAX)).collect();
+    let (width, height) = (view.width as u32, view.height as u32);
+    let golden = recipe_path.with_extension("png");
+    let actual = image::GrayImage::from_raw(width, height, actual).ok_or_else(|| format!("{name}: size"))?;
+    if bless {
+        return actual.save(&golden).map_err(|e| format!("{name}: {e}"));
+    }
+    let expected = image::open(&golden).map_err(|e| format!("{name}: {e}"))?.to_luma8();
+    if expected.dimensions() != actual.dimensions() {
+        return Err(format!("{name}: {:?} instead of {:?} pixels", actual.dimensions(), expected.dimensions()));
+    }
+    let difference: Vec<u8> = actual.iter().zip(expected.iter()).map(|(a, b)| a.abs_diff(*b)).collect();
+    let largest = difference.iter().copied().max().unwrap_or(0);
+    let differing = difference.iter().filter(|d| **d > 0).count();
+    if largest <= LARGEST && differing as f64 <= SHARE * difference.len() as f64 {
+        return Ok(());
+    }
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
+    std::fs::create_dir_all(&out).map_err(|e| format!("{name}: {e}"))?;
+    actual.save(out.join(format!("{name}.actual.png"))).map_err(|e| format!("{name}: {e}"))?;
+    let shown = difference.iter().map(|d| d.saturating_mul(32)).collect();
+    if let Some(picture) = image::GrayImage::from_raw(width, height, shown) {
+        picture.save(out.join(format!("{name}.difference.png"))).map_err(|e| format!("{name}: {e}"))?;
+    }
+    Err(format!("{name}: {differing} pixels differ, by up to {largest} grey levels; see {}", out.display()))
+}

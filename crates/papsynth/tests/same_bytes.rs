@@ -1,0 +1,163 @@
+//! Recipe, model, seed and index determine an image: whatever the threads, the order, or what else is on the slide.
+
+use papsynth::key::Key;
+use papsynth::model::Model;
+use papsynth::recipe::{Layout, Number, Preset, Recipe};
+use papsynth::scene::Kind;
+use papsynth::truth::Part;
+use papsynth::{Engine, Error, Frame, Inputs, Threads};
+
+fn small(preset: Preset) -> Recipe {
+    let mut recipe = preset.recipe();
+    recipe.field.width_px = Number::Fixed(220.0);
+    recipe.field.height_px = Number::Fixed(180.0);
+    for mix in recipe.cells.values_mut() {
+        mix.count = Number::uniform(1.0, 3.0);
+    }
+    if let Layout::Clusters { radius_um, .. } = &mut recipe.layout {
+        *radius_um = Number::Fixed(15.0);
+    }
+    recipe.slide.spacing_um = Number::Fixed(4.0);
+    recipe
+}
+
+fn engine(recipe: &Recipe) -> Engine {
+    Engine::new(recipe, &Model::builtin(), &Inputs::default()).unwrap()
+}
+
+fn frame(engine: &Engine, index: u64, threads: Threads) -> Frame {
+    let mut planes = Vec::new();
+    let finished = engine
+        .stream::<Error>(Key { seed: 5, index }, threads, |plane| {
+            planes.push(plane);
+            Ok(())
+        })
+        .unwrap();
+    Frame { planes, finished }
+}
+
+fn assert_same(a: &Frame, b: &Frame, what: &str) {
+    assert_eq!(a.planes, b.planes, "{what}");
+    assert_eq!(a.finished.scene, b.finished.scene, "{what}");
+    assert_eq!(a.finished.truth.objects, b.finished.truth.objects, "{what}");
+    assert_eq!(a.finished.truth.labels, b.finished.truth.labels, "{what}");
+    assert_eq!(a.finished.truth.layers, b.finished.truth.layers, "{what}");
+    assert_eq!(a.finished.all_in_focus, b.finished.all_in_focus, "{what}");
+}
+
+#[test]
+fn threads_and_order_change_nothing() {
+    for preset in Preset::ALL {
+        let engine = engine(&small(preset));
+        let forwards: Vec<Frame> = (0..4).map(|index| frame(&engine, index, Threads::One)).collect();
+        for index in (0..4).rev() {
+            for threads in [1, 2, 8] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let again = pool.install(|| frame(&engine, index, Threads::All));
+                assert_same(&forwards[index as usize], &again, &format!("{} {index} on {threads}", preset.name()));
+            }
+        }
+        let alone = frame(&self::engine(&small(preset)), 3, Threads::One);
+        assert_same(&forwards[3], &alone, &format!("{}: the fourth alone", preset.name()));
+    }
+}
+
+#[test]
+fn another_speckle_moves_no_nucleus() {
+    let mut recipe = small(Preset::Lbc);
+    recipe.debris.speckles.count = Number::Fixed(5.0);
+    recipe.debris.out_of_focus.count = Number::Fixed(0.0);
+    let few = frame(&engine(&recipe), 0, Threads::One);
+    recipe.debris.speckles.count = Number::Fixed(6.0);
+    let more = frame(&engine(&recipe), 0, Threads::One);
+    let others = |frame: &Frame| {
+        frame.finished.truth.objects.iter().filter(|o| o.kind != Kind::Speckle).map(|o| (o.id, o.part, o.amodal.clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(others(&few), others(&more));
+    let scene = |frame: &Frame| frame.finished.scene.objects.iter().filter(|o| o.body.kind() == Kind::Speckle).cloned().collect::<Vec<_>>();
+    assert_eq!(scene(&few)[..], scene(&more)[..5]);
+}
+
+#[test]
+fn a_distribution_elsewhere_moves_nothing() {
+    let mut recipe = small(Preset::Lbc);
+    let before = engine(&recipe).scene(Key { seed: 5, index: 0 }).unwrap();
+    recipe.camera.read_noise_e = Number::uniform(5.0, 9.0);
+    let after = engine(&recipe).scene(Key { seed: 5, index: 0 }).unwrap();
+    assert_eq!(before.objects, after.objects);
+    assert_eq!(before.background, after.background);
+    assert_ne!(before.camera, after.camera);
+}
+
+#[test]
+fn truth_holds_together() {
+    let mut recipe = small(Preset::HighGrade);
+    recipe.focus.planes = Number::Fixed(3.0);
+    let frame = frame(&engine(&recipe), 1, Threads::All);
+    let truth = &frame.finished.truth;
+    assert_eq!(frame.planes.len(), 3);
+    let width = frame.finished.scene.view.width;
+    for object in &truth.objects {
+        assert!(object.amodal.area() > 0);
+        assert_eq!(object.detectability.len(), 3);
+        assert_eq!(object.defocus_um.len(), 3);
+        let labels = truth.labels_of(object.group());
+        assert!(object.front.pixels(width).all(|p| labels.ids[p] == object.id));
+        let inside: std::collections::BTreeSet<usize> = object.amodal.pixels(width).collect();
+        assert!(object.front.pixels(width).all(|p| inside.contains(&p)), "what shows is part of the whole");
+        if !object.truncated {
+            let px = object.area_um2 / (0.25 * 0.25);
+            let slack = 0.05 * px + 12.0;
+            assert!((object.amodal.area() as f64 - px).abs() < slack, "{:?} {}: {px} {}", object.kind, object.id, object.amodal.area());
+        }
+    }
+    let cells: Vec<_> = truth.objects.iter().filter(|o| o.part == Part::Cytoplasm).collect();
+    for nucleus in truth.objects.iter().filter(|o| o.part == Part::Nucleus) {
+        let cell = cells.iter().find(|cell| cell.id == nucleus.id);
+        assert!(cell.is_some(), "a nucleus shares the id of its cell");
+    }
+    let covered = truth.layers.iter().map(|&l| u64::from(l)).sum::<u64>();
+    assert_eq!(covered, cells.iter().map(|c| c.amodal.area()).sum::<u64>());
+    for object in truth.objects.iter().filter(|o| o.stain > 0.1 && o.amodal.area() > 20) {
+        assert!(object.detectability.iter().all(|d| *d > 0.0), "{:?} darkens what lies behind it", object.kind);
+    }
+}
+
+#[test]
+fn focus_moves_blur_between_planes_and_keeps_the_noise_free_mean() {
+    let mut recipe = small(Preset::Sparse);
+    recipe.focus.planes = Number::Fixed(9.0);
+    recipe.focus.step_um = Number::Fixed(2.0);
+    recipe.slide.depth_um = Number::Fixed(0.0);
+    recipe.slide.stacking_um = Number::Fixed(0.0);
+    recipe.debris.out_of_focus.count = Number::Fixed(0.0);
+    let frame = frame(&engine(&recipe), 2, Threads::One);
+    let roughness: Vec<f64> = frame
+        .planes
+        .iter()
+        .map(|plane| {
+            plane.noise_free.chunks_exact(frame.finished.scene.view.width).flat_map(|row| row.windows(2)).map(|w| f64::from((w[1] - w[0]).abs())).sum()
+        })
+        .collect();
+    let sharpest = (0..9).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();
+    assert_eq!(sharpest, 4, "everything lies at depth zero: {roughness:?}");
+    assert!(roughness[0] < 0.8 * roughness[4] && roughness[8] < 0.8 * roughness[4]);
+}
+
+#[test]
+fn more_cells_than_fit_is_an_error_before_the_search() {
+    let mut recipe = small(Preset::Sparse);
+    recipe.slide.spacing_um = Number::Fixed(30.0);
+    recipe.cells.get_mut("intermediate").unwrap().count = Number::Fixed(500.0);
+    let message = engine(&recipe).scene(Key { seed: 1, index: 0 }).unwrap_err().to_string();
+    assert!(message.contains("do not fit") && message.contains("slide.spacing_um"), "{message}");
+}
+
+#[test]
+fn an_unknown_class_is_named_with_those_there_are() {
+    let mut recipe = small(Preset::Sparse);
+    let mix = recipe.cells["intermediate"].clone();
+    recipe.cells.insert("intermedate".to_owned(), mix);
+    let message = Engine::new(&recipe, &Model::builtin(), &Inputs::default()).unwrap_err().to_string();
+    assert!(message.contains("`intermedate`") && message.contains("intermediate"), "{message}");
+}
