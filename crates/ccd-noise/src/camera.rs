@@ -1,7 +1,7 @@
 use rand_core::Rng;
 
 use crate::field::{NoiseField, blocks, padded, rows, whole_rows};
-use crate::hash::{BLOCK, RowWords, Stream};
+use crate::hash::{BLOCK, Block, RowWords, Stream};
 use crate::normal::normals;
 use crate::poisson::{at_least_nothing, poisson};
 use crate::{CameraParams, Error, PhotonNoise};
@@ -155,27 +155,39 @@ impl Chain {
         let block = row.block(x);
         let read = normals(&block.words(Stream::Read));
         let mut means = *electrons;
-        let mut one_normal = true;
         for mean in &mut means {
             *mean = at_least_nothing(*mean);
-            one_normal &= *mean >= self.normal_from;
         }
-        // g_po of Eq. 13
+        // g_po and the standard deviation of g_g of Eq. 13
+        let mut noise = [self.read_noise; BLOCK];
         let mut charge = match self.photon_noise {
+            PhotonNoise::Exact => poisson(&means, &block),
             PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } if one_normal => means,
-            PhotonNoise::Exact | PhotonNoise::NormalAbove { .. } => poisson(&means, &block),
+            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, &mut noise, &block),
         };
         let mut after = [0.0; BLOCK];
         for i in 0..BLOCK {
-            let both = means[i] >= self.normal_from;
-            let mean = if both { means[i] } else { charge[i] };
-            charge[i] = mean.min(self.full_well);
-            let shot = if both { charge[i] } else { 0.0 };
-            // g_g of Eq. 13
-            after[i] = charge[i] + (shot + self.read_noise * self.read_noise).sqrt() * read[i];
+            charge[i] = charge[i].min(self.full_well);
+            after[i] = charge[i] + noise[i] * read[i];
         }
         (charge, after)
+    }
+
+    /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
+    #[inline(always)]
+    fn one_normal(&self, means: &[f32; BLOCK], noise: &mut [f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
+        let mut everywhere = true;
+        for mean in means {
+            everywhere &= *mean >= self.normal_from;
+        }
+        let mut charge = if everywhere { *means } else { poisson(means, block) };
+        for i in 0..BLOCK {
+            let both = (means[i].min(self.full_well) + self.read_noise * self.read_noise).sqrt();
+            let normal = means[i] >= self.normal_from;
+            noise[i] = if normal { both } else { noise[i] };
+            charge[i] = if normal { means[i] } else { charge[i] };
+        }
+        charge
     }
 }
 

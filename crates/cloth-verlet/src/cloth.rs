@@ -8,7 +8,7 @@ use multiversion::multiversion;
 /// Sheets solved side by side: as many as there are f32 in the widest registers.
 const LANES: usize = 16;
 /// Up to this many sheets are solved one by one: that takes less time than all lanes for a few.
-const FEW: usize = 1;
+const FEW: usize = 2;
 
 /// A circular mesh, ready to be pressed into any number of outlines.
 #[derive(Debug)]

@@ -151,19 +151,24 @@ pub(crate) fn project<T: Real, const L: usize>(
     lengths: &[Lane<T, L>],
     binding: Binding<T>,
 ) {
-    let least = -(binding.gain * binding.gives_way);
     for (&[a, b], rest) in pairs.iter().zip(lengths) {
-        let (mut p, mut q) = (now[a as usize], now[b as usize]);
-        for l in 0..L {
-            let d = [q[0][l] - p[0][l], q[1][l] - p[1][l], q[2][l] - p[2][l]];
-            let s = pull(d, rest[l], binding.gain).at_least(least);
-            for axis in 0..3 {
-                p[axis][l] = p[axis][l] + d[axis] * (s * binding.weights[0]);
-                q[axis][l] = q[axis][l] - d[axis] * (s * binding.weights[1]);
-            }
+        if let Ok([p, q]) = now.get_disjoint_mut([a as usize, b as usize]) {
+            bind(p, q, rest, &binding);
         }
-        now[a as usize] = p;
-        now[b as usize] = q;
+    }
+}
+
+/// One distance, in all lanes. A function of its own, so that the compiler knows its arguments apart.
+#[inline(always)]
+fn bind<T: Real, const L: usize>(p: &mut Node<T, L>, q: &mut Node<T, L>, rest: &Lane<T, L>, binding: &Binding<T>) {
+    let least = -(binding.gain * binding.gives_way);
+    for l in 0..L {
+        let d = [q[0][l] - p[0][l], q[1][l] - p[1][l], q[2][l] - p[2][l]];
+        let s = pull(d, rest[l], binding.gain).at_least(least);
+        for axis in 0..3 {
+            p[axis][l] = p[axis][l] + d[axis] * (s * binding.weights[0]);
+            q[axis][l] = q[axis][l] - d[axis] * (s * binding.weights[1]);
+        }
     }
 }
 

@@ -195,7 +195,7 @@ fn add_edge(sums: &mut [[f64; 2]], width: usize, a: Point, b: Point, plane: Plan
     // Unused where the edge is upright.
     let per_column = 1.0 / slope;
     let (top, bottom) = (a[1].max(0.0), b[1].min(height as f64));
-    if !(top < bottom) {
+    if top >= bottom {
         return;
     }
     let mut from = [if top > a[1] { a[0] + (top - a[1]) * slope } else { a[0] }, top];

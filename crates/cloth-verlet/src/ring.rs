@@ -89,9 +89,8 @@ impl<T: Real, const L: usize> Ring<T, L> {
                     // Lanes that are not due stay as they are, whatever their neighbours do.
                     let due = slack[l] < pace[l] * stride;
                     let outside = nearest.outwards[l] > T::ZERO;
-                    for axis in 0..2 {
-                        node[axis][l] =
-                            if due & outside { node[axis][l] - nearest.off[axis][l] } else { node[axis][l] };
+                    for (value, off) in node.iter_mut().zip(&nearest.off) {
+                        value[l] = if due & outside { value[l] - off[l] } else { value[l] };
                     }
                     let gap = if outside { T::ZERO } else { nearest.away[l].sqrt() };
                     slack[l] = if due { gap } else { slack[l] };
@@ -166,9 +165,9 @@ impl<T: Real, const L: usize> Nearest<T, L> {
 
     /// Looks at the side from `a` to `b`.
     #[inline(always)]
-    fn meet(&mut self, p: &[Lane<T, L>; 2], a: &Corner<T, L>, b: &Corner<T, L>) {
+    fn meet(&mut self, [px, py]: &[Lane<T, L>; 2], a: &Corner<T, L>, b: &Corner<T, L>) {
         for l in 0..L {
-            let (rx, ry) = (p[0][l] - a.at[0][l], p[1][l] - a.at[1][l]);
+            let (rx, ry) = (px[l] - a.at[0][l], py[l] - a.at[1][l]);
             let (ux, uy) = (b.at[0][l] - a.at[0][l], b.at[1][l] - a.at[1][l]);
             let t = ((rx * ux + ry * uy) * a.inverse[l]).at_least(T::ZERO).at_most(T::ONE);
             let (ex, ey) = (rx - t * ux, ry - t * uy);

@@ -109,10 +109,11 @@ impl ShapeStatistics {
             components: self
                 .components
                 .iter()
-                .map(|c| PrincipalComponent {
-                    loading: all(&c.loading),
-                    skewness: round(c.skewness),
-                    excess_kurtosis: round(c.excess_kurtosis),
+                .map(|c| {
+                    let skewness = round(c.skewness);
+                    // Rounding may carry a score just past what its skewness allows.
+                    let excess_kurtosis = round(c.excess_kurtosis).max(Bend::least_kurtosis(skewness));
+                    PrincipalComponent { loading: all(&c.loading), skewness, excess_kurtosis }
                 })
                 .collect(),
             residual: self.residual,

@@ -394,4 +394,31 @@ mod tests {
             assert_eq!(path.join("."), expected);
         }
     }
+
+    /// A sound recipe with a part of it replaced.
+    fn damaged(start: usize, length: usize, by: &str) -> String {
+        let text = papsynth::recipe::Recipe::default().to_toml();
+        let start = start % text.len();
+        let end = (start + length).min(text.len());
+        format!("{}{by}{}", &text[..start], &text[end..])
+    }
+
+    proptest::proptest! {
+        /// Whatever the text: an answer, no panic, and places that lie in the text.
+        #[test]
+        fn any_damage_is_read_or_refused(start in 0_usize..100_000, length in 0_usize..40, by in "\\PC{0,20}") {
+            let text = damaged(start, length, &by);
+            for fault in read(&text).err().into_iter().flatten() {
+                if let Some(span) = fault.span {
+                    proptest::prop_assert!(text.get(span.clone()).is_some(), "{:?}", span);
+                }
+                let _ = find(&text, &fault.path);
+            }
+        }
+
+        #[test]
+        fn any_text_is_read_or_refused(text in "[\\PC\n]{0,200}") {
+            let _ = read(&text);
+        }
+    }
 }

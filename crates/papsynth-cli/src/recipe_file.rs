@@ -151,19 +151,19 @@ impl Sources {
     }
 
     fn place(&self, fault: Fault) -> Complaint {
-        let mut complaint = Complaint::new(fault.message);
-        if let Some(help) = fault.help {
-            complaint = complaint.help(help);
-        }
+        let complaint = |message: String| match &fault.help {
+            Some(help) => Complaint::new(message).help(help),
+            None => Complaint::new(message),
+        };
         if let Some(set) = self.sets.iter().rev().find(|set| set.touches(&fault.path)) {
-            return complaint.at("--set", &set.argument, set.value_at..set.argument.len());
+            return complaint(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
         }
         match &self.file {
             Some((name, text)) => match fault.span.or_else(|| diagnose::find(text, &fault.path)) {
-                Some(span) => complaint.at(name, text, span),
-                None => complaint,
+                Some(span) => complaint(fault.message).at(name, text, span),
+                None => complaint(format!("{name}: {}", fault.message)),
             },
-            None => complaint,
+            None => complaint(fault.message),
         }
     }
 }
@@ -307,5 +307,15 @@ mod tests {
     fn a_field_that_clashes_with_a_default_names_both() {
         let error = load(Preset::Lbc, &["nucleus.patch_um=0.6"]).unwrap_err();
         assert!(error.contains("nucleus.overlap_um") && error.contains("nucleus.patch_um"), "{error}");
+    }
+
+    proptest::proptest! {
+        /// Whatever stands in a `--set`: an answer, and no panic.
+        #[test]
+        fn anything_can_be_set_or_is_refused(argument in "(field|layout|cells|[a-z.\"']{0,12})[.=]{0,2}\\PC{0,24}") {
+            if let Err(error) = load(Preset::Lbc, &[&argument]) {
+                proptest::prop_assert!(error.contains("--set"), "{}", error);
+            }
+        }
     }
 }

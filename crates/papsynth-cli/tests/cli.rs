@@ -99,7 +99,7 @@ fn what_is_no_text_or_too_much_is_refused() {
         (&[0xff, 0xfe, 0x00], "the byte 0xff is no text"),
         (&[0; 64], "recipe.toml:1"),
         (deep.as_bytes(), "recipe.toml:2"),
-        (dotted.as_bytes(), "recipe.toml:1"),
+        (dotted.as_bytes(), "recipe.toml: recursion limit"),
         (long.as_bytes(), "field.width_px"),
         (&[b'#'; (1 << 20) + 1], "larger than 1048576 bytes"),
     ];

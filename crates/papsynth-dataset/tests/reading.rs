@@ -229,7 +229,7 @@ fn weight_maps_need_a_place() {
 
     let scratch = Scratch::new("weights");
     let mut recipe = support::recipe();
-    let read = |recipe| read_inputs(recipe, scratch.path(), &Limits::default());
+    let read = |recipe: &papsynth::recipe::Recipe| read_inputs(recipe, scratch.path(), &Limits::default());
     assert!(read(&recipe).unwrap().weight_map.is_none());
     recipe.layout = papsynth::recipe::Layout::Map { path: "map.png".to_owned() };
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: there is no such file"));

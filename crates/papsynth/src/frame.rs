@@ -25,7 +25,7 @@ pub struct Finished {
     pub scene: Scene,
     /// What is known of it.
     pub truth: Truth,
-    /// The noise-free image with every object in focus, in grey levels.
+    /// The noise-free image of a focus stack with every object in focus, in grey levels; empty for a single plane.
     pub all_in_focus: Vec<f32>,
 }
 

@@ -7,18 +7,15 @@ use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
 use crate::transmit::{self, FocusAt, LightPath};
-use crate::truth::{Group, LabelMap, Mask, ObjectTruth, Part, Truth, front_masks, layers};
-
-/// Coverage from which on a pixel belongs to a mask.
-const COVERED: f32 = 0.5;
+use crate::truth::{COVERED, Group, LabelMap, Mask, ObjectTruth, Part, Truth, front_masks, layers};
 
 /// A scene with its phantoms made.
 pub(crate) struct Rendering {
     scene: Scene,
-    threads: Threads,
     phantoms: Vec<Phantom>,
     /// Complete masks of every piece of every phantom.
     masks: Vec<Vec<Mask>>,
+    path: LightPath,
     detector: Detector,
     /// How detectable each piece is, plane by plane.
     detectability: Vec<Vec<f64>>,
@@ -42,8 +39,9 @@ impl Rendering {
             };
             phantom.pieces.iter().map(mask).collect()
         });
+        let path = LightPath::new(&scene, &phantoms, threads)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, threads, phantoms, masks, detector, detectability: Vec::new() })
+        Ok(Self { scene, phantoms, masks, path, detector, detectability: Vec::new() })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -53,17 +51,13 @@ impl Rendering {
     /// Images one plane. Planes are asked for in order, each once.
     pub(crate) fn plane(&mut self, index: usize) -> Result<Plane, String> {
         let depth_um = self.scene.planes_um[index];
-        let path = LightPath::new(&self.scene, &self.phantoms, self.threads)?;
-        let mut light = path.image(FocusAt::Depth(depth_um), &self.masks)?;
-        let feathered = match self.scene.optics.restore {
-            Restore::Off => None,
-            Restore::BeforeDetection | Restore::AfterDetection => path.restored()?,
-        };
+        let mut light = self.path.image(&self.scene, &self.phantoms, &self.masks, FocusAt::Depth(depth_um))?;
+        let feathered = self.path.feathered.as_deref();
         let late = self.scene.optics.restore == Restore::AfterDetection;
         let width = self.scene.view.width;
         let mut rng = self.scene.key.stream("plane", index as u64, "camera");
         let mut electrons = core::mem::take(&mut light.spread);
-        if let (Some(feathered), false) = (&feathered, late) {
+        if let (Some(feathered), false) = (feathered, late) {
             transmit::restore(&mut electrons, &light.sharp, feathered);
         }
         self.detector.electrons(&mut electrons);
@@ -72,10 +66,11 @@ impl Rendering {
         let saturated = self.detector.camera.expose_into(&electrons, width, &mut grey, &mut rng);
         let mut noise_free = vec![0.0; electrons.len()];
         self.detector.camera.mean_dn_into(&electrons, &mut noise_free);
-        if let (Some(feathered), true) = (&feathered, late) {
+        if let (Some(feathered), true) = (feathered, late) {
             self.restore_finished(&mut grey, &mut noise_free, &mut light.sharp, feathered);
         }
-        self.detectability.push(self.detectabilities(&light.absorbances, &electrons));
+        let detectability = self.detectabilities(&light.absorbances, &electrons);
+        self.detectability.push(detectability);
         Ok(Plane { index, depth_um, grey, noise_free, saturated })
     }
 
@@ -115,18 +110,20 @@ impl Rendering {
 
     /// The all-in-focus image and the truth.
     pub(crate) fn finish(self) -> Result<Finished, String> {
-        let path = LightPath::new(&self.scene, &self.phantoms, self.threads)?;
-        let mut light = path.image(FocusAt::Everywhere, &self.masks)?;
-        if self.scene.optics.restore != Restore::Off {
-            if let Some(feathered) = path.restored()? {
-                transmit::restore(&mut light.spread, &light.sharp, &feathered);
-            }
+        let all_in_focus = if self.planes() > 1 { self.all_in_focus()? } else { Vec::new() };
+        let truth = self.truth();
+        Ok(Finished { scene: self.scene, truth, all_in_focus })
+    }
+
+    fn all_in_focus(&self) -> Result<Vec<f32>, String> {
+        let mut light = self.path.image(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere)?;
+        if let Some(feathered) = &self.path.feathered {
+            transmit::restore(&mut light.spread, &light.sharp, feathered);
         }
         self.detector.electrons(&mut light.spread);
         let mut all_in_focus = vec![0.0; light.spread.len()];
         self.detector.camera.mean_dn_into(&light.spread, &mut all_in_focus);
-        let truth = self.truth();
-        Ok(Finished { scene: self.scene, truth, all_in_focus })
+        Ok(all_in_focus)
     }
 
     fn truth(&self) -> Truth {

@@ -7,9 +7,10 @@ use rand_core::Rng;
 use crate::exp10::exp10;
 use crate::phantom::Phantom;
 use crate::phantom::tile::{Tile, add_tile};
+use crate::recipe::Restore;
 use crate::scene::{Scene, SceneIllumination};
 use crate::threads::{self, Threads};
-use crate::truth::Mask;
+use crate::truth::{COVERED, Mask};
 
 /// Spread below which a Gaussian changes nothing that 16 bits could show, px.
 const SHARP_PX: f64 = 0.03;
@@ -17,13 +18,13 @@ const SHARP_PX: f64 = 0.03;
 /// Objects whose blurred tiles are in memory at one time.
 const CHUNK: usize = 64;
 
-/// The light path of one scene.
-pub(crate) struct LightPath<'a> {
-    scene: &'a Scene,
-    phantoms: &'a [Phantom],
+/// What all planes of one scene share.
+pub(crate) struct LightPath {
     /// I_b of Eq. 10: the logarithm of the empty slide's light, as a fraction of full scale.
     empty_log10: Vec<f32>,
     in_plane: Gaussian,
+    /// The feathered mask C′ of the nuclei whose texture was taken from images, if any are to be restored.
+    pub(crate) feathered: Option<Vec<f32>>,
     threads: Threads,
 }
 
@@ -46,23 +47,28 @@ pub(crate) enum FocusAt {
     Everywhere,
 }
 
-impl<'a> LightPath<'a> {
-    pub(crate) fn new(scene: &'a Scene, phantoms: &'a [Phantom], threads: Threads) -> Result<Self, String> {
+impl LightPath {
+    pub(crate) fn new(scene: &Scene, phantoms: &[Phantom], threads: Threads) -> Result<Self, String> {
         let (width, height) = (scene.view.width, scene.view.height);
         let mut empty_log10 = vec![0.0; width * height];
         background(scene)?.log10_into(&mut empty_log10, width, [0, 0]);
         let in_plane = Gaussian::new(scene.optics.sigma_xy_um / scene.view.pixel_um).map_err(|e| e.to_string())?;
-        Ok(Self { scene, phantoms, empty_log10, in_plane, threads })
+        let feathered = match scene.optics.restore {
+            Restore::Off => None,
+            Restore::BeforeDetection | Restore::AfterDetection => feathered(scene, phantoms)?,
+        };
+        Ok(Self { empty_log10, in_plane, feathered, threads })
     }
 
-    /// Images the scene. `masks` are those of the pieces of all phantoms, in their order.
-    pub(crate) fn image(&self, focus: FocusAt, masks: &[Vec<Mask>]) -> Result<Light, String> {
-        let (width, height) = (self.scene.view.width, self.scene.view.height);
+    /// Images the phantoms of a scene. `masks` are those of their pieces, in their order.
+    pub(crate) fn image(&self, scene: &Scene, phantoms: &[Phantom], masks: &[Vec<Mask>], focus: FocusAt) -> Result<Light, String> {
+        let (width, height) = (scene.view.width, scene.view.height);
         let mut exponent = self.empty_log10.clone();
         let mut absorbances = Vec::new();
-        let indices: Vec<usize> = (0..self.phantoms.len()).collect();
+        let indices: Vec<usize> = (0..phantoms.len()).collect();
         for chunk in indices.chunks(CHUNK) {
-            let blurred = threads::map(self.threads, chunk, |&index| self.blur(index, focus, &masks[index]));
+            let work = |&index: &usize| blur(scene, scene.objects[index].depth_um, &phantoms[index], &masks[index], focus);
+            let blurred = threads::map(self.threads, chunk, work);
             // Eq. 14: I_p = Σ pᵢ ∗ G_σz, added in the order of the objects whatever thread made them.
             for pieces in blurred {
                 for (tile, mean) in pieces? {
@@ -76,52 +82,49 @@ impl<'a> LightPath<'a> {
         self.in_plane.blur_into(&exponent, width, Border::Reflect, &mut spread, &mut Scratch::new());
         Ok(Light { sharp: exponent, spread, absorbances })
     }
+}
 
-    /// The negative absorbance of an object's pieces in a plane, and its mean over their masks.
-    fn blur(&self, index: usize, focus: FocusAt, masks: &[Mask]) -> Result<Vec<(Tile, f64)>, String> {
-        let view = self.scene.view;
-        let sigma_px = match focus {
-            FocusAt::Everywhere => 0.0,
-            FocusAt::Depth(plane) => {
-                // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
-                let defocus = (plane - self.scene.objects[index].depth_um).abs();
-                self.scene.optics.sigma_z_um_per_um * defocus / view.pixel_um
+/// The negative absorbance of an object's pieces in a plane, and its mean over their masks.
+fn blur(scene: &Scene, depth_um: f64, phantom: &Phantom, masks: &[Mask], focus: FocusAt) -> Result<Vec<(Tile, f64)>, String> {
+    let sigma_px = match focus {
+        FocusAt::Everywhere => 0.0,
+        // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
+        FocusAt::Depth(plane) => scene.optics.sigma_z_um_per_um * (plane - depth_um).abs() / scene.view.pixel_um,
+    };
+    let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::new(sigma_px)).transpose().map_err(|e| e.to_string())?;
+    let pieces = phantom.pieces.iter().zip(masks).map(|(piece, mask)| {
+        let mut tile = match &gaussian {
+            None => piece.absorbance.clone(),
+            Some(gaussian) => {
+                let (values, margin) = gaussian.spread(&piece.absorbance.values, piece.absorbance.width);
+                let [x, y] = piece.absorbance.origin;
+                let width = piece.absorbance.width + 2 * margin;
+                Tile { origin: [x - margin as i64, y - margin as i64], width, values }
             }
         };
-        let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::new(sigma_px)).transpose().map_err(|e| e.to_string())?;
-        let pieces = self.phantoms[index].pieces.iter().zip(masks).map(|(piece, mask)| {
-            let mut tile = match &gaussian {
-                None => piece.absorbance.clone(),
-                Some(gaussian) => {
-                    let (values, margin) = gaussian.spread(&piece.absorbance.values, piece.absorbance.width);
-                    let [x, y] = piece.absorbance.origin;
-                    Tile { origin: [x - margin as i64, y - margin as i64], width: piece.absorbance.width + 2 * margin, values }
-                }
-            };
-            let mean = mean_over(&tile, mask);
-            tile.values.iter_mut().for_each(|v| *v = -*v);
-            (tile, mean)
-        });
-        Ok(pieces.collect())
-    }
+        let mean = mean_over(&tile, mask);
+        tile.values.iter_mut().for_each(|v| *v = -*v);
+        (tile, mean)
+    });
+    Ok(pieces.collect())
+}
 
-    /// The feathered mask C′ = C ∗ G_σ of the nuclei whose texture was taken from images (Eq. 16), if there are any.
-    pub(crate) fn restored(&self) -> Result<Option<Vec<f32>>, String> {
-        let view = self.scene.view;
-        let imaged = || self.phantoms.iter().flat_map(|p| &p.pieces).filter(|piece| piece.imaged);
-        if imaged().next().is_none() {
-            return Ok(None);
-        }
-        let mut mask = vec![0.0_f32; view.width * view.height];
-        for piece in imaged() {
-            let mut tile = piece.coverage.clone();
-            tile.values.iter_mut().for_each(|v| *v = if *v >= 0.5 { 1.0 } else { 0.0 });
-            add_tile(&mut mask, view.width, view.height, [0, 0], &tile);
-        }
-        mask.iter_mut().for_each(|v| *v = v.min(1.0));
-        let feather = Gaussian::new(self.scene.optics.restore_feather_um / view.pixel_um).map_err(|e| e.to_string())?;
-        Ok(Some(feather.blur(&mask, view.width, Border::Reflect)))
+/// C′ = C ∗ G_σ, C being 1 on nuclei whose texture was taken from images and 0 elsewhere (Eq. 16), if there are any.
+fn feathered(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Vec<f32>>, String> {
+    let view = scene.view;
+    let imaged = || phantoms.iter().flat_map(|p| &p.pieces).filter(|piece| piece.imaged);
+    if imaged().next().is_none() {
+        return Ok(None);
     }
+    let mut mask = vec![0.0_f32; view.width * view.height];
+    for piece in imaged() {
+        let mut tile = piece.coverage.clone();
+        tile.values.iter_mut().for_each(|v| *v = if *v >= COVERED { 1.0 } else { 0.0 });
+        add_tile(&mut mask, view.width, view.height, [0, 0], &tile);
+    }
+    mask.iter_mut().for_each(|v| *v = v.min(1.0));
+    let feather = Gaussian::new(scene.optics.restore_feather_um / view.pixel_um).map_err(|e| e.to_string())?;
+    Ok(Some(feather.blur(&mask, view.width, Border::Reflect)))
 }
 
 /// Eq. 15 on transmitted light: I′ = I_sharp · C′ + I_spread · (1 − C′).

@@ -11,18 +11,13 @@ const SIDE: usize = 40;
 
 fn disc(side: usize) -> Vec<f32> {
     let offset = |i: usize| (2 * i + 1) as f32 / side as f32 - 1.0;
-    let inside =
-        |i: usize| offset(i % side) * offset(i % side) + offset(i / side) * offset(i / side) < 1.0;
-    (0..side * side)
-        .map(|i| if inside(i) { 1.0 } else { 0.0 })
-        .collect()
+    let inside = |i: usize| offset(i % side) * offset(i % side) + offset(i / side) * offset(i / side) < 1.0;
+    (0..side * side).map(|i| if inside(i) { 1.0 } else { 0.0 }).collect()
 }
 
 /// White noise, averaged over 3 x 3 px to make it a texture, standard deviation about 17.
 fn texture(side: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<f32> {
-    let noise: Vec<f32> = (0..side * side)
-        .map(|_| (rng.next_u32() >> 16) as f32 / 370.0)
-        .collect();
+    let noise: Vec<f32> = (0..side * side).map(|_| (rng.next_u32() >> 16) as f32 / 370.0).collect();
     let at = |x: usize, y: usize| noise[y % side * side + x % side];
     let mean = |i: usize| {
         let (x, y) = (i % side, i / side);
@@ -34,26 +29,17 @@ fn texture(side: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<f32> {
 fn nucleus(c: &mut Criterion) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let mask = disc(SIDE);
-    let sources: Vec<Source> = (0..3)
-        .map(|_| Source::new(&texture(SIDE, &mut rng), &mask, SIDE).expect("a disc"))
-        .collect();
+    let sources: Vec<Source> =
+        (0..3).map(|_| Source::new(&texture(SIDE, &mut rng), &mask, SIDE).expect("a disc")).collect();
     let sources: Vec<&Source> = sources.iter().collect();
-    let seven_by_two = QuiltParams {
-        patch_px: 7,
-        overlap_px: 2,
-        ..QuiltParams::default()
-    };
+    let seven_by_two = QuiltParams { patch_px: 7, overlap_px: 2, ..QuiltParams::default() };
     let cases = [
         ("default", QuiltParams::default()),
         ("paper", QuiltParams::paper()),
         ("patch 7, overlap 2", seven_by_two.clone()),
         (
             "patch 7, overlap 2, no bias, sharp cut",
-            QuiltParams {
-                centre_bias: CentreBias::Off,
-                seam: Seam::MinCut { feather_px: 0 },
-                ..seven_by_two
-            },
+            QuiltParams { centre_bias: CentreBias::Off, seam: Seam::MinCut { feather_px: 0 }, ..seven_by_two },
         ),
     ];
     let mut group = c.benchmark_group("nucleus");
@@ -77,28 +63,19 @@ fn search(c: &mut Criterion) {
     let mut group = c.benchmark_group("one source");
     group.sample_size(10);
     for (side, patch_px) in [(128, 16), (256, 32), (256, 64)] {
-        let source =
-            Source::new(&texture(side, &mut rng), &vec![1.0; side * side], side).expect("a square");
+        let source = Source::new(&texture(side, &mut rng), &vec![1.0; side * side], side).expect("a square");
         let target = vec![1.0; side * side];
         for search in [Search::Direct, Search::Fft, Search::Auto] {
             let params = QuiltParams {
                 patch_px,
                 overlap_px: patch_px / 4,
                 search,
-                acceptance: Acceptance::Near {
-                    factor: 1.1,
-                    floor: 0.02,
-                },
+                acceptance: Acceptance::Near { factor: 1.1, floor: 0.02 },
                 ..QuiltParams::default()
             };
             let quilter = Quilter::new(&[&source], &params).expect("valid parameters");
-            let id = BenchmarkId::new(
-                format!("{search:?}"),
-                format!("side {side}, patch {patch_px}"),
-            );
-            group.bench_function(id, |b| {
-                b.iter(|| quilter.synthesise(black_box(&target), side, &mut rng))
-            });
+            let id = BenchmarkId::new(format!("{search:?}"), format!("side {side}, patch {patch_px}"));
+            group.bench_function(id, |b| b.iter(|| quilter.synthesise(black_box(&target), side, &mut rng)));
         }
     }
     group.finish();

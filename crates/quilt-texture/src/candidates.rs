@@ -28,12 +28,8 @@ pub(crate) struct Run {
 impl Candidates {
     pub(crate) fn new(source: &Source, patch: usize) -> Self {
         let (width, stride) = (source.width, source.stride());
-        let mut candidates = Self {
-            runs: Vec::new(),
-            barrier: vec![f32::INFINITY; source.pixels.len()],
-            places: Vec::new(),
-            slots: 0,
-        };
+        let mut candidates =
+            Self { runs: Vec::new(), barrier: vec![f32::INFINITY; source.pixels.len()], places: Vec::new(), slots: 0 };
         // For each column: how many rows in a row had `patch` known pixels from there on.
         let mut rows = vec![0; width];
         for (y, known) in source.known.chunks(width).enumerate() {
@@ -56,11 +52,7 @@ impl Candidates {
             self.barrier[start + x] = 0.0;
         }
         if let [first, .., last] | [first @ last] = self.places[before..] {
-            let run = Run {
-                place: first,
-                blocks: (last - first) / LANES + 1,
-                slot: self.slots,
-            };
+            let run = Run { place: first, blocks: (last - first) / LANES + 1, slot: self.slots };
             self.slots += run.blocks * LANES;
             self.runs.push(run);
         }
@@ -85,20 +77,12 @@ mod tests {
     fn places_are_those_wholly_under_the_mask() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
         for (width, height, patch) in [(40, 40, 7), (9, 30, 3), (5, 5, 5), (80, 12, 2)] {
-            let mask: Vec<f32> = (0..width * height)
-                .map(|_| {
-                    if rng.next_u32().is_multiple_of(40) {
-                        0.0
-                    } else {
-                        1.0
-                    }
-                })
-                .collect();
+            let mask: Vec<f32> =
+                (0..width * height).map(|_| if rng.next_u32().is_multiple_of(40) { 0.0 } else { 1.0 }).collect();
             let source = Source::new(&mask, &mask, width).unwrap();
             let candidates = Candidates::new(&source, patch);
-            let whole = |&(x, y): &(usize, usize)| {
-                (y..y + patch).all(|j| (x..x + patch).all(|i| mask[j * width + i] > 0.0))
-            };
+            let whole =
+                |&(x, y): &(usize, usize)| (y..y + patch).all(|j| (x..x + patch).all(|i| mask[j * width + i] > 0.0));
             let slow: Vec<_> = (0..=height - patch)
                 .flat_map(|y| (0..=width - patch).map(move |x| (x, y)))
                 .filter(whole)

@@ -33,17 +33,11 @@ impl Canvas {
         let (patch, overlap) = (params.patch_px, params.overlap_px);
         let target_height = target_mask.len() / target_width;
         let step = patch - overlap;
-        let patches =
-            [target_width, target_height].map(|n| n.saturating_sub(overlap).div_ceil(step).max(1));
+        let patches = [target_width, target_height].map(|n| n.saturating_sub(overlap).div_ceil(step).max(1));
         let [width, height] = patches.map(|n| n * step + overlap);
         let mut wanted = vec![false; width * height];
-        for (row, mask) in wanted
-            .chunks_mut(width)
-            .zip(target_mask.chunks(target_width))
-        {
-            row.iter_mut()
-                .zip(mask)
-                .for_each(|(wanted, &m)| *wanted = m > 0.0);
+        for (row, mask) in wanted.chunks_mut(width).zip(target_mask.chunks(target_width)) {
+            row.iter_mut().zip(mask).for_each(|(wanted, &m)| *wanted = m > 0.0);
         }
         Self {
             patch,
@@ -68,9 +62,7 @@ impl Canvas {
             let start = self.index(corner, [0, y]);
             let row = start..start + self.patch;
             let unseen = self.wanted[row.clone()].iter().zip(&self.origins[row]);
-            unseen
-                .into_iter()
-                .any(|(&wanted, origin)| wanted && origin.is_none())
+            unseen.into_iter().any(|(&wanted, origin)| wanted && origin.is_none())
         })
     }
 
@@ -78,11 +70,7 @@ impl Canvas {
     pub(crate) fn overlaps(&self, corner: [usize; 2], pixels: &mut Vec<([usize; 2], f32)>) {
         pixels.clear();
         for y in 0..self.patch {
-            let breadth = if y < self.overlap {
-                self.patch
-            } else {
-                self.overlap
-            };
+            let breadth = if y < self.overlap { self.patch } else { self.overlap };
             for x in 0..breadth {
                 let i = self.index(corner, [x, y]);
                 if self.wanted[i] && self.origins[i].is_some() {
@@ -93,14 +81,7 @@ impl Canvas {
     }
 
     /// Joins the patch at `place` of a source to what is there.
-    pub(crate) fn paste(
-        &mut self,
-        corner: [usize; 2],
-        number: usize,
-        source: &Source,
-        place: usize,
-        seam: Seam,
-    ) {
+    pub(crate) fn paste(&mut self, corner: [usize; 2], number: usize, source: &Source, place: usize, seam: Seam) {
         let mut joint = core::mem::take(&mut self.joint);
         self.weigh(corner, source, place, seam, &mut joint);
         for y in 0..self.patch {
@@ -114,16 +95,9 @@ impl Canvas {
                 };
                 if weight >= 0.5 {
                     let row = from / (source.width + ROW_PADDING);
-                    self.origins[i] = Some(Origin {
-                        source: number,
-                        pixel: from - row * ROW_PADDING,
-                    });
+                    self.origins[i] = Some(Origin { source: number, pixel: from - row * ROW_PADDING });
                 }
-                self.pixels[i] = if weight == 1.0 {
-                    new
-                } else {
-                    self.pixels[i] + weight * (new - self.pixels[i])
-                };
+                self.pixels[i] = if weight == 1.0 { new } else { self.pixels[i] + weight * (new - self.pixels[i]) };
             }
         }
         self.joint = joint;
@@ -140,13 +114,9 @@ impl Canvas {
             let row = y * self.width..y * self.width + target_width;
             let wanted = &self.wanted[row.clone()];
             let pixels = self.pixels[row.clone()].iter().zip(wanted);
-            texture
-                .pixels
-                .extend(pixels.map(|(&v, &wanted)| if wanted { v } else { 0.0 }));
+            texture.pixels.extend(pixels.map(|(&v, &wanted)| if wanted { v } else { 0.0 }));
             let origins = self.origins[row].iter().zip(wanted);
-            texture
-                .origins
-                .extend(origins.map(|(origin, &wanted)| origin.filter(|_| wanted)));
+            texture.origins.extend(origins.map(|(origin, &wanted)| origin.filter(|_| wanted)));
         }
         texture
     }
@@ -156,14 +126,7 @@ impl Canvas {
     }
 
     /// Sets the weights of the new patch where it covers old pixels.
-    fn weigh(
-        &self,
-        corner: [usize; 2],
-        source: &Source,
-        place: usize,
-        seam: Seam,
-        joint: &mut Joint,
-    ) {
+    fn weigh(&self, corner: [usize; 2], source: &Source, place: usize, seam: Seam, joint: &mut Joint) {
         let (patch, overlap) = (self.patch, self.overlap);
         let old = |x, y| self.origins[self.index(corner, [x, y])].is_some();
         let rows = |mut columns: core::ops::Range<usize>, y| columns.any(|x| old(x, y));
@@ -175,16 +138,8 @@ impl Canvas {
         match seam {
             Seam::Feather => {
                 for (i, weight) in weights.iter_mut().enumerate() {
-                    let across = if left {
-                        feather(i % patch, overlap)
-                    } else {
-                        1.0
-                    };
-                    let down = if above {
-                        feather(i / patch, overlap)
-                    } else {
-                        1.0
-                    };
+                    let across = if left { feather(i % patch, overlap) } else { 1.0 };
+                    let down = if above { feather(i / patch, overlap) } else { 1.0 };
                     *weight = across.min(down);
                 }
             }
@@ -194,14 +149,9 @@ impl Canvas {
                 let error = |x, y| {
                     let i = self.index(corner, [x, y]);
                     let d = self.pixels[i] - source.pixels[place + y * source.stride() + x];
-                    if self.wanted[i] && self.origins[i].is_some() {
-                        d * d
-                    } else {
-                        0.0
-                    }
+                    if self.wanted[i] && self.origins[i].is_some() { d * d } else { 0.0 }
                 };
-                let strip =
-                    || (0..patch).flat_map(|along| (0..overlap).map(move |across| (along, across)));
+                let strip = || (0..patch).flat_map(|along| (0..overlap).map(move |across| (along, across)));
                 if left {
                     joint.errors.clear();
                     joint.errors.extend(strip().map(|(y, x)| error(x, y)));
@@ -228,8 +178,7 @@ impl Canvas {
                     for y in 0..patch {
                         let breadth = if y < overlap { patch } else { overlap };
                         for x in 0..breadth {
-                            weights[y * patch + x] =
-                                blurred(&joint.sharp, patch, [x, y], feather_px, [left, above]);
+                            weights[y * patch + x] = blurred(&joint.sharp, patch, [x, y], feather_px, [left, above]);
                         }
                     }
                 }
@@ -244,16 +193,10 @@ fn blurred(weights: &[f32], patch: usize, at: [usize; 2], radius: usize, meets: 
     let [(x0, x1, wide), (y0, y1, high)] = [0, 1].map(|axis| {
         let first = at[axis].saturating_sub(radius);
         let end = (at[axis] + radius + 1).min(patch);
-        let beyond = if meets[axis] {
-            radius.saturating_sub(at[axis])
-        } else {
-            0
-        };
+        let beyond = if meets[axis] { radius.saturating_sub(at[axis]) } else { 0 };
         (first, end, end - first + beyond)
     });
-    let sum: f32 = (y0..y1)
-        .map(|y| weights[y * patch + x0..y * patch + x1].iter().sum::<f32>())
-        .sum();
+    let sum: f32 = (y0..y1).map(|y| weights[y * patch + x0..y * patch + x1].iter().sum::<f32>()).sum();
     #[expect(clippy::cast_precision_loss, reason = "at most 513 squared")]
     {
         sum / (wide * high) as f32

@@ -26,10 +26,7 @@ pub(crate) fn centrality(inside: &[bool], width: usize) -> Vec<f32> {
         envelope.transform(row, out);
     }
     let largest = squared.iter().copied().max().unwrap_or(0).max(1);
-    #[expect(
-        clippy::cast_precision_loss,
-        reason = "rounded once, like any coordinate"
-    )]
+    #[expect(clippy::cast_precision_loss, reason = "rounded once, like any coordinate")]
     let root = |square: u32| (square as f32 / largest as f32).sqrt();
     squared.into_iter().map(root).collect()
 }
@@ -100,33 +97,24 @@ mod tests {
 
     fn slow(inside: &[bool], width: usize) -> Vec<f32> {
         let (w, h) = (width as i64, (inside.len() / width) as i64);
-        let outside = |x: i64, y: i64| {
-            !(0..w).contains(&x) || !(0..h).contains(&y) || !inside[(y * w + x) as usize]
-        };
+        let outside = |x: i64, y: i64| !(0..w).contains(&x) || !(0..h).contains(&y) || !inside[(y * w + x) as usize];
         let squared: Vec<i64> = (0..w * h)
             .map(|i| {
                 let all = (-1..=h).flat_map(|y| (-1..=w).map(move |x| (x, y)));
-                let away =
-                    |(x, y): (i64, i64)| (x - i % w) * (x - i % w) + (y - i / w) * (y - i / w);
+                let away = |(x, y): (i64, i64)| (x - i % w) * (x - i % w) + (y - i / w) * (y - i / w);
                 all.filter(|&(x, y)| outside(x, y)).map(away).min().unwrap()
             })
             .collect();
         let largest = *squared.iter().max().unwrap().max(&1) as f32;
-        squared
-            .iter()
-            .map(|&d| (d as f32 / largest).sqrt())
-            .collect()
+        squared.iter().map(|&d| (d as f32 / largest).sqrt()).collect()
     }
 
     #[test]
     fn equals_brute_force() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        for (width, height, holes) in [(1, 1, 2), (7, 5, 3), (23, 17, 40), (12, 30, 9), (16, 9, 1)]
-        {
+        for (width, height, holes) in [(1, 1, 2), (7, 5, 3), (23, 17, 40), (12, 30, 9), (16, 9, 1)] {
             for _ in 0..20 {
-                let mask: Vec<_> = (0..width * height)
-                    .map(|_| !rng.next_u32().is_multiple_of(holes))
-                    .collect();
+                let mask: Vec<_> = (0..width * height).map(|_| !rng.next_u32().is_multiple_of(holes)).collect();
                 assert_eq!(centrality(&mask, width), slow(&mask, width));
             }
         }

@@ -44,9 +44,7 @@ pub enum Error {
     #[error("sources is empty; accepted: at least one source")]
     NoSource,
     /// No patch lies wholly under the mask of a source.
-    #[error(
-        "sources[{index}] has no room for a patch of {patch_px} px; accepted: smaller patches or larger sources"
-    )]
+    #[error("sources[{index}] has no room for a patch of {patch_px} px; accepted: smaller patches or larger sources")]
     SourceTooSmall {
         /// Which source.
         index: usize,

@@ -11,7 +11,8 @@ pub struct QuiltParams {
     pub acceptance: Acceptance,
     /// How a patch is joined to its neighbours. Default [`Seam::MinCut`] (ours).
     pub seam: Seam,
-    /// Whether central patches come from the centres of sources. Default weighted (the paper's).
+    /// Whether central patches come from the centres of sources. Default weighted (the paper's)
+    /// with strength 0.5 (ours).
     pub centre_bias: CentreBias,
     /// How all candidates are compared. Default [`Search::Auto`] (ours). Has no effect on
     /// [`Acceptance::Threshold`], which compares few.
@@ -25,12 +26,9 @@ impl Default for QuiltParams {
         Self {
             patch_px: 9,
             overlap_px: 3,
-            acceptance: Acceptance::Near {
-                factor: 1.1,
-                floor: 0.02,
-            },
-            seam: Seam::MinCut { feather_px: 1 },
-            centre_bias: CentreBias::Weighted { strength: 1.0 },
+            acceptance: Acceptance::Near { factor: 1.1, floor: 0.05 },
+            seam: Seam::MinCut { feather_px: 0 },
+            centre_bias: CentreBias::Weighted { strength: 0.5 },
             search: Search::Auto,
             fft: Fft::Fastest,
         }
@@ -47,10 +45,7 @@ impl QuiltParams {
         Self {
             patch_px: 7,
             overlap_px: 2,
-            acceptance: Acceptance::Threshold {
-                d_max: 15.0,
-                max_tries: 1000,
-            },
+            acceptance: Acceptance::Threshold { d_max: 15.0, max_tries: 1000 },
             seam: Seam::Feather,
             centre_bias: CentreBias::Weighted { strength: 2.0 },
             ..Self::default()
@@ -59,18 +54,11 @@ impl QuiltParams {
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         #[expect(clippy::cast_precision_loss, reason = "for a message")]
-        let size = |field, value: usize, accepted, inside: bool| {
-            number(field, value as f64, accepted, inside)
-        };
+        let size = |field, value: usize, accepted, inside: bool| number(field, value as f64, accepted, inside);
         let patch = (2..=256).contains(&self.patch_px);
         size("patch_px", self.patch_px, "2 to 256", patch)?;
         let overlap = (1..=self.patch_px / 2).contains(&self.overlap_px);
-        size(
-            "overlap_px",
-            self.overlap_px,
-            "1 to half of patch_px",
-            overlap,
-        )?;
+        size("overlap_px", self.overlap_px, "1 to half of patch_px", overlap)?;
         match self.acceptance {
             Acceptance::Threshold { d_max, max_tries } => {
                 number("acceptance.d_max", d_max, "0 or more", d_max >= 0.0)?;
@@ -94,21 +82,8 @@ impl QuiltParams {
     }
 }
 
-fn number(
-    field: &'static str,
-    value: f64,
-    accepted: &'static str,
-    inside: bool,
-) -> Result<(), Error> {
-    if inside && value.is_finite() {
-        Ok(())
-    } else {
-        Err(Error::Parameter {
-            field,
-            value,
-            accepted,
-        })
-    }
+fn number(field: &'static str, value: f64, accepted: &'static str, inside: bool) -> Result<(), Error> {
+    if inside && value.is_finite() { Ok(()) } else { Err(Error::Parameter { field, value, accepted }) }
 }
 
 /// Which candidates are good enough to be pasted.
@@ -131,7 +106,7 @@ pub enum Acceptance {
     Near {
         /// 1 or more; 1.1 by default.
         factor: f64,
-        /// Mismatch that counts as none, a part of the variance, 0 or more; 0.02 by default.
+        /// Mismatch that counts as none, a part of the variance, 0 or more; 0.05 by default.
         /// Without it a patch whose overlap was copied from one place is always continued by the
         /// pixels beside that place, and sources reappear verbatim.
         floor: f64,
@@ -139,15 +114,18 @@ pub enum Acceptance {
 }
 
 /// How a patch is joined to what lies under its overlaps.
+///
+/// Measured on Matérn textures with the default patches: the sharp cut keeps 0.92 of the variance
+/// and its steps are 1.05 times those between neighbours in a source; both kinds of fading keep
+/// 0.87 and smooth the seams to 0.8 times that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seam {
     /// The paper's: the new patch fades in over the overlap, with weights that sum to one.
-    /// Takes from the texture's variance.
     Feather,
     /// The path of least difference through the overlap (Efros and Freeman, 2001).
     MinCut {
-        /// The cut is blurred by a box of 2 · `feather_px` + 1 pixels. 0 to `overlap_px`; with 0
-        /// every pixel is one pixel of a source. 1 by default.
+        /// The cut is blurred by a box of 2 · `feather_px` + 1 pixels. 0 to `overlap_px`. 0 by
+        /// default: every pixel is one pixel of a source.
         feather_px: usize,
     },
 }
@@ -207,10 +185,7 @@ mod tests {
     fn paper_defaults() {
         let paper = QuiltParams::paper();
         assert_eq!((paper.patch_px, paper.overlap_px), (7, 2));
-        assert!(matches!(
-            paper.acceptance,
-            Acceptance::Threshold { d_max: 15.0, .. }
-        ));
+        assert!(matches!(paper.acceptance, Acceptance::Threshold { d_max: 15.0, .. }));
         assert_eq!(paper.seam, Seam::Feather);
         assert!(paper.centre_bias.strength() > 0.0);
         assert_eq!(paper.check(), Ok(()));
@@ -223,66 +198,22 @@ mod tests {
         let near = |factor, floor| Acceptance::Near { factor, floor };
         let threshold = |d_max, max_tries| Acceptance::Threshold { d_max, max_tries };
         for bad in [
-            QuiltParams {
-                patch_px: 1,
-                ..good()
-            },
-            QuiltParams {
-                patch_px: 257,
-                ..good()
-            },
-            QuiltParams {
-                overlap_px: 0,
-                ..good()
-            },
-            QuiltParams {
-                overlap_px: 5,
-                ..good()
-            },
-            QuiltParams {
-                acceptance: near(0.9, 0.0),
-                ..good()
-            },
-            QuiltParams {
-                acceptance: near(f64::NAN, 0.0),
-                ..good()
-            },
-            QuiltParams {
-                acceptance: near(1.1, -1.0),
-                ..good()
-            },
-            QuiltParams {
-                acceptance: near(1.1, f64::INFINITY),
-                ..good()
-            },
-            QuiltParams {
-                acceptance: threshold(-1.0, 9),
-                ..good()
-            },
-            QuiltParams {
-                acceptance: threshold(1.0, 0),
-                ..good()
-            },
-            QuiltParams {
-                seam: Seam::MinCut { feather_px: 4 },
-                ..good()
-            },
-            QuiltParams {
-                centre_bias: CentreBias::Weighted { strength: f64::NAN },
-                ..good()
-            },
+            QuiltParams { patch_px: 1, ..good() },
+            QuiltParams { patch_px: 257, ..good() },
+            QuiltParams { overlap_px: 0, ..good() },
+            QuiltParams { overlap_px: 5, ..good() },
+            QuiltParams { acceptance: near(0.9, 0.0), ..good() },
+            QuiltParams { acceptance: near(f64::NAN, 0.0), ..good() },
+            QuiltParams { acceptance: near(1.1, -1.0), ..good() },
+            QuiltParams { acceptance: near(1.1, f64::INFINITY), ..good() },
+            QuiltParams { acceptance: threshold(-1.0, 9), ..good() },
+            QuiltParams { acceptance: threshold(1.0, 0), ..good() },
+            QuiltParams { seam: Seam::MinCut { feather_px: 4 }, ..good() },
+            QuiltParams { centre_bias: CentreBias::Weighted { strength: f64::NAN }, ..good() },
         ] {
-            assert!(
-                matches!(bad.check(), Err(Error::Parameter { .. })),
-                "{bad:?}"
-            );
+            assert!(matches!(bad.check(), Err(Error::Parameter { .. })), "{bad:?}");
         }
-        let message = QuiltParams {
-            patch_px: 1,
-            ..good()
-        }
-        .check()
-        .unwrap_err();
+        let message = QuiltParams { patch_px: 1, ..good() }.check().unwrap_err();
         assert_eq!(message.to_string(), "patch_px is 1; accepted: 2 to 256");
     }
 }

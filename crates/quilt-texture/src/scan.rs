@@ -143,11 +143,7 @@ fn smallest(values: &[f32; LANES]) -> f32 {
     let mut width = LANES / 2;
     while width > 0 {
         for lane in 0..width {
-            halves[lane] = if halves[lane + width] < halves[lane] {
-                halves[lane + width]
-            } else {
-                halves[lane]
-            };
+            halves[lane] = if halves[lane + width] < halves[lane] { halves[lane + width] } else { halves[lane] };
         }
         width /= 2;
     }
@@ -164,9 +160,7 @@ pub(crate) mod tests {
 
     /// A disc of white noise, uniform in 0..1.
     pub(crate) fn disc(width: usize, height: usize, rng: &mut impl Rng) -> Source {
-        let pixels: Vec<f32> = (0..width * height)
-            .map(|_| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32)
-            .collect();
+        let pixels: Vec<f32> = (0..width * height).map(|_| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32).collect();
         let mask: Vec<f32> = (0..width * height)
             .map(|i| {
                 let x = 2.0 * ((i % width) as f32 + 0.5) / width as f32 - 1.0;
@@ -191,12 +185,7 @@ pub(crate) mod tests {
     }
 
     /// Σ (s - t)² + weight · Δ² in double precision.
-    pub(crate) fn slow_cost(
-        source: &Source,
-        patch: usize,
-        template: &Template,
-        place: usize,
-    ) -> f64 {
+    pub(crate) fn slow_cost(source: &Source, patch: usize, template: &Template, place: usize) -> f64 {
         let at = |[x, y]: [usize; 2]| place + y * source.stride() + x;
         let depth = source.centrality[at([patch / 2, patch / 2])];
         let away = f64::from(depth) - f64::from(template.centrality);
@@ -220,14 +209,7 @@ pub(crate) mod tests {
                 let tolerance = Tolerance { factor, floor };
                 let mut costs = vec![f32::NAN; candidates.slots];
                 let mut least = f32::INFINITY;
-                scan(
-                    &source,
-                    &candidates,
-                    &laid,
-                    tolerance,
-                    &mut least,
-                    &mut costs,
-                );
+                scan(&source, &candidates, &laid, tolerance, &mut least, &mut costs);
                 let smallest = costs.iter().copied().fold(f32::INFINITY, f32::min);
                 assert_eq!(least, smallest);
                 for (slot, &cost) in costs.iter().enumerate() {

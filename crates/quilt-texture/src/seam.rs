@@ -38,11 +38,7 @@ fn least_near(row: &[f32], x: usize) -> usize {
 /// has the rest, so that both sum to one.
 pub(crate) fn feather(i: usize, overlap: usize) -> f32 {
     #[expect(clippy::cast_precision_loss, reason = "at most 128")]
-    if i < overlap {
-        (i + 1) as f32 / (overlap + 1) as f32
-    } else {
-        1.0
-    }
+    if i < overlap { (i + 1) as f32 / (overlap + 1) as f32 } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -70,17 +66,11 @@ mod tests {
         for (length, breadth) in [(1, 1), (7, 5), (7, 2), (5, 1), (6, 3), (2, 5)] {
             for _ in 0..50 {
                 // Whole numbers, so that sums are exact and ties occur.
-                let errors: Vec<_> = (0..length * breadth)
-                    .map(|_| (rng.next_u32() % 10) as f32)
-                    .collect();
+                let errors: Vec<_> = (0..length * breadth).map(|_| (rng.next_u32() % 10) as f32).collect();
                 let mut path = vec![0; length];
                 min_cut(&mut errors.clone(), breadth, &mut path);
                 assert!(path.windows(2).all(|w| w[0].abs_diff(w[1]) <= 1));
-                let total: f32 = path
-                    .iter()
-                    .enumerate()
-                    .map(|(y, x)| errors[y * breadth + x])
-                    .sum();
+                let total: f32 = path.iter().enumerate().map(|(y, x)| errors[y * breadth + x]).sum();
                 assert_eq!(total, least(&errors, breadth, 0, None));
             }
         }

@@ -36,11 +36,7 @@ impl Source {
     /// not finite.
     pub fn new(pixels: &[f32], mask: &[f32], width: usize) -> Result<Self, Error> {
         if width == 0 || pixels.len() != mask.len() || !pixels.len().is_multiple_of(width) {
-            return Err(Error::Shape {
-                pixels: pixels.len(),
-                mask: mask.len(),
-                width,
-            });
+            return Err(Error::Shape { pixels: pixels.len(), mask: mask.len(), width });
         }
         finite("mask", mask.iter().enumerate())?;
         let known: Vec<bool> = mask.iter().map(|&m| m >= COVERED).collect();
@@ -52,10 +48,7 @@ impl Source {
         }
         #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
         let mean = used().map(|(_, &v)| f64::from(v)).sum::<f64>() / count as f64;
-        let squares = used()
-            .map(|(_, &v)| f64::from(v) - mean)
-            .map(|d| d * d)
-            .sum();
+        let squares = used().map(|(_, &v)| f64::from(v) - mean).map(|d| d * d).sum();
 
         let height = pixels.len() / width;
         let stride = width + ROW_PADDING;
@@ -71,15 +64,7 @@ impl Source {
                 }
             }
         }
-        Ok(Self {
-            width,
-            height,
-            pixels: padded,
-            centrality: depth,
-            known,
-            count,
-            squares,
-        })
+        Ok(Self { width, height, pixels: padded, centrality: depth, known, count, squares })
     }
 
     /// Width, px.
@@ -100,17 +85,10 @@ impl Source {
     }
 }
 
-fn finite<'a>(
-    slice: &'static str,
-    values: impl Iterator<Item = (usize, &'a f32)>,
-) -> Result<(), Error> {
+fn finite<'a>(slice: &'static str, values: impl Iterator<Item = (usize, &'a f32)>) -> Result<(), Error> {
     for (index, &value) in values {
         if !value.is_finite() {
-            return Err(Error::NotFinite {
-                slice,
-                index,
-                value,
-            });
+            return Err(Error::NotFinite { slice, index, value });
         }
     }
     Ok(())
@@ -122,16 +100,12 @@ mod tests {
 
     #[test]
     fn mismatches_are_errors() {
-        let shape = |pixels: usize, mask: usize, width| {
-            Source::new(&vec![0.0; pixels], &vec![1.0; mask], width).unwrap_err()
-        };
+        let shape =
+            |pixels: usize, mask: usize, width| Source::new(&vec![0.0; pixels], &vec![1.0; mask], width).unwrap_err();
         for bad in [shape(6, 6, 0), shape(6, 5, 3), shape(7, 7, 3)] {
             assert!(matches!(bad, Error::Shape { .. }));
         }
-        assert!(matches!(
-            Source::new(&[1.0; 4], &[0.4; 4], 2),
-            Err(Error::EmptyMask)
-        ));
+        assert!(matches!(Source::new(&[1.0; 4], &[0.4; 4], 2), Err(Error::EmptyMask)));
         assert!(matches!(Source::new(&[], &[], 3), Err(Error::EmptyMask)));
         let nan = Source::new(&[1.0, f32::NAN], &[1.0, 1.0], 2).unwrap_err();
         assert_eq!(nan.to_string(), "pixels[1] is NaN; accepted: finite values");

@@ -35,25 +35,14 @@ impl Spectral {
         let plans = match fft {
             Fft::Fastest => {
                 let mut planner = FftPlanner::new();
-                grid.map(|n| Plan {
-                    forward: planner.plan_fft_forward(n),
-                    inverse: planner.plan_fft_inverse(n),
-                })
+                grid.map(|n| Plan { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) })
             }
             Fft::Portable => {
                 let mut planner = FftPlannerScalar::new();
-                grid.map(|n| Plan {
-                    forward: planner.plan_fft_forward(n),
-                    inverse: planner.plan_fft_inverse(n),
-                })
+                grid.map(|n| Plan { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) })
             }
         };
-        let known = || {
-            (0..)
-                .zip(&source.known)
-                .filter(|&(_, &known)| known)
-                .map(|(i, _): (usize, _)| i)
-        };
+        let known = || (0..).zip(&source.known).filter(|&(_, &known)| known).map(|(i, _): (usize, _)| i);
         let [x, y] = [|i: usize, w: usize| i % w, |i: usize, w: usize| i / w];
         let value = |i| {
             let place = y(i, source.width) * source.stride() + x(i, source.width);
@@ -61,13 +50,7 @@ impl Spectral {
         };
         #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
         let mean = known().map(value).sum::<f64>() / source.count as f64;
-        let mut spectral = Self {
-            grid,
-            mean,
-            plain: Vec::new(),
-            squared: Vec::new(),
-            plans,
-        };
+        let mut spectral = Self { grid, mean, plain: Vec::new(), squared: Vec::new(), plans };
         let transform = |of: &dyn Fn(f64) -> f64| {
             let mut image = vec![Complex64::ZERO; grid[0] * grid[1]];
             for i in known() {
@@ -101,20 +84,14 @@ impl Spectral {
         let centre = (patch / 2) * (stride + 1);
         costs.fill(f32::INFINITY);
         for run in &candidates.runs {
-            for (i, cost) in costs[run.slot..][..run.blocks * LANES]
-                .iter_mut()
-                .enumerate()
-            {
+            for (i, cost) in costs[run.slot..][..run.blocks * LANES].iter_mut().enumerate() {
                 let place = run.place + i;
                 if candidates.barrier[place] > 0.0 {
                     continue;
                 }
                 let away = source.centrality[place + centre] - template.centrality;
                 let sum = squares[place / stride * self.grid[0] + place % stride].max(0.0);
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    reason = "costs are single precision"
-                )]
+                #[expect(clippy::cast_possible_truncation, reason = "costs are single precision")]
                 {
                     *cost = template.weight * (away * away) + sum as f32;
                 }
@@ -148,10 +125,7 @@ impl Spectral {
         }
         #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
         let scale = 1.0 / (width * height) as f64;
-        self.inverse(product)
-            .iter()
-            .map(|z| constant + scale * z.re)
-            .collect()
+        self.inverse(product).iter().map(|z| constant + scale * z.re).collect()
     }
 
     fn forward(&self, mut image: Vec<Complex64>) -> Vec<Complex64> {
@@ -173,9 +147,7 @@ impl Spectral {
 
 impl fmt::Debug for Spectral {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Spectral")
-            .field("grid", &self.grid)
-            .finish_non_exhaustive()
+        f.debug_struct("Spectral").field("grid", &self.grid).finish_non_exhaustive()
     }
 }
 
@@ -244,14 +216,7 @@ mod tests {
         let template = template(8, 3, &mut rng);
         let mut costs = vec![f32::NAN; candidates.slots];
         let mut least = f32::INFINITY;
-        Spectral::new(&source, Fft::Fastest).costs(
-            &source,
-            &candidates,
-            8,
-            &template,
-            &mut least,
-            &mut costs,
-        );
+        Spectral::new(&source, Fft::Fastest).costs(&source, &candidates, 8, &template, &mut least, &mut costs);
         assert_eq!(least, costs.iter().copied().fold(f32::INFINITY, f32::min));
         for (slot, &cost) in costs.iter().enumerate() {
             let place = candidates.place_of_slot(slot);

@@ -62,7 +62,7 @@ pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, 
         join(&runs, above, first..runs.len(), &mut forest);
         above = first..runs.len();
         // What does not reach the newest row cannot join any more.
-        if forest.trees > limits.max_regions + above.len() {
+        if forest.trees > limits.max_regions.saturating_add(above.len()) {
             return Err(Problem::Regions { limit: limits.max_regions });
         }
     }

@@ -159,7 +159,7 @@ fn finish(
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
-    add_detail(&mut absorbance, body, pools, pixel_um, &mut rng);
+    add_detail(&mut absorbance, &coverage, body, pools, pixel_um, &mut rng);
     if body.detail.cytoskeleton > 0.0 {
         add_cytoskeleton(studio, &mut absorbance, &plan.outline, body.detail.cytoskeleton, pixel_um, &mut rng)?;
     }
@@ -223,7 +223,7 @@ fn roughened(outline: &[Point], depth_px: f64, rng: &mut Stream) -> Vec<Point> {
 }
 
 /// The first two levels of detail, and the grain: factors on the thickness.
-fn add_detail(absorbance: &mut Tile, body: &CellBody, pools: &Pools, pixel_um: f64, rng: &mut Stream) {
+fn add_detail(absorbance: &mut Tile, coverage: &Tile, body: &CellBody, pools: &Pools, pixel_um: f64, rng: &mut Stream) {
     let detail = &body.detail;
     let clouds = Look::clouds(detail.clouds_um / pixel_um, rng);
     let flecks = Look::fine(pixel_um, rng);
@@ -232,19 +232,23 @@ fn add_detail(absorbance: &mut Tile, body: &CellBody, pools: &Pools, pixel_um: f
     let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
     let width = absorbance.width;
     let mut factor = vec![1.0_f32; width];
-    for (y, row) in absorbance.values.chunks_exact_mut(width).enumerate() {
-        let first = [0.0, y as f64];
+    let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
+    for (y, (row, cover)) in rows.enumerate() {
+        let inside = |share: &f32| *share > 0.0;
+        let (Some(first), Some(last)) = (cover.iter().position(inside), cover.iter().rposition(inside)) else { continue };
+        let (at, row) = ([first as f64, y as f64], &mut row[first..=last]);
+        let factor = &mut factor[..row.len()];
         factor.fill(1.0);
         if cloud > 0.0 {
-            pools.clouds.row(&clouds, first, width, |x, v| factor[x] += cloud * v);
+            pools.clouds.row(&clouds, at, row.len(), |x, v| factor[x] += cloud * v);
         }
         if fleck > 0.0 {
-            pools.flecks.row(&flecks, first, width, |x, v| factor[x] += fleck * (v - threshold).max(0.0));
+            pools.flecks.row(&flecks, at, row.len(), |x, v| factor[x] += fleck * (v - threshold).max(0.0));
         }
         if grainy > 0.0 {
-            pools.grain.row(&grain, first, width, |x, v| factor[x] += grainy * v);
+            pools.grain.row(&grain, at, row.len(), |x, v| factor[x] += grainy * v);
         }
-        for (value, factor) in row.iter_mut().zip(&factor) {
+        for (value, factor) in row.iter_mut().zip(factor) {
             *value *= factor.max(0.0);
         }
     }

@@ -1,18 +1,17 @@
 //! White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9).
 
-use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
 use super::Phantom;
 use super::tile::{Point, Tile, area};
-use super::wobble::{placed, wobbled_circle};
+use super::wobble::{placed, textured, wobbled_circle};
 use crate::random;
 use crate::scene::{Body, Object, Scene};
 
 /// Size of the cells of the Perlin noise inside a nucleus, relative to its radius.
-const NOISE_CELL: f64 = 0.9;
+const NOISE_CELL: f64 = 0.55;
 /// Strength of that noise relative to the absorbance.
-const NOISE_STRENGTH: f32 = 0.45;
+const NOISE_STRENGTH: f32 = 1.1;
 /// Radius of a lobe relative to a round nucleus of the same cell.
 const LOBE: f64 = 0.66;
 /// Radius of the cell relative to its nucleus.
@@ -53,14 +52,9 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
     for shape in &shapes {
         nucleus.cover(shape);
     }
-    let key = rng.next_u64();
-    let noise = Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key).ok();
-    let cell = NOISE_CELL * radius;
     let mut tile = nucleus.clone();
-    tile.for_each(|p, value| {
-        let n = noise.as_ref().map_or(0.0, |n| n.at((p[0] - centre[0]) / cell, (p[1] - centre[1]) / cell));
-        *value *= absorbance as f32 * (1.0 + NOISE_STRENGTH * n).max(0.0);
-    });
+    domed(&mut tile, &shapes);
+    textured(&mut tile, centre, NOISE_CELL * radius, 2, NOISE_STRENGTH, absorbance, rng.next_u64());
     let mut whole = shapes.iter().map(|shape| area(shape)).sum();
     if let Some(body) = &body {
         coverage.cover(body);
@@ -73,4 +67,21 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
         *cover = cover.max(*inside);
     }
     Phantom::whole(tile, coverage, whole)
+}
+
+/// Absorbance of a lobe at its rim, relative to its middle: a lobe is a ball that dries flat.
+const RIM: f64 = 0.62;
+
+/// Makes lobes thicker in their middle.
+fn domed(tile: &mut Tile, lobes: &[Vec<Point>]) {
+    let balls: Vec<(Point, f64)> =
+        lobes.iter().map(|lobe| (fsd_shape::centroid(lobe), area(lobe) / core::f64::consts::PI)).collect();
+    tile.for_each(|p, value| {
+        let chord = |(centre, square): &(Point, f64)| {
+            let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+            (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt()
+        };
+        let thickest = balls.iter().map(chord).fold(0.0, f64::max);
+        *value *= (RIM + (1.0 - RIM) * thickest) as f32;
+    });
 }

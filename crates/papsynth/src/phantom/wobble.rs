@@ -1,8 +1,9 @@
-//! The paper's parametric shape (Eqs. 6, 7): a circle whose points are pushed about.
+//! The paper's parametric shape (Eqs. 6, 7), a circle whose points are pushed about, and its Perlin texture.
 
+use perlin_bg::{Fractal, FractalParams, Window};
 use rand_core::Rng;
 
-use super::tile::Point;
+use super::tile::{Point, Tile};
 use crate::random;
 
 /// Points of the perturbed circle before it is smoothed (K of Eq. 7).
@@ -43,6 +44,18 @@ pub(crate) fn smooth(corners: &[Point], between: usize) -> Vec<Point> {
         }
     }
     curve
+}
+
+/// Fills what a tile covers with an absorbance that Perlin noise varies, with cells of `cell_px` pixels about `centre`.
+pub(crate) fn textured(tile: &mut Tile, centre: Point, cell_px: f64, octaves: usize, strength: f32, absorbance: f64, key: u64) {
+    let Ok(noise) = Fractal::new(&FractalParams { octaves, ..FractalParams::default() }, key) else { return };
+    let step = 1.0 / cell_px;
+    let window = Window { origin: [-centre[0] * step, -centre[1] * step], step, first: tile.origin };
+    let mut factor = vec![1.0; tile.values.len()];
+    noise.add_into(&mut factor, tile.width, &window, strength);
+    for (value, factor) in tile.values.iter_mut().zip(&factor) {
+        *value *= absorbance as f32 * factor.max(0.0);
+    }
 }
 
 /// A point turned by an angle about the origin and moved.

@@ -132,7 +132,7 @@ impl Default for Folds {
         Self {
             flap: 0.32.into(),
             roll: 0.18.into(),
-            cigar: 0.03.into(),
+            cigar: 0.02.into(),
             depth: Number::uniform(0.10, 0.45),
             radius_um: Number::uniform(0.35, 0.8),
         }

@@ -176,8 +176,8 @@ fn draw_fold(recipe: &Recipe, rng: &mut Stream) -> Option<Fold> {
     };
     /// A rolled rim takes in less of the cell than a flap.
     const ROLLED: f64 = 0.45;
-    /// Each side of a cigar is folded in from about two thirds of the radius.
-    const CIGAR: f64 = 0.62;
+    /// Each side of a cigar is folded in from about half of the radius.
+    const CIGAR: f64 = 0.5;
     let depth = match form {
         FoldForm::Flap => depth,
         FoldForm::Roll => depth * ROLLED,

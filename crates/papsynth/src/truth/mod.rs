@@ -10,6 +10,9 @@ use crate::scene::Kind;
 pub use labels::{LabelMap, front_masks, layers};
 pub use mask::{Bounds, Mask, Run};
 
+/// Coverage from which on a pixel belongs to a mask.
+pub const COVERED: f32 = 0.5;
+
 /// Which part of an object a mask belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -1,0 +1,28 @@
+//! Writes a small data set and its contact sheet, which is the picture in the README.
+//!
+//! `cargo run --release --example dataset [FOLDER]`; without a folder it goes to `target/dataset-example`.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+
+use papsynth::model::Model;
+use papsynth::recipe::Preset;
+use papsynth::{Engine, Inputs, Threads};
+use papsynth_dataset::{Dataset, DatasetInfo, Error, Run};
+
+fn main() -> Result<(), Error> {
+    let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("target/dataset-example"), PathBuf::from);
+    let mut recipe = Preset::Lbc.recipe();
+    recipe.field.width_px = 688.0.into();
+    recipe.field.height_px = 519.0.into();
+    for mix in recipe.cells.values_mut() {
+        mix.count = 6.0.into();
+    }
+    let model = Model::builtin();
+    let engine = Engine::new(&recipe, &model, &Inputs::default())?;
+    let dataset = Dataset::create_or_resume(&folder, &DatasetInfo { recipe: &recipe, model: &model, seed: 1 })?;
+    let stop = AtomicBool::new(false);
+    dataset.generate(&engine, &Run { frames: 0..2, at_once: 2, threads: Threads::One, stop: &stop }, &|_| ())?;
+    dataset.finish()?;
+    Ok(())
+}

@@ -1,0 +1,204 @@
+"""Checks a data set with readers that are not ours.
+
+Usage: python external.py DIR
+
+Needs numpy, pillow, tifffile, pycocotools; ome-types is used where it is installed. Prints a line for each check and
+ends with status 1 at the first that fails.
+"""
+
+import csv
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import tifffile
+from PIL import Image
+from pycocotools import mask as rle
+from pycocotools.coco import COCO
+
+try:
+    import ome_types
+except ImportError:
+    ome_types = None
+
+GROUPS = {"cytoplasm": "cytoplasm", "nucleus": "nucleus", "whole": "debris"}
+
+
+def check(condition, message):
+    """Ends the program unless the condition holds."""
+    if not condition:
+        print(f"FAILED: {message}")
+        sys.exit(1)
+
+
+def passed(message):
+    print(f"ok: {message}")
+
+
+def equal(what, found, expected):
+    check(found == expected, f"{what}: found {found}, expected {expected}")
+
+
+def read_json(path):
+    return json.loads(path.read_text())
+
+
+def check_manifest(folder):
+    """Every file is listed, and is as listed."""
+    manifest = read_json(folder / "manifest.json")
+    equal("manifest format", manifest["format"], "papsynth-dataset")
+    listed = {entry["path"]: entry for entry in manifest["files"]}
+    equal("number of listed files", len(listed), len(manifest["files"]))
+    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} - {"manifest.json"}
+    equal("files that are not listed", sorted(found - listed.keys()), [])
+    equal("listed files that are missing", sorted(listed.keys() - found), [])
+    for name, entry in listed.items():
+        content = (folder / name).read_bytes()
+        equal(f"size of {name}", len(content), entry["bytes"])
+        equal(f"SHA-256 of {name}", hashlib.sha256(content).hexdigest(), entry["sha256"])
+    for name in ["recipe", "model"]:
+        path = {"recipe": "recipe.toml", "model": "model.json"}[name]
+        equal(f"identity of {path}", manifest["identity"][f"{name}_sha256"], listed[path]["sha256"])
+    passed(f"manifest: {len(listed)} files of the right size and SHA-256, none beside them")
+    return manifest
+
+
+def check_stack(path, frame):
+    """OME-TIFF: axes, sizes, pixel size, step, type."""
+    planes, height, width = len(frame["planes_um"]), frame["height"], frame["width"]
+    with tifffile.TiffFile(path) as file:
+        check(file.is_ome, f"{path} is no OME-TIFF for tifffile")
+        equal(f"pages of {path}", len(file.pages), planes)
+        series = file.series[0]
+        equal(f"axes of {path}", series.axes, "ZYX")
+        equal(f"shape of {path}", series.shape, (planes, height, width))
+        stack = series.asarray()
+        description = file.ome_metadata
+    equal(f"type of {path}", stack.dtype, np.dtype("u1" if frame["bits"] <= 8 else "u2"))
+    pixels = tifffile.xml2dict(description)["OME"]["Image"]["Pixels"]
+    step = abs(frame["planes_um"][1] - frame["planes_um"][0])
+    for key, value in [("PhysicalSizeX", frame["pixel_um"]), ("PhysicalSizeY", frame["pixel_um"]), ("PhysicalSizeZ", step)]:
+        check(abs(float(pixels[key]) - value) < 1e-9, f"{key} of {path}: found {pixels[key]}, expected {value}")
+        equal(f"{key}Unit of {path}", pixels[f"{key}Unit"], "µm")
+    if ome_types is not None:
+        typed = ome_types.from_xml(description).images[0].pixels
+        equal(f"SizeZ of {path} by ome-types", typed.size_z, planes)
+        found = [plane.position_z for plane in typed.planes]
+        check(np.allclose(found, frame["planes_um"]), f"positions of {path}: {found}")
+    return stack
+
+
+def check_images(folder, frame):
+    """All pictures of a frame open and have its shape; returns its label images."""
+    name, shape = f"{frame['index']:06}", (frame["height"], frame["width"])
+    white = 2 ** frame["bits"] - 1
+    planes = len(frame["planes_um"])
+    grey = "u1" if frame["bits"] <= 8 else "u2"
+    flat = folder / ("images" if planes == 1 else "all-in-focus") / f"{name}.png"
+    with Image.open(flat) as image:
+        image.load()
+        picture = np.array(image)
+    equal(f"shape of {flat}", picture.shape, shape)
+    equal(f"type of {flat}", picture.dtype, np.dtype(grey))
+    check(picture.max() <= white, f"{flat} exceeds {frame['bits']} bits")
+    if planes > 1:
+        stack = check_stack(folder / "images" / f"{name}.ome.tif", frame)
+    else:
+        stack = picture[None]
+    floats = tifffile.imread(folder / "noise-free" / f"{name}.tif").reshape(planes, *shape)
+    equal(f"type of noise-free/{name}.tif", floats.dtype, np.dtype("f4"))
+    check(np.isfinite(floats).all(), f"noise-free/{name}.tif is not finite")
+    # Noise has no mean: over a whole plane it all but vanishes, unless pixels are saturated.
+    clipped = np.clip(floats, 0, white)
+    off = np.abs(stack.astype(float).mean(axis=(1, 2)) - clipped.mean(axis=(1, 2)))
+    check((off < 0.02 * white + 0.5).all(), f"{name}: planes are {off} grey levels from their noise-free twins")
+    labels = {}
+    for kind in ["cytoplasm", "nucleus", "debris", "layers"]:
+        path = folder / "labels" / kind / f"{name}.tif"
+        labels[kind] = tifffile.imread(path)
+        equal(f"shape of {path}", labels[kind].shape, shape)
+        wide = "u4" if labels[kind].max(initial=0) > 65535 else "u2"
+        equal(f"type of {path}", labels[kind].dtype, np.dtype(wide))
+    return labels
+
+
+def check_objects(coco, rows, frame, labels):
+    """Masks, table and label images say the same."""
+    index = frame["index"]
+    annotations = coco.loadAnns(coco.getAnnIds(imgIds=[index]))
+    equal(f"objects of frame {index} in coco.json and objects.csv", len(annotations), len(rows))
+    layers = np.zeros(labels["layers"].shape, int)
+    drawn = {kind: np.zeros(labels[kind].shape, np.int64) for kind in GROUPS.values()}
+    counts = {}
+    for annotation, row in zip(annotations, rows):
+        name = f"object {row['id']} ({row['part']}) of frame {index}"
+        equal(f"id of {name}", annotation["cell_id"], int(row["id"]))
+        equal(f"part of {name}", annotation["part"], row["part"])
+        category = coco.cats[annotation["category_id"]]
+        counts[category["name"]] = counts.get(category["name"], 0) + 1
+        equal(f"group of {name}", category["supercategory"], GROUPS[row["part"]])
+        whole, front = coco.annToMask(annotation), rle.decode(annotation["front"])
+        for what, found in [
+            ("pycocotools' area", int(rle.area(annotation["segmentation"]))),
+            ("sum of the mask", int(whole.sum())),
+            ("area_px", int(row["area_px"])),
+        ]:
+            equal(f"{what} of {name}", found, annotation["area"])
+        equal(f"front_area_px of {name}", int(row["front_area_px"]), int(front.sum()))
+        check(not (front & ~whole).any(), f"front of {name} leaves its mask")
+        box = [int(row[f"bbox_{side}_px"] or 0) for side in ["x", "y", "width", "height"]]
+        equal(f"bbox of {name}", annotation["bbox"], box)
+        equal(f"pycocotools' bbox of {name}", [int(v) for v in rle.toBbox(annotation["segmentation"])], box)
+        y, x = np.nonzero(whole)
+        centroid = [float(row["centroid_x_px"]), float(row["centroid_y_px"])]
+        check(np.allclose(centroid, [x.mean(), y.mean()], atol=1e-6), f"centroid of {name}: {centroid}")
+        for column in ["defocus_um", "detectability"]:
+            equal(f"values of {column} of {name}", len(row[column].split(";")), len(frame["planes_um"]))
+        values = [float(v) for v in row["detectability"].split(";")]
+        equal(f"best_plane of {name}", int(row["best_plane"]), int(np.argmax(values)))
+        group = GROUPS[row["part"]]
+        check(not drawn[group][front > 0].any(), f"front of {name} overlaps another of its group")
+        drawn[group][front > 0] = annotation["cell_id"]
+        if row["part"] == "cytoplasm":
+            layers += whole
+    for kind, picture in drawn.items():
+        check(np.array_equal(picture, labels[kind]), f"fronts of frame {index} are not labels/{kind}")
+    check(np.array_equal(layers, labels["layers"]), f"masks of frame {index} are not labels/layers")
+    equal(f"counts of frame {index}", counts, frame["objects"])
+
+
+def main(folder):
+    manifest = check_manifest(folder)
+    coco = COCO(folder / "coco.json")
+    check(all(i > 0 for i in coco.anns), "annotation ids begin at 1")
+    passed(f"coco.json: pycocotools reads {len(coco.imgs)} images and {len(coco.anns)} annotations")
+    with open(folder / "objects.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    equal("rows of objects.csv", len(rows), len(coco.anns))
+    records = sorted(p for p in (folder / "frames").glob("*.json") if not p.name.endswith(".coco.json"))
+    equal("number of frames", len(records), manifest["frames"])
+    equal("number of images", len(coco.imgs), manifest["frames"])
+    for path in records:
+        record = read_json(path)
+        equal(f"identity in {path}", record["identity"], manifest["identity"])
+        frame = record["summary"]
+        image = coco.imgs[frame["index"]]
+        check((folder / image["file_name"]).exists(), f"{image['file_name']} is missing")
+        equal(f"size of frame {frame['index']}", [image["width"], image["height"]], [frame["width"], frame["height"]])
+        labels = check_images(folder, frame)
+        own = [row for row in rows if int(row["image"]) == frame["index"]]
+        check_objects(coco, own, frame, labels)
+        kind = "image" if len(frame["planes_um"]) == 1 else f"stack of {len(frame['planes_um'])} planes"
+        passed(f"frame {frame['index']}: {kind}, labels, and {len(own)} masks agree")
+    with Image.open(folder / "contact-sheet.png") as sheet:
+        sheet.load()
+        equal("mode of the contact sheet", sheet.mode, "RGB")
+    passed("contact-sheet.png opens")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(Path(sys.argv[1]))
