@@ -28,11 +28,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let save = arguments.option("--save")?;
     let against = arguments.option("--against")?;
     // Named one by one, since the test harness of a library does not know criterion's arguments.
-    let benches = workspace
-        .packages
-        .iter()
-        .flat_map(|package| &package.targets)
-        .filter(|(kind, _)| kind == "bench");
+    let benches = workspace.packages.iter().flat_map(|package| &package.targets).filter(|(kind, _)| kind == "bench");
     let mut command = workspace.cargo();
     command.args(["bench", "--workspace"]);
     for (_, name) in benches {
@@ -44,10 +40,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     }
     if let Some(name) = against {
         let saved = has_baseline(&workspace.target.join("criterion"), &name);
-        ensure!(
-            saved,
-            "nothing was saved under the name `{name}` yet: cargo xtask bench --save {name}"
-        );
+        ensure!(saved, "nothing was saved under the name `{name}` yet: cargo xtask bench --save {name}");
         // Lenient: a bench that is newer than the baseline is measured, and compared with nothing.
         command.args(["--baseline-lenient", &name]);
     }
@@ -57,13 +50,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
 
 /// Whether any bench has figures of that name below a folder.
 fn has_baseline(folder: &Path, name: &str) -> bool {
-    let folders = fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.is_dir());
-    folders
-        .into_iter()
-        .any(|path| path.file_name().is_some_and(|last| last == name) || has_baseline(&path, name))
+    let folders =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).filter(|path| path.is_dir());
+    folders.into_iter().any(|path| path.file_name().is_some_and(|last| last == name) || has_baseline(&path, name))
 }

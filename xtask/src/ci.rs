@@ -23,32 +23,17 @@ type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
 /// Cheap ones first. The golden images are part of the tests.
 const STEPS: [Step; 12] = [
-    ("format", |workspace| {
-        cargo(workspace, &["fmt", "--all", "--check"])
-    }),
+    ("format", |workspace| cargo(workspace, &["fmt", "--all", "--check"])),
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
     ("real material", |_| real_material()),
     ("lints", |workspace| {
-        cargo(
-            workspace,
-            &[
-                "clippy",
-                "--workspace",
-                "--all-targets",
-                "--all-features",
-                "--",
-                "-D",
-                "warnings",
-            ],
-        )
+        cargo(workspace, &["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"])
     }),
     ("documentation", documentation),
     ("tests", |workspace| chore(workspace, &test::CHORE)),
     ("data set", |workspace| chore(workspace, &dataset::CHORE)),
-    ("external readers", |workspace| {
-        chore(workspace, &external::CHORE)
-    }),
+    ("external readers", |workspace| chore(workspace, &external::CHORE)),
     ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
     ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("licences", licences),
@@ -72,10 +57,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
             }
         };
         println!("{words}");
-        table.push_str(&format!(
-            "{name:<18} {:>6.0} s  {words}\n",
-            time.as_secs_f64()
-        ));
+        table.push_str(&format!("{name:<18} {:>6.0} s  {words}\n", time.as_secs_f64()));
     }
     println!("\n{table}{:<18} {:>6.0} s", "together", total.as_secs_f64());
     if !failed.is_empty() {
@@ -84,10 +66,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the time goes to whoever waits, and into no image"
-)]
+#[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no image")]
 fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let start = Instant::now();
     (work(), start.elapsed())
@@ -116,18 +95,16 @@ fn real_material() -> Result<Outcome> {
         None if in_ci() => {
             bail!("PAPSYNTH_REFERENCE does not name the folder of the real material, and CI is set")
         }
-        None => Ok(Outcome::Skipped(
-            "PAPSYNTH_REFERENCE is not set, so the tests on real cells are left out".to_owned(),
-        )),
+        None => {
+            Ok(Outcome::Skipped("PAPSYNTH_REFERENCE is not set, so the tests on real cells are left out".to_owned()))
+        }
     }
 }
 
 fn documentation(workspace: &Workspace) -> Result<Outcome> {
     let mut command = workspace.cargo();
     // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    command
-        .args(["doc", "--workspace", "--lib", "--no-deps", "--all-features"])
-        .env("RUSTDOCFLAGS", "-D warnings");
+    command.args(["doc", "--workspace", "--lib", "--no-deps", "--all-features"]).env("RUSTDOCFLAGS", "-D warnings");
     shell::run(&mut command)?;
     Ok(Outcome::Done)
 }

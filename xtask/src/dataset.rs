@@ -25,18 +25,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let folder = workspace.target.join("dataset");
     let (fields, stack) = (folder.join("fields"), folder.join("stack"));
     generate(workspace, &fields, ["--frames", "8"])?;
-    generate(
-        workspace,
-        &stack,
-        [
-            "--frames",
-            "1",
-            "--set",
-            "focus.planes=11",
-            "--set",
-            "focus.step_um=0.8",
-        ],
-    )?;
+    generate(workspace, &stack, ["--frames", "1", "--set", "focus.planes=11", "--set", "focus.step_um=0.8"])?;
     println!("\nEight labelled fields and a focus stack:");
     for folder in [fields, stack] {
         look_at(workspace, &folder)?;
@@ -55,16 +44,7 @@ pub(crate) fn generate<I: AsRef<OsStr>>(
     }
     let mut command = workspace.cargo();
     command
-        .args([
-            "run",
-            "--quiet",
-            "--release",
-            "--package",
-            "papsynth-cli",
-            "--",
-            "generate",
-            "--out",
-        ])
+        .args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--", "generate", "--out"])
         .arg(out)
         .args(arguments);
     shell::run(&mut command)
@@ -73,11 +53,8 @@ pub(crate) fn generate<I: AsRef<OsStr>>(
 /// Prints what lies in a folder, a line for each folder in it and each file.
 fn look_at(workspace: &Workspace, folder: &Path) -> Result<()> {
     println!("  {}", workspace.shown(folder));
-    let entries =
-        fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-    let mut paths = entries
-        .map(|entry| Ok(entry?.path()))
-        .collect::<Result<Vec<_>>>()?;
+    let entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
     paths.sort();
     for path in paths {
         let name = path.file_name().unwrap_or_default().display().to_string();

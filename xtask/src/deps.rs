@@ -45,10 +45,7 @@ const PLACES: [(&str, Role); 12] = [
 
 impl Role {
     fn of(name: &str) -> Option<Self> {
-        PLACES
-            .iter()
-            .find(|(crate_name, _)| *crate_name == name)
-            .map(|(_, role)| *role)
+        PLACES.iter().find(|(crate_name, _)| *crate_name == name).map(|(_, role)| *role)
     }
 
     /// Whom a crate in this place may depend on.
@@ -64,10 +61,7 @@ impl Role {
 
 /// The crates that know techniques alone, for chores that build them without the rest.
 pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
-    let names = workspace
-        .packages
-        .iter()
-        .map(|package| package.name.as_str());
+    let names = workspace.packages.iter().map(|package| package.name.as_str());
     names.filter(|name| matches!(Role::of(name), Some(Role::Technique | Role::Engine)))
 }
 
@@ -86,18 +80,12 @@ fn faults(packages: &[Package]) -> Vec<String> {
     let mut faults = Vec::new();
     for package in packages {
         let Some(role) = Role::of(&package.name) else {
-            faults.push(format!(
-                "crate `{}` has no place in the house yet: xtask/src/deps.rs",
-                package.name
-            ));
+            faults.push(format!("crate `{}` has no place in the house yet: xtask/src/deps.rs", package.name));
             continue;
         };
         for member in &package.members {
             if !Role::of(member).is_some_and(|known| role.may_know().contains(&known)) {
-                faults.push(format!(
-                    "`{}` ({role:?}) must not depend on `{member}`",
-                    package.name
-                ));
+                faults.push(format!("`{}` ({role:?}) must not depend on `{member}`", package.name));
             }
         }
     }
@@ -109,11 +97,7 @@ fn picture(packages: &[Package]) -> String {
     let mut lines = String::new();
     for (name, _) in PLACES {
         if let Some(package) = packages.iter().find(|package| package.name == name) {
-            let known = if package.members.is_empty() {
-                "-".to_owned()
-            } else {
-                package.members.join(", ")
-            };
+            let known = if package.members.is_empty() { "-".to_owned() } else { package.members.join(", ") };
             lines.push_str(&format!("{name:<22} knows {known}\n"));
         }
     }
@@ -126,12 +110,7 @@ mod tests {
 
     fn package(name: &str, members: &[&str]) -> Package {
         let members = members.iter().map(|&member| member.to_owned()).collect();
-        Package {
-            name: name.to_owned(),
-            folder: "/".into(),
-            members,
-            targets: Vec::new(),
-        }
+        Package { name: name.to_owned(), folder: "/".into(), members, targets: Vec::new() }
     }
 
     #[test]

@@ -54,27 +54,13 @@ struct Row {
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     let mut table: BTreeMap<u32, BTreeMap<(String, usize, String), Row>> = BTreeMap::new();
-    for package in workspace
-        .packages
-        .iter()
-        .filter(|package| package.folder.starts_with(workspace.root.join("crates")))
+    for package in workspace.packages.iter().filter(|package| package.folder.starts_with(workspace.root.join("crates")))
     {
         for path in sources(&package.folder.join("src"))? {
-            let text = fs::read_to_string(&path)
-                .with_context(|| format!("cannot read {}", path.display()))?;
+            let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
             let file = workspace.shown(&path).to_string();
-            for Citation {
-                equation,
-                item,
-                line,
-                place,
-            } in citations(&text)
-            {
-                let row = table
-                    .entry(equation)
-                    .or_default()
-                    .entry((file.clone(), line, item))
-                    .or_default();
+            for Citation { equation, item, line, place } in citations(&text) {
+                let row = table.entry(equation).or_default().entry((file.clone(), line, item)).or_default();
                 match place {
                     Place::Documentation => row.documented = true,
                     Place::Heading => {}
@@ -93,20 +79,11 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     }
     let without = |wanted: fn(&Row) -> bool| -> Vec<String> {
         let found = |n: &u32| table.get(n).is_some_and(|rows| rows.values().any(wanted));
-        EQUATIONS
-            .filter(|n| !found(n))
-            .map(|n| n.to_string())
-            .collect()
+        EQUATIONS.filter(|n| !found(n)).map(|n| n.to_string()).collect()
     };
-    let (nowhere, not_computed) = (
-        without(|row| row.documented),
-        without(|row| !row.inside.is_empty()),
-    );
+    let (nowhere, not_computed) = (without(|row| row.documented), without(|row| !row.inside.is_empty()));
     if !not_computed.is_empty() {
-        println!(
-            "No line says that it computes Eq. {}.",
-            not_computed.join(", ")
-        );
+        println!("No line says that it computes Eq. {}.", not_computed.join(", "));
     }
     if !nowhere.is_empty() {
         bail!("no item cites Eq. {}", nowhere.join(", "));
@@ -117,9 +94,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
 /// All source files below a folder, in order, without those of tests.
 fn sources(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
-    for entry in
-        fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?
-    {
+    for entry in fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {
         let path = entry?.path();
         if path.file_stem().is_some_and(|stem| stem == "tests") {
             continue;
@@ -210,45 +185,20 @@ impl Scope {
     fn enter(&mut self, code: &str, indent: usize, line: usize, documented: bool) -> Option<Item> {
         let mut words = code;
         loop {
-            let rest = [
-                "pub(crate) ",
-                "pub(super) ",
-                "pub ",
-                "const fn",
-                "unsafe ",
-                "async ",
-            ]
-            .into_iter()
-            .find_map(|word| {
-                let rest = words.strip_prefix(word)?;
-                Some(if word == "const fn" {
-                    words.strip_prefix("const ")?
-                } else {
-                    rest
-                })
-            });
+            let rest =
+                ["pub(crate) ", "pub(super) ", "pub ", "const fn", "unsafe ", "async "].into_iter().find_map(|word| {
+                    let rest = words.strip_prefix(word)?;
+                    Some(if word == "const fn" { words.strip_prefix("const ")? } else { rest })
+                });
             match rest {
                 Some(rest) => words = rest,
                 None => break,
             }
         }
-        let keyword = [
-            "fn",
-            "struct",
-            "enum",
-            "trait",
-            "impl",
-            "type",
-            "const",
-            "static",
-            "mod",
-            "macro_rules!",
-        ];
-        let keyword = keyword.into_iter().find(|&keyword| {
-            words
-                .strip_prefix(keyword)
-                .is_some_and(|rest| rest.starts_with([' ', '<']))
-        });
+        let keyword = ["fn", "struct", "enum", "trait", "impl", "type", "const", "static", "mod", "macro_rules!"];
+        let keyword = keyword
+            .into_iter()
+            .find(|&keyword| words.strip_prefix(keyword).is_some_and(|rest| rest.starts_with([' ', '<'])));
         let name = match keyword {
             Some("impl") => owner_of_impl(words),
             Some(keyword) => identifier(words[keyword.len()..].trim_start()),
@@ -276,9 +226,7 @@ impl Scope {
 }
 
 fn identifier(text: &str) -> String {
-    text.chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '_')
-        .collect()
+    text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
 }
 
 /// The type of `impl<…> Trait for Type<…>`.
@@ -346,9 +294,7 @@ fn next(text: &str) -> Option<(bool, u32, &str)> {
 
 fn number(text: &str) -> Option<(u32, &str)> {
     let text = text.trim_start();
-    let end = text
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(text.len());
+    let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     // Three digits are no equation of this paper; a range of them would only make a long list.
     let value = text[..end].parse().ok().filter(|value| *value < 100)?;
     Some((value, &text[end..]))
@@ -372,10 +318,7 @@ mod tests {
     #[test]
     fn equations_of_other_sources_do_not_count() {
         assert!(numbers("(Macklin 2016, doi:10.1145/2994258.2994272, Eq. 5)").is_empty());
-        assert_eq!(
-            numbers("as they do (doi:10.1145/2994258.2994272). Eq. 5 of the paper"),
-            [5]
-        );
+        assert_eq!(numbers("as they do (doi:10.1145/2994258.2994272). Eq. 5 of the paper"), [5]);
     }
 
     #[test]
@@ -383,10 +326,7 @@ mod tests {
         let text = "//! Eq. 1.\n\n/// Eq. 2.\n#[derive(\n    Debug\n)]\npub struct A {\n    /// c of Eq. 9.\n    pub c: f32,\n}\n\n\
                     impl<R: Rng> Trait<R> for A {\n    /// Eqs. 3, 4.\n    pub(crate) const fn go(&self) {\n        // Eq. 4: x = y\n        x(); // Eq. 3\n    }\n}\n\n\
                     /// One of them.\npub enum B {\n    /// Eq. 5.\n    Uniform {},\n}\n\n#[cfg(test)]\nmod tests {\n    // Eq. 6\n}\n";
-        let found: Vec<_> = citations(text)
-            .into_iter()
-            .map(|c| (c.equation, c.item, c.line, c.place))
-            .collect();
+        let found: Vec<_> = citations(text).into_iter().map(|c| (c.equation, c.item, c.line, c.place)).collect();
         let item = |equation, item: &str, line, place| (equation, item.to_owned(), line, place);
         let expected = [
             item(2, "struct A", 7, Place::Documentation),

@@ -28,28 +28,12 @@ struct Figure {
 }
 
 const fn engine(number: u32, shows: &'static str, arguments: &'static [&'static str]) -> Figure {
-    Figure {
-        number,
-        shows,
-        package: "papsynth",
-        example: "figures",
-        arguments,
-    }
+    Figure { number, shows, package: "papsynth", example: "figures", arguments }
 }
 
 const FIGURES: [Figure; 11] = [
-    engine(
-        1,
-        "bacilli, leukocytes, speckles, objects out of focus",
-        &["1"],
-    ),
-    Figure {
-        number: 3,
-        shows: "drawn outlines",
-        package: "fsd-shape",
-        example: "compare",
-        arguments: &[],
-    },
+    engine(1, "bacilli, leukocytes, speckles, objects out of focus", &["1"]),
+    Figure { number: 3, shows: "drawn outlines", package: "fsd-shape", example: "compare", arguments: &[] },
     Figure {
         number: 4,
         shows: "patches and their overlaps",
@@ -68,70 +52,36 @@ const FIGURES: [Figure; 11] = [
     engine(7, "levels of detail of a cytoplasm", &["7"]),
     engine(8, "weight maps and what they scatter", &["8"]),
     engine(9, "a cluster of leukocytes, step by step", &["9"]),
-    Figure {
-        number: 10,
-        shows: "blur with depth",
-        package: "optics-psf",
-        example: "depth",
-        arguments: &[],
-    },
+    Figure { number: 10, shows: "blur with depth", package: "optics-psf", example: "depth", arguments: &[] },
     engine(12, "a whole field", &["12"]),
     engine(13, "high-grade cells", &["13"]),
 ];
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let wanted = arguments.rest().into_iter().map(|word| {
-        let number = word
-            .parse()
-            .ok()
-            .filter(|number| FIGURES.iter().any(|figure| figure.number == *number));
-        number.with_context(|| {
-            format!("`{word}` is no figure that is redrawn; expected 1, 3 to 10, 12 or 13")
-        })
+        let number = word.parse().ok().filter(|number| FIGURES.iter().any(|figure| figure.number == *number));
+        number.with_context(|| format!("`{word}` is no figure that is redrawn; expected 1, 3 to 10, 12 or 13"))
     });
     let wanted: Vec<u32> = wanted.collect::<Result<_>>()?;
     let folder = workspace.target.join("figures");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut table = String::new();
-    for figure in FIGURES
-        .iter()
-        .filter(|figure| wanted.is_empty() || wanted.contains(&figure.number))
-    {
-        let Figure {
-            number,
-            shows,
-            package,
-            example,
-            arguments,
-        } = figure;
+    for figure in FIGURES.iter().filter(|figure| wanted.is_empty() || wanted.contains(&figure.number)) {
+        let Figure { number, shows, package, example, arguments } = figure;
         workspace.expect_target(package, "example", example)?;
         let path = folder.join(format!("fig-{number:02}.png"));
         let mut command = workspace.cargo();
         command
-            .args([
-                "run",
-                "--quiet",
-                "--release",
-                "--package",
-                package,
-                "--example",
-                example,
-                "--",
-            ])
+            .args(["run", "--quiet", "--release", "--package", package, "--example", example, "--"])
             .args(*arguments)
             .arg(&path);
         shell::run(&mut command)?;
-        ensure!(
-            path.exists(),
-            "example `{example}` of `{package}` did not write {}",
-            path.display()
-        );
-        let own = arguments
-            .iter()
-            .map(|word| format!("{word} "))
-            .collect::<String>();
+        ensure!(path.exists(), "example `{example}` of `{package}` did not write {}", path.display());
+        let own = arguments.iter().map(|word| format!("{word} ")).collect::<String>();
         let place = workspace.shown(&path);
-        table.push_str(&format!("Fig. {number:<3} {shows:<52} cargo run --release -p {package} --example {example} -- {own}{place}\n"));
+        table.push_str(&format!(
+            "Fig. {number:<3} {shows:<52} cargo run --release -p {package} --example {example} -- {own}{place}\n"
+        ));
     }
     print!("{table}");
     Ok(Outcome::Done)

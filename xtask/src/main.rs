@@ -2,10 +2,7 @@
 //!
 //! Cargo and rustc do all the work; each chore is one file. Nothing here knows what a cell is.
 
-#![expect(
-    clippy::print_stdout,
-    reason = "a program that talks to whoever called it"
-)]
+#![expect(clippy::print_stdout, reason = "a program that talks to whoever called it")]
 
 mod arguments;
 mod bench;
@@ -85,28 +82,12 @@ fn chore() -> Result<Outcome> {
     };
     let Some(chore) = CHORES.iter().find(|chore| chore.name == name) else {
         let names: Vec<&str> = CHORES.iter().map(|chore| chore.name).collect();
-        bail!(
-            "there is no chore `{name}`; expected one of {}",
-            names.join(", ")
-        );
+        bail!("there is no chore `{name}`; expected one of {}", names.join(", "));
     };
     let words: Vec<String> = words.collect();
-    if words
-        .iter()
-        .take_while(|word| *word != "--")
-        .any(|word| is_help(word))
-    {
-        let Chore {
-            name,
-            usage,
-            about,
-            details,
-            ..
-        } = chore;
-        println!(
-            "{about}\n\nUsage: cargo xtask {}",
-            [*name, *usage].join(" ").trim_end()
-        );
+    if words.iter().take_while(|word| *word != "--").any(|word| is_help(word)) {
+        let Chore { name, usage, about, details, .. } = chore;
+        println!("{about}\n\nUsage: cargo xtask {}", [*name, *usage].join(" ").trim_end());
         if !details.is_empty() {
             println!("\n{}", wrapped(details));
         }
@@ -122,10 +103,7 @@ fn wrapped(text: &str) -> String {
     for paragraph in text.lines() {
         lines.push(String::new());
         for word in paragraph.split_whitespace() {
-            if lines
-                .last()
-                .is_some_and(|line| line.len() + word.len() > COLUMNS)
-            {
+            if lines.last().is_some_and(|line| line.len() + word.len() > COLUMNS) {
                 lines.push(String::new());
             }
             if let Some(line) = lines.last_mut() {
@@ -134,11 +112,7 @@ fn wrapped(text: &str) -> String {
             }
         }
     }
-    lines
-        .iter()
-        .map(|line| line.trim_end())
-        .collect::<Vec<_>>()
-        .join("\n")
+    lines.iter().map(|line| line.trim_end()).collect::<Vec<_>>().join("\n")
 }
 
 fn is_help(word: &str) -> bool {

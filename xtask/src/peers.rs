@@ -22,30 +22,10 @@ struct Race {
 }
 
 const RACES: [Race; 4] = [
-    Race {
-        work: "frame",
-        accelerator: "numba",
-        repetitions: 7,
-        wanted: 8.0,
-    },
-    Race {
-        work: "frame",
-        accelerator: "numpy",
-        repetitions: 5,
-        wanted: 15.0,
-    },
-    Race {
-        work: "stack",
-        accelerator: "numba",
-        repetitions: 3,
-        wanted: 8.0,
-    },
-    Race {
-        work: "stack",
-        accelerator: "numpy",
-        repetitions: 3,
-        wanted: 8.0,
-    },
+    Race { work: "frame", accelerator: "numba", repetitions: 7, wanted: 8.0 },
+    Race { work: "frame", accelerator: "numpy", repetitions: 5, wanted: 15.0 },
+    Race { work: "stack", accelerator: "numba", repetitions: 3, wanted: 8.0 },
+    Race { work: "stack", accelerator: "numpy", repetitions: 3, wanted: 8.0 },
 ];
 
 /// Frames a thread makes for a measurement of throughput, and how often both ways are measured in turn.
@@ -55,16 +35,12 @@ const TURNS: usize = 3;
 /// Runs the race and prints the ratios. Nothing is asserted: a machine has good days and bad ones.
 pub(crate) fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let repetitions = arguments.option("--repetitions")?;
-    let repetitions: Option<usize> = repetitions
-        .map(|n| {
-            n.parse()
-                .with_context(|| format!("`{n}` is no number of repetitions"))
-        })
-        .transpose()?;
+    let repetitions: Option<usize> =
+        repetitions.map(|n| n.parse().with_context(|| format!("`{n}` is no number of repetitions"))).transpose()?;
     arguments.finish()?;
     let folder = workspace.root.join("benches/peers");
-    let requirements = fs::read_to_string(folder.join("requirements.txt"))
-        .context("cannot read benches/peers/requirements.txt")?;
+    let requirements =
+        fs::read_to_string(folder.join("requirements.txt")).context("cannot read benches/peers/requirements.txt")?;
     let ours = Ours::build(workspace)?;
     let python = match Python::environment(workspace, "peers", &requirements)? {
         Python::Ready(python) => python,
@@ -73,24 +49,13 @@ pub(crate) fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Out
             return Outcome::skipped_unless_ci(format!("no race against the peer: {reason}"));
         }
     };
-    let peer = Peer {
-        python,
-        script: folder.join("bench_frame.py"),
-        scratch: workspace.target.join("peers"),
-    };
-    fs::create_dir_all(&peer.scratch)
-        .with_context(|| format!("cannot make {}", peer.scratch.display()))?;
+    let peer = Peer { python, script: folder.join("bench_frame.py"), scratch: workspace.target.join("peers") };
+    fs::create_dir_all(&peer.scratch).with_context(|| format!("cannot make {}", peer.scratch.display()))?;
     let mut table = String::from(
         "\nProcess CPU time on one thread (medians) and peak memory, both sides in this run, truth included:\n\n",
     );
     table.push_str("work   peer    peer CPU s  our CPU s  ratio  wanted  peer MB  our MB\n");
-    for Race {
-        work,
-        accelerator,
-        repetitions: usual,
-        wanted,
-    } in RACES
-    {
+    for Race { work, accelerator, repetitions: usual, wanted } in RACES {
         let count = repetitions.unwrap_or(usual);
         let peer = peer.measure(accelerator, work, count)?;
         let ours = ours.measure(work, count)?;
@@ -100,10 +65,7 @@ pub(crate) fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Out
             peer.cpu_s, ours.cpu_s, peer.peak_mb, ours.peak_mb
         ));
     }
-    let (few, many) = (
-        ours.measure("frame", 2)?.peak_mb,
-        ours.measure("frame", 40)?.peak_mb,
-    );
+    let (few, many) = (ours.measure("frame", 2)?.peak_mb, ours.measure("frame", 40)?.peak_mb);
     print!("{table}\nOur peak memory after 2 frames {few:.0} MB, after 40 {many:.0} MB.\n");
     ours.print_throughput()?;
     Ok(Outcome::Done)
@@ -117,18 +79,12 @@ struct Measured {
 
 impl Measured {
     fn read(value: &Value) -> Result<Self> {
-        Ok(Self {
-            cpu_s: float(value, "cpu_med")?,
-            peak_mb: float(value, "peak_mb")?,
-        })
+        Ok(Self { cpu_s: float(value, "cpu_med")?, peak_mb: float(value, "peak_mb")? })
     }
 }
 
 fn float(value: &Value, name: &str) -> Result<f64> {
-    value
-        .get(name)
-        .and_then(Value::as_f64)
-        .with_context(|| format!("`{name}` is missing from {value}"))
+    value.get(name).and_then(Value::as_f64).with_context(|| format!("`{name}` is missing from {value}"))
 }
 
 /// benches/peers/papsim.py.
@@ -141,20 +97,14 @@ struct Peer {
 impl Peer {
     fn measure(&self, accelerator: &str, work: &str, repetitions: usize) -> Result<Measured> {
         let mut command = Command::new(&self.python);
-        command
-            .arg(&self.script)
-            .args([accelerator, work, "1", &repetitions.to_string()])
-            .current_dir(&self.scratch);
+        command.arg(&self.script).args([accelerator, work, "1", &repetitions.to_string()]).current_dir(&self.scratch);
         // What Python compiles goes below the target folder, not beside the sources.
         command
             .env("PYTHONPYCACHEPREFIX", self.scratch.join("bytecode"))
             .env("NUMBA_CACHE_DIR", self.scratch.join("numba"));
         shell::run(&mut command)?;
-        let report = self
-            .scratch
-            .join(format!("peer_out/{work}_{accelerator}_t1.json"));
-        let report = fs::read_to_string(&report)
-            .with_context(|| format!("cannot read {}", report.display()))?;
+        let report = self.scratch.join(format!("peer_out/{work}_{accelerator}_t1.json"));
+        let report = fs::read_to_string(&report).with_context(|| format!("cannot read {}", report.display()))?;
         Measured::read(&shell::last_json(&report)?)
     }
 }
@@ -168,42 +118,26 @@ impl Ours {
     fn build(workspace: &Workspace) -> Result<Self> {
         let name = "peer_workload";
         workspace.expect_target("papsynth", "example", name)?;
-        shell::run(workspace.cargo().args([
-            "build",
-            "--release",
-            "--package",
-            "papsynth",
-            "--example",
-            name,
-        ]))?;
+        shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth", "--example", name]))?;
         let program = format!("{name}{}", std::env::consts::EXE_SUFFIX);
-        Ok(Self {
-            program: workspace.target.join("release/examples").join(program),
-        })
+        Ok(Self { program: workspace.target.join("release/examples").join(program) })
     }
 
     fn measure(&self, work: &str, repetitions: usize) -> Result<Measured> {
-        let report =
-            shell::output(Command::new(&self.program).args([work, &repetitions.to_string()]))?;
+        let report = shell::output(Command::new(&self.program).args([work, &repetitions.to_string()]))?;
         Measured::read(&shell::last_json(&report)?)
     }
 
     /// Starts a process that makes frames side by side on so many threads.
     fn start(&self, frames: usize, threads: usize) -> Result<Child> {
         let mut command = Command::new(&self.program);
-        command
-            .args(["throughput", &frames.to_string(), &threads.to_string()])
-            .stdout(Stdio::piped());
-        command
-            .spawn()
-            .with_context(|| format!("cannot start {}", self.program.display()))
+        command.args(["throughput", &frames.to_string(), &threads.to_string()]).stdout(Stdio::piped());
+        command.spawn().with_context(|| format!("cannot start {}", self.program.display()))
     }
 
     /// Frames a second of such processes together, all running at the same moment.
     fn frames_per_s(&self, processes: usize, frames: usize, threads: usize) -> Result<f64> {
-        let children = (0..processes)
-            .map(|_| self.start(frames, threads))
-            .collect::<Result<Vec<_>>>()?;
+        let children = (0..processes).map(|_| self.start(frames, threads)).collect::<Result<Vec<_>>>()?;
         children.into_iter().try_fold(0.0, |sum, child| {
             let report = String::from_utf8(child.wait_with_output()?.stdout)?;
             Ok(sum + float(&shell::last_json(&report)?, "frames_per_s")?)

@@ -17,10 +17,6 @@ pub(crate) const CHORE: Chore = Chore {
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
-    shell::run(
-        workspace
-            .cargo()
-            .args(["publish", "--workspace", "--dry-run", "--allow-dirty"]),
-    )?;
+    shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))?;
     Ok(Outcome::Done)
 }

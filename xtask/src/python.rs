@@ -20,58 +20,27 @@ impl Python {
     ///
     /// `requirements` is the text of a requirements file. An environment that cannot be made is not an error: a
     /// machine with only Rust is welcome.
-    pub(crate) fn environment(
-        workspace: &Workspace,
-        name: &str,
-        requirements: &str,
-    ) -> Result<Self> {
+    pub(crate) fn environment(workspace: &Workspace, name: &str, requirements: &str) -> Result<Self> {
         let folder = workspace.target.join("python").join(name);
-        let python = folder.join(if cfg!(windows) {
-            "Scripts/python.exe"
-        } else {
-            "bin/python"
-        });
+        let python = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
         let stamp = folder.join("installed.txt");
-        if fs::read_to_string(&stamp).is_ok_and(|installed| installed == requirements)
-            && python.exists()
-        {
+        if fs::read_to_string(&stamp).is_ok_and(|installed| installed == requirements) && python.exists() {
             return Ok(Self::Ready(python));
         }
-        let system = ["python3", "python"]
-            .into_iter()
-            .find(|name| shell::answers(Command::new(name).arg("--version")));
+        let system = ["python3", "python"].into_iter().find(|name| shell::answers(Command::new(name).arg("--version")));
         let Some(system) = system else {
-            return Ok(Self::Missing(
-                "there is no Python on this machine".to_owned(),
-            ));
+            return Ok(Self::Missing("there is no Python on this machine".to_owned()));
         };
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        if let Err(error) = shell::run(
-            Command::new(system)
-                .args(["-m", "venv", "--clear"])
-                .arg(&folder),
-        ) {
-            return Ok(Self::Missing(format!(
-                "Python cannot make an environment: {error}"
-            )));
+        if let Err(error) = shell::run(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder)) {
+            return Ok(Self::Missing(format!("Python cannot make an environment: {error}")));
         }
         let list = folder.join("requirements.txt");
-        fs::write(&list, requirements)
-            .with_context(|| format!("cannot write {}", list.display()))?;
-        let install = [
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--disable-pip-version-check",
-            "--only-binary",
-            ":all:",
-            "-r",
-        ];
+        fs::write(&list, requirements).with_context(|| format!("cannot write {}", list.display()))?;
+        let install =
+            ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:", "-r"];
         if let Err(error) = shell::run(Command::new(&python).args(install).arg(&list)) {
-            return Ok(Self::Missing(format!(
-                "the packages of Python cannot be had: {error}"
-            )));
+            return Ok(Self::Missing(format!("the packages of Python cannot be had: {error}")));
         }
         fs::rename(&list, &stamp).with_context(|| format!("cannot write {}", stamp.display()))?;
         Ok(Self::Ready(python))

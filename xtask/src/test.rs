@@ -16,11 +16,6 @@ pub(crate) const CHORE: Chore = Chore {
 };
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
-    shell::run(
-        workspace
-            .cargo()
-            .args(["test", "--workspace"])
-            .args(arguments.rest()),
-    )?;
+    shell::run(workspace.cargo().args(["test", "--workspace"]).args(arguments.rest()))?;
     Ok(Outcome::Done)
 }

@@ -23,21 +23,12 @@ pub(crate) const CHORE: Chore = Chore {
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let libraries =
-        shell::output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]))?;
+    let libraries = shell::output(Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]))?;
     if !Path::new(libraries.trim()).is_dir() {
-        return Ok(Outcome::Skipped(format!(
-            "the target {TARGET} is not installed"
-        )));
+        return Ok(Outcome::Skipped(format!("the target {TARGET} is not installed")));
     }
     let mut command = workspace.cargo();
-    command.args([
-        "build",
-        "--target",
-        TARGET,
-        "--lib",
-        "--no-default-features",
-    ]);
+    command.args(["build", "--target", TARGET, "--lib", "--no-default-features"]);
     for name in deps::pure_crates(workspace) {
         command.args(["--package", name]);
     }

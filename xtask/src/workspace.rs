@@ -32,18 +32,9 @@ pub(crate) struct Package {
 impl Workspace {
     /// Asks Cargo.
     pub(crate) fn load() -> Result<Self> {
-        let text = shell::output(cargo_command().args([
-            "metadata",
-            "--no-deps",
-            "--format-version",
-            "1",
-        ]))?;
-        let metadata: Value =
-            serde_json::from_str(&text).context("the output of `cargo metadata`")?;
-        let packages = array(&metadata, "packages")
-            .iter()
-            .map(Package::new)
-            .collect::<Result<_>>()?;
+        let text = shell::output(cargo_command().args(["metadata", "--no-deps", "--format-version", "1"]))?;
+        let metadata: Value = serde_json::from_str(&text).context("the output of `cargo metadata`")?;
+        let packages = array(&metadata, "packages").iter().map(Package::new).collect::<Result<_>>()?;
         Ok(Self {
             root: text_of(&metadata, "workspace_root")?.into(),
             target: text_of(&metadata, "target_directory")?.into(),
@@ -80,31 +71,17 @@ impl Package {
     fn new(value: &Value) -> Result<Self> {
         let manifest = PathBuf::from(text_of(value, "manifest_path")?);
         // Members are the dependencies that are found by path.
-        let members = array(value, "dependencies")
-            .iter()
-            .filter(|d| d.get("path").is_some_and(Value::is_string));
-        let mut members = members
-            .map(|d| text_of(d, "name"))
-            .collect::<Result<Vec<_>>>()?;
+        let members = array(value, "dependencies").iter().filter(|d| d.get("path").is_some_and(Value::is_string));
+        let mut members = members.map(|d| text_of(d, "name")).collect::<Result<Vec<_>>>()?;
         members.sort();
         members.dedup();
-        let kind = |target: &Value| {
-            array(target, "kind")
-                .first()
-                .and_then(Value::as_str)
-                .unwrap_or_default()
-                .to_owned()
-        };
-        let targets = array(value, "targets")
-            .iter()
-            .map(|t| Ok((kind(t), text_of(t, "name")?)))
-            .collect::<Result<_>>()?;
+        let kind =
+            |target: &Value| array(target, "kind").first().and_then(Value::as_str).unwrap_or_default().to_owned();
+        let targets =
+            array(value, "targets").iter().map(|t| Ok((kind(t), text_of(t, "name")?))).collect::<Result<_>>()?;
         Ok(Self {
             name: text_of(value, "name")?,
-            folder: manifest
-                .parent()
-                .context("a manifest lies in a folder")?
-                .to_owned(),
+            folder: manifest.parent().context("a manifest lies in a folder")?.to_owned(),
             members,
             targets,
         })
@@ -116,14 +93,10 @@ fn cargo_command() -> Command {
 }
 
 fn array<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-    value
-        .get(name)
-        .and_then(Value::as_array)
-        .map_or(&[], Vec::as_slice)
+    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn text_of(value: &Value, name: &str) -> Result<String> {
     let text = value.get(name).and_then(Value::as_str);
-    text.map(str::to_owned)
-        .with_context(|| format!("`cargo metadata` says nothing about `{name}`"))
+    text.map(str::to_owned).with_context(|| format!("`cargo metadata` says nothing about `{name}`"))
 }

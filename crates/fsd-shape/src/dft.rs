@@ -65,6 +65,9 @@ fn split(part: &Part<'_>, output: &mut [Point], scratch: &mut [Point]) {
     }
     let scratch = &mut scratch[..len];
     scratch.copy_from_slice(output);
+    if p == 4 {
+        return four(part, output, scratch);
+    }
     let whole = part.twiddles.len();
     for k in 0..m {
         for q in 0..p {
@@ -82,6 +85,24 @@ fn split(part: &Part<'_>, output: &mut [Point], scratch: &mut [Point]) {
             }
             output[k + q * m] = sum;
         }
+    }
+}
+
+/// The sums over four interleaved parts: three twiddles, and turns by quarters that need no multiplication.
+fn four(part: &Part<'_>, output: &mut [Point], scratch: &[Point]) {
+    let m = output.len() / 4;
+    // The sign of the exponent, of a quarter turn's twiddle.
+    let sign = part.twiddles[part.twiddles.len() / 4][1].signum();
+    for k in 0..m {
+        let turned = |r: usize| multiply(scratch[r * m + k], part.twiddles[r * k * part.stride]);
+        let [a, b, c, d] = [scratch[k], turned(1), turned(2), turned(3)];
+        let (ac, bd) = ([a[0] + c[0], a[1] + c[1]], [b[0] + d[0], b[1] + d[1]]);
+        let (a_c, b_d) = ([a[0] - c[0], a[1] - c[1]], [b[0] - d[0], b[1] - d[1]]);
+        let quarter = [-sign * b_d[1], sign * b_d[0]];
+        output[k] = [ac[0] + bd[0], ac[1] + bd[1]];
+        output[k + m] = [a_c[0] + quarter[0], a_c[1] + quarter[1]];
+        output[k + 2 * m] = [ac[0] - bd[0], ac[1] - bd[1]];
+        output[k + 3 * m] = [a_c[0] - quarter[0], a_c[1] - quarter[1]];
     }
 }
 

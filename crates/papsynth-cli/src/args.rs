@@ -9,7 +9,11 @@ use papsynth::recipe::Preset;
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
 #[derive(Debug, Parser)]
-#[command(name = "papsynth", version, max_term_width = 100, after_help = "\
+#[command(
+    name = "papsynth",
+    version,
+    max_term_width = 100,
+    after_help = "\
 Examples:
   papsynth generate --out fields --frames 8            eight labelled fields of the default recipe
   papsynth init --preset dense --out dense.toml        a commented recipe to change
@@ -17,7 +21,8 @@ Examples:
   papsynth generate dense.toml --out dense --frames 100
 
 Exit codes: 0 done; 2 usage, recipe or input (trying again will not help); 74 input/output (it may);
-130 interrupted (run the same command again to go on).")]
+130 interrupted (run the same command again to go on)."
+)]
 pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -201,7 +206,7 @@ pub(crate) struct Learn {
     /// Model to learn into [default: the one that ships]
     #[arg(long, value_name = "MODEL")]
     pub(crate) base: Option<PathBuf>,
-    /// Keep means, covariances and spectra alone, and no pixels
+    /// Keep means, covariances and spectra of this class alone, and no pixels
     #[arg(long)]
     pub(crate) numbers_only: bool,
     /// Model file to write, replacing an older one

@@ -39,6 +39,8 @@ pub(crate) fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
     let mut check = Check { schema: &schema, text, faults: Vec::new() };
     check.table(table.get_ref(), schema.root(), &mut Vec::new());
     if !check.faults.is_empty() {
+        // As they stand in the text, not as their names sort.
+        check.faults.sort_by_key(|fault| fault.span.as_ref().map(|span| span.start));
         return Err(check.faults);
     }
     toml::from_str(text).map_err(|error: toml::de::Error| vec![type_fault(&error, table.get_ref(), &schema)])
@@ -78,10 +80,8 @@ fn version(table: &DeTable<'_>) -> Result<(), Vec<Fault>> {
         return Ok(());
     }
     let newer = number.as_str().parse::<u64>().is_ok_and(|v| v > u64::from(RECIPE_VERSION));
-    let message = format!(
-        "version: this recipe is of version {}; this program reads version {RECIPE_VERSION}",
-        number.as_str()
-    );
+    let message =
+        format!("version: this recipe is of version {}; this program reads version {RECIPE_VERSION}", number.as_str());
     let help = if newer {
         "it was written for a newer papsynth, which can read it"
     } else {
@@ -314,7 +314,8 @@ mod tests {
     #[test]
     fn all_unknown_keys_are_named_at_once() {
         let faults = read("a = 1\n[field]\nb = 2\n[camera]\nc = 3\nbits = 8\n").unwrap_err();
-        assert_eq!(faults.len(), 3);
+        let paths: Vec<String> = faults.iter().map(|fault| fault.path.join(".")).collect();
+        assert_eq!(paths, ["a", "field.b", "camera.c"]);
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub(crate) struct Complaint {
     text: Option<NamedSource<Arc<String>>>,
     #[label(collection)]
     labels: Vec<LabeledSpan>,
-    #[related]
+    /// What the complaint sums up; each is reported on its own.
     related: Vec<Complaint>,
     place: Option<Place>,
 }
@@ -167,8 +167,12 @@ impl Failure {
 
     /// Says on standard error what went wrong; a closed standard error changes nothing.
     pub(crate) fn print(self) {
-        let report = Report::new(*self.complaint);
-        let _ = writeln!(io::stderr().lock(), "{report:?}");
+        let mut complaint = *self.complaint;
+        let parts = std::mem::take(&mut complaint.related);
+        let mut err = io::stderr().lock();
+        for complaint in std::iter::once(complaint).chain(parts) {
+            let _ = writeln!(err, "{:?}", Report::new(complaint));
+        }
     }
 
     /// The same as a JSON object.
@@ -192,11 +196,7 @@ pub(crate) fn install_reports() {
     let on_terminal = io::stderr().is_terminal();
     // It fails only if it was installed before, which is then what is wanted.
     let _ = miette::set_hook(Box::new(move |_| {
-        let options = miette::MietteHandlerOpts::new()
-            .wrap_lines(on_terminal)
-            .break_words(false)
-            .show_related_errors_as_siblings()
-            .context_lines(1);
+        let options = miette::MietteHandlerOpts::new().wrap_lines(on_terminal).break_words(false).context_lines(1);
         Box::new(if on_terminal { options } else { options.color(false).unicode(false) }.build())
     }));
 }

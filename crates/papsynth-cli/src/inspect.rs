@@ -43,7 +43,10 @@ fn table(dir: &str, overview: &Overview) -> String {
     row("seed", &identity.seed.to_string());
     row(
         "versions",
-        &format!("recipe {}, model {}, stream {}", identity.recipe_version, identity.model_version, identity.stream_version),
+        &format!(
+            "recipe {}, model {}, stream {}",
+            identity.recipe_version, identity.model_version, identity.stream_version
+        ),
     );
     row("frames", &overview.frames.to_string());
     if !overview.missing.is_empty() {
@@ -59,7 +62,8 @@ fn table(dir: &str, overview: &Overview) -> String {
     if overview.frames > 0 {
         let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));
         let bits = listed(overview.bits.iter().map(|bits| format!("{bits} bits")));
-        let planes = listed(overview.planes.iter().map(|n| format!("{n} {}", if *n == 1 { "plane" } else { "planes" })));
+        let planes =
+            listed(overview.planes.iter().map(|n| format!("{n} {}", if *n == 1 { "plane" } else { "planes" })));
         let [least, most] = overview.pixel_um;
         let pixel = if least == most { format!("{least}") } else { format!("{least} to {most}") };
         row("images", &format!("{sizes}; {pixel} um a pixel; {bits}; {planes}"));

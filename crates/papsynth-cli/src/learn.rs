@@ -46,19 +46,19 @@ pub(crate) fn run(args: &Learn) -> Result<(), Failure> {
         source: args.source.clone().unwrap_or_else(|| source(args)),
         donors: if args.numbers_only { Donors::NumbersOnly } else { Donors::Keep },
     };
-    let model = learn(&base, &material, &params).map_err(|error| {
-        Failure::input(Complaint::new(error.to_string()))
-    })?;
+    let model = learn(&base, &material, &params).map_err(|error| Failure::input(Complaint::new(error.to_string())))?;
     write_file(&args.out, model.to_json().as_bytes())?;
-    let out = args.out.display();
+    let read = [
+        (nuclei.len(), "images of nuclei"),
+        (nucleus_outlines.len(), "outlines of nuclei"),
+        (cells.len(), "outlines of cells"),
+    ];
+    let read = read.iter().filter(|(count, _)| *count > 0);
+    let read = read.map(|(count, what)| format!("{count} {what}")).collect::<Vec<_>>().join(", ");
+    let (out, class) = (args.out.display(), &args.class);
     exit::print(&format!(
-        "{out}: class `{}` from {} images and {} outlines of nuclei and {} outlines of cells\n\
-         Use it with: papsynth generate --model {out} --set 'cells.{}.count=10' ...\n",
-        args.class,
-        nuclei.len(),
-        nucleus_outlines.len(),
-        cells.len(),
-        args.class,
+        "{out}: class `{class}` from {read}\n\
+         Use it with: papsynth generate --model {out} --set cells.{class}.count=10 ...\n"
     ))
 }
 
@@ -163,7 +163,8 @@ fn images_in(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
             continue;
         }
         if let Some(other) = found.insert(name, path.clone()) {
-            let message = format!("{} and {} have the same name, apart from their endings", other.display(), path.display());
+            let message =
+                format!("{} and {} have the same name, apart from their endings", other.display(), path.display());
             return Err(Failure::input(Complaint::new(message)));
         }
     }

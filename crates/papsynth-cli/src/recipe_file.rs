@@ -246,11 +246,7 @@ mod tests {
     use super::*;
 
     fn load(preset: Preset, sets: &[&str]) -> Result<Recipe, String> {
-        let args = RecipeArgs {
-            recipe: None,
-            preset: Some(preset),
-            set: sets.iter().map(|&s| s.to_owned()).collect(),
-        };
+        let args = RecipeArgs { recipe: None, preset: Some(preset), set: sets.iter().map(|&s| s.to_owned()).collect() };
         RecipeFile::load(&args).map(|found| found.recipe).map_err(|failure| failure.json().to_string())
     }
 
@@ -276,7 +272,7 @@ mod tests {
         let recipe = load(Preset::Lbc, &["field.width_px=96", "field.width_px=64"]).unwrap();
         assert_eq!(recipe.field.width_px, 64.0.into());
         // A bound is laid over the distribution it bounds.
-        let recipe = load(Preset::Lbc, &["slide.depth_um.max=5"]).unwrap();
+        let recipe = load(Preset::Lbc, &["slide.depth_um={uniform=[2, 6]}", "slide.depth_um.max=5"]).unwrap();
         assert_eq!(recipe.slide.depth_um.bounds(), [2.0, 5.0]);
     }
 

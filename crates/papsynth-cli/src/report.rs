@@ -56,9 +56,7 @@ impl Progress {
         };
         let target = if style == Style::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(start.frames), target);
-        let template = "{msg} [{bar:30}] {pos} of {len} frames, {elapsed} gone, about {eta} left";
-        let look = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        bar.set_style(look.progress_chars("=> "));
+        bar.set_style(look(""));
         bar.set_message(start.dir.display().to_string());
         if style == Style::Json {
             let Start { dir, seed, frames, threads } = &start;
@@ -80,6 +78,10 @@ impl Progress {
             Step::Made(summary) => summary,
         };
         self.bar.inc(1);
+        if self.style == Style::Bar && self.bar.position() == 1 {
+            // Before the first frame there is nothing to estimate from.
+            self.bar.set_style(look(", about {eta} left"));
+        }
         let (done, of) = (self.bar.position(), self.bar.length().unwrap_or_default());
         let left_s = self.bar.eta().as_secs();
         let (index, objects) = (summary.index, summary.objects.values().sum::<u64>());
@@ -91,7 +93,8 @@ impl Progress {
             }
             Style::Lines if is_told(done, of) => {
                 let left = if done < of { format!(", about {} left", duration(left_s)) } else { String::new() };
-                let _ = writeln!(io::stderr().lock(), "frame {index}: {objects} objects and parts ({done} of {of}{left})");
+                let _ =
+                    writeln!(io::stderr().lock(), "frame {index}: {objects} objects and parts ({done} of {of}{left})");
             }
             Style::Lines | Style::Bar | Style::Quiet => {}
         }
@@ -111,12 +114,20 @@ impl Progress {
             Style::Bar | Style::Lines => {
                 let (dir, frames) = (dir.display(), if *made == 1 { "frame" } else { "frames" });
                 let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
-                exit::print(&format!("{dir}: {made} {frames} made{there}
+                exit::print(&format!(
+                    "{dir}: {made} {frames} made{there}
 Look at: {dir}/contact-sheet.png
-"))
+"
+                ))
             }
         }
     }
+}
+
+/// The bar, with what follows it.
+fn look(rest: &str) -> ProgressStyle {
+    let template = format!("{{msg}} [{{bar:30}}] {{pos}} of {{len}} frames, {{elapsed}} gone{rest}");
+    ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
 }
 
 /// Whether a line is due: at most [`MOST_LINES`] in all, and the last frame always.

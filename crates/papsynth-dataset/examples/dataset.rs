@@ -1,6 +1,7 @@
 //! Writes a small data set and its contact sheet, which is the picture in the README.
 //!
-//! `cargo run --release --example dataset [FOLDER]`; without a folder it goes to `target/dataset-example`.
+//! `cargo run --release --example dataset [FOLDER [PLANES]]`; without a folder it goes to `target/dataset-example`,
+//! with a number of planes above 1 it is one of focus stacks.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -11,10 +12,13 @@ use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::{Dataset, DatasetInfo, Error, Run};
 
 fn main() -> Result<(), Error> {
-    let folder = std::env::args_os().nth(1).map_or_else(|| PathBuf::from("target/dataset-example"), PathBuf::from);
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().map_or_else(|| PathBuf::from("target/dataset-example"), PathBuf::from);
+    let planes: f64 = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(1.0);
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = 688.0.into();
     recipe.field.height_px = 519.0.into();
+    recipe.focus.planes = planes.into();
     for mix in recipe.cells.values_mut() {
         mix.count = 6.0.into();
     }

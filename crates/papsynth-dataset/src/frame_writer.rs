@@ -7,7 +7,7 @@ use std::io;
 use papsynth::scene::{Scene, View};
 use papsynth::truth::{Group, Truth};
 use papsynth::{Finished, Plane};
-use tiff::TiffError;
+use tiff::{TiffError, TiffResult};
 
 use crate::coco::{Document, category_name};
 use crate::dataset::Dataset;
@@ -16,7 +16,7 @@ use crate::files::{Handle, Pending};
 use crate::layout::{self, Form};
 use crate::record::{FORMAT_VERSION, FileRecord, FrameRecord, FrameSummary, Geometry, WRITER};
 use crate::table::table;
-use crate::write::{PageWriter, Pixels, description, grey_png, label_tiff};
+use crate::write::{PageWriter, Pixels, compressed, description, grey_png, label_tiff};
 
 /// Writes the files of one frame. Planes are written as they arrive and not kept. Dropped before it is finished, it
 /// leaves no record, and the frame counts as not made.
@@ -135,11 +135,13 @@ impl<'a> FrameWriter<'a> {
             let grey = rounded(&finished.all_in_focus, white(self.geometry.bits));
             self.write_grey(&layout::all_in_focus(index), &grey)?;
         }
+        let view = self.geometry.view;
         for group in Group::ALL {
-            self.write_labels(&layout::labels(group, index), &truth.labels_of(group).ids)?;
+            let ids = &truth.labels_of(group).ids;
+            self.write_tiff(&layout::labels(group, index), label_tiff(ids, view.width, view.pixel_um))?;
         }
-        let layers: Vec<u32> = truth.layers.iter().map(|&n| n.into()).collect();
-        self.write_labels(&layout::layers(index), &layers)?;
+        let layers = compressed(Pixels::U16(&truth.layers), view.width, view.pixel_um);
+        self.write_tiff(&layout::layers(index), layers)?;
         let rows = table(truth, index).map_err(|e| self.wrong(e.to_string()))?;
         self.write(&layout::table(index), &rows)?;
         let summary = summary(&self.geometry, truth, std::mem::take(&mut self.saturated));
@@ -175,9 +177,8 @@ impl<'a> FrameWriter<'a> {
         self.write(name, &bytes)
     }
 
-    fn write_labels(&mut self, name: &str, ids: &[u32]) -> Result<(), Error> {
-        let view = &self.geometry.view;
-        let bytes = label_tiff(ids, view.width, view.pixel_um).map_err(|e| self.wrong(format!("{name}: {e}")))?;
+    fn write_tiff(&mut self, name: &str, encoded: TiffResult<Vec<u8>>) -> Result<(), Error> {
+        let bytes = encoded.map_err(|e| self.wrong(format!("{name}: {e}")))?;
         self.write(name, &bytes)
     }
 
@@ -194,7 +195,9 @@ impl<'a> FrameWriter<'a> {
                 finished.scene.key.index
             )));
         }
-        self.check_size("all-in-focus values", finished.all_in_focus.len(), pixels)?;
+        if due > 1 {
+            self.check_size("all-in-focus values", finished.all_in_focus.len(), pixels)?;
+        }
         self.check_size("layer counts", truth.layers.len(), pixels)?;
         for group in Group::ALL {
             self.check_size("labels", truth.labels_of(group).ids.len(), pixels)?;

@@ -8,11 +8,21 @@
 //! Sizes are those of the Herlev table (log-normal, Jantzen et al. 2005) and absorbances those measured on
 //! monochrome liquid-based fields and on the authors' nuclei.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::print_stdout,
+    reason = "a small program with small numbers"
+)]
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
-use papsynth::model::{CellClass, ChromatinStatistics, CytoplasmStatistics, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics, Shapes};
+use papsynth::model::{
+    CellClass, ChromatinStatistics, CytoplasmStatistics, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics,
+    Shapes,
+};
 
 /// Thickness from rim to centre in ten steps, relative to a cell's median: measured on free cells.
 const RIM_TO_CENTRE: [f64; 10] = [0.61, 0.87, 0.96, 1.04, 1.08, 1.14, 1.22, 1.23, 1.31, 1.31];
@@ -110,7 +120,13 @@ fn main() {
         let chromatin = &class.nucleus.chromatin;
         println!(
             "{}: nuclei A {:?}, sd {:?}, skewness {}, nu {}, length {} um, profile {:?}",
-            facts.name, class.nucleus.absorbance, chromatin.sd, chromatin.skewness, chromatin.nu, chromatin.length_um, chromatin.rim_to_centre
+            facts.name,
+            class.nucleus.absorbance,
+            chromatin.sd,
+            chromatin.skewness,
+            chromatin.nu,
+            chromatin.length_um,
+            chromatin.rim_to_centre
         );
     }
     let text = model.to_json();
@@ -181,7 +197,8 @@ fn nuclei(folder: &Path) -> Vec<NucleusImage> {
         .filter_map(|entry| Some(entry.ok()?.file_name()))
         .collect();
     names.sort();
-    let open = |path: std::path::PathBuf| image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8();
+    let open =
+        |path: std::path::PathBuf| image::open(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).to_luma8();
     names
         .iter()
         .map(|name| {

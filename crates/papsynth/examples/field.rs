@@ -4,6 +4,8 @@
 //! cargo run --release -p papsynth --example field -- lbc 7 target/field.png
 //! ```
 
+#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small program with small numbers")]
+
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
@@ -21,7 +23,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
     let frame = engine.frame(Key { seed: 1, index })?;
     let view = frame.finished.scene.view;
-    let scale = f32::from(u8::MAX) / f32::from(frame.planes.iter().flat_map(|p| &p.grey).copied().max().unwrap_or(1).max(255));
+    let scale =
+        f32::from(u8::MAX) / f32::from(frame.planes.iter().flat_map(|p| &p.grey).copied().max().unwrap_or(1).max(255));
     let pixels: Vec<u8> = frame.planes[0].grey.iter().map(|grey| (f32::from(*grey) * scale) as u8).collect();
     let (width, height) = (u32::try_from(view.width)?, u32::try_from(view.height)?);
     image::GrayImage::from_raw(width, height, pixels).ok_or("an image of another size")?.save(&out)?;

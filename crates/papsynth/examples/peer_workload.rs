@@ -3,6 +3,8 @@
 //! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and the peak of
 //! resident memory. Truth is made with every image; no file is written.
 
+#![expect(clippy::cast_possible_truncation, clippy::print_stdout, reason = "a small program with small numbers")]
+
 use std::time::Instant;
 
 use papsynth::key::Key;

@@ -17,8 +17,8 @@ pub(crate) fn exp10(values: &mut [f32]) {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the exponent is within −127..=127")]
 fn exp10_one(x: f32) -> f32 {
     /// log₂ 10 in two parts, the first short enough that its products with whole numbers are exact.
-    const LOG2_10_HIGH: f32 = 3.321_289_1;
-    const LOG2_10_LOW: f32 = 3.897_558e-5;
+    const LOG2_10_HIGH: f32 = 3.321_289;
+    const LOG2_10_LOW: f32 = 6.390_324e-4;
     /// 1.5·2²³: adding and subtracting it rounds to a whole number.
     const ROUND: f32 = 12_582_912.0;
     let x = x.clamp(-37.0, 37.0);

@@ -1,4 +1,9 @@
 #![doc = include_str!("../README.md")]
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "pixels are f32, and the recipe's check bounds every size and place far below what an integer holds"
+)]
 
 mod detect;
 mod engine;

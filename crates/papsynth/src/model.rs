@@ -244,8 +244,12 @@ impl Donor {
         /// Widest donor: a nucleus of 100 µm at 0.05 µm a pixel, and then some.
         const WIDEST: usize = 4096;
         within("pixel_um", self.pixel_um, 0.05, 4.0)?;
-        if self.width == 0 || self.width > WIDEST || self.absorbance_milli.len() % self.width != 0 {
-            return Err(format!("width: {} does not divide its {} pixels into rows", self.width, self.absorbance_milli.len()));
+        if self.width == 0 || self.width > WIDEST || !self.absorbance_milli.len().is_multiple_of(self.width) {
+            return Err(format!(
+                "width: {} does not divide its {} pixels into rows",
+                self.width,
+                self.absorbance_milli.len()
+            ));
         }
         if self.absorbance_milli.iter().all(|&v| v == OUTSIDE) {
             return Err("absorbance_milli: no pixel lies inside the nucleus".to_owned());

@@ -153,7 +153,14 @@ impl Rendering {
         Truth { objects, labels, layers }
     }
 
-    fn row(&self, object: &Object, phantom: &Phantom, piece: &phantom::Piece, mask: &Mask, number: usize) -> ObjectTruth {
+    fn row(
+        &self,
+        object: &Object,
+        phantom: &Phantom,
+        piece: &phantom::Piece,
+        mask: &Mask,
+        number: usize,
+    ) -> ObjectTruth {
         let pixel_um = self.scene.view.pixel_um;
         let kind = object.body.kind();
         let covered = piece.coverage.values.iter().filter(|share| **share >= COVERED).count() as u64;

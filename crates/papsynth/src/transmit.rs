@@ -61,13 +61,20 @@ impl LightPath {
     }
 
     /// Images the phantoms of a scene. `masks` are those of their pieces, in their order.
-    pub(crate) fn image(&self, scene: &Scene, phantoms: &[Phantom], masks: &[Vec<Mask>], focus: FocusAt) -> Result<Light, String> {
+    pub(crate) fn image(
+        &self,
+        scene: &Scene,
+        phantoms: &[Phantom],
+        masks: &[Vec<Mask>],
+        focus: FocusAt,
+    ) -> Result<Light, String> {
         let (width, height) = (scene.view.width, scene.view.height);
         let mut exponent = self.empty_log10.clone();
         let mut absorbances = Vec::new();
         let indices: Vec<usize> = (0..phantoms.len()).collect();
         for chunk in indices.chunks(CHUNK) {
-            let work = |&index: &usize| blur(scene, scene.objects[index].depth_um, &phantoms[index], &masks[index], focus);
+            let work =
+                |&index: &usize| blur(scene, scene.objects[index].depth_um, &phantoms[index], &masks[index], focus);
             let blurred = threads::map(self.threads, chunk, work);
             // Eq. 14: I_p = Σ pᵢ ∗ G_σz, added in the order of the objects whatever thread made them.
             for pieces in blurred {
@@ -85,7 +92,13 @@ impl LightPath {
 }
 
 /// The negative absorbance of an object's pieces in a plane, and its mean over their masks.
-fn blur(scene: &Scene, depth_um: f64, phantom: &Phantom, masks: &[Mask], focus: FocusAt) -> Result<Vec<(Tile, f64)>, String> {
+fn blur(
+    scene: &Scene,
+    depth_um: f64,
+    phantom: &Phantom,
+    masks: &[Mask],
+    focus: FocusAt,
+) -> Result<Vec<(Tile, f64)>, String> {
     let sigma_px = match focus {
         FocusAt::Everywhere => 0.0,
         // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
@@ -161,7 +174,9 @@ fn background(scene: &Scene) -> Result<Background, String> {
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
         // A bowl whose top is off the centre, 1 − x2 (x − tx)² − …, has a tilt; the constant left over is in the level.
-        SceneIllumination::Bowl { x2, y2, top } => Illumination::Bowl { x2, y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] },
+        SceneIllumination::Bowl { x2, y2, top } => {
+            Illumination::Bowl { x2, y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
+        }
     };
     let params = BackgroundParams {
         level: scene.background.level,

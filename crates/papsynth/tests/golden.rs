@@ -5,6 +5,8 @@
 //! Tolerance: no pixel may differ by more than one grey level and no more than one in a hundred may differ at all.
 //! Fourier transforms round differently on different instruction sets; everything else is exact.
 
+#![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
+
 use std::path::{Path, PathBuf};
 
 use papsynth::key::Key;

@@ -1,5 +1,7 @@
 //! Recipe, model, seed and index determine an image: whatever the threads, the order, or what else is on the slide.
 
+#![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
+
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Layout, Number, Preset, Recipe};
@@ -71,10 +73,19 @@ fn another_speckle_moves_no_nucleus() {
     recipe.debris.speckles.count = Number::Fixed(6.0);
     let more = frame(&engine(&recipe), 0, Threads::One);
     let others = |frame: &Frame| {
-        frame.finished.truth.objects.iter().filter(|o| o.kind != Kind::Speckle).map(|o| (o.id, o.part, o.amodal.clone())).collect::<Vec<_>>()
+        frame
+            .finished
+            .truth
+            .objects
+            .iter()
+            .filter(|o| o.kind != Kind::Speckle)
+            .map(|o| (o.id, o.part, o.amodal.clone()))
+            .collect::<Vec<_>>()
     };
     assert_eq!(others(&few), others(&more));
-    let scene = |frame: &Frame| frame.finished.scene.objects.iter().filter(|o| o.body.kind() == Kind::Speckle).cloned().collect::<Vec<_>>();
+    let scene = |frame: &Frame| {
+        frame.finished.scene.objects.iter().filter(|o| o.body.kind() == Kind::Speckle).cloned().collect::<Vec<_>>()
+    };
     assert_eq!(scene(&few)[..], scene(&more)[..5]);
 }
 
@@ -108,7 +119,13 @@ fn truth_holds_together() {
         if !object.truncated {
             let px = object.area_um2 / (0.25 * 0.25);
             let slack = 0.05 * px + 12.0;
-            assert!((object.amodal.area() as f64 - px).abs() < slack, "{:?} {}: {px} {}", object.kind, object.id, object.amodal.area());
+            assert!(
+                (object.amodal.area() as f64 - px).abs() < slack,
+                "{:?} {}: {px} {}",
+                object.kind,
+                object.id,
+                object.amodal.area()
+            );
         }
     }
     let cells: Vec<_> = truth.objects.iter().filter(|o| o.part == Part::Cytoplasm).collect();
@@ -136,7 +153,12 @@ fn focus_moves_blur_between_planes_and_keeps_the_noise_free_mean() {
         .planes
         .iter()
         .map(|plane| {
-            plane.noise_free.chunks_exact(frame.finished.scene.view.width).flat_map(|row| row.windows(2)).map(|w| f64::from((w[1] - w[0]).abs())).sum()
+            plane
+                .noise_free
+                .chunks_exact(frame.finished.scene.view.width)
+                .flat_map(|row| row.windows(2))
+                .map(|w| f64::from((w[1] - w[0]).abs()))
+                .sum()
         })
         .collect();
     let sharpest = (0..9).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();

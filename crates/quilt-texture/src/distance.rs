@@ -95,16 +95,23 @@ mod tests {
 
     const SEED: u64 = 0xd157;
 
+    /// The nearest outside pixel of all, with a frame of outside around the image.
     fn slow(inside: &[bool], width: usize) -> Vec<f32> {
-        let (w, h) = (width as i64, (inside.len() / width) as i64);
-        let outside = |x: i64, y: i64| !(0..w).contains(&x) || !(0..h).contains(&y) || !inside[(y * w + x) as usize];
-        let squared: Vec<i64> = (0..w * h)
-            .map(|i| {
-                let all = (-1..=h).flat_map(|y| (-1..=w).map(move |x| (x, y)));
-                let away = |(x, y): (i64, i64)| (x - i % w) * (x - i % w) + (y - i / w) * (y - i / w);
-                all.filter(|&(x, y)| outside(x, y)).map(away).min().unwrap()
-            })
+        let height = inside.len() / width;
+        let framed = |x: usize, y: usize| {
+            let within = (1..=width).contains(&x) && (1..=height).contains(&y);
+            within && inside[(y - 1) * width + x - 1]
+        };
+        let outside: Vec<_> = (0..(width + 2) * (height + 2))
+            .map(|i| (i % (width + 2), i / (width + 2)))
+            .filter(|&(x, y)| !framed(x, y))
             .collect();
+        let nearest = |i: usize| {
+            let (x, y) = (i % width + 1, i / width + 1);
+            let squared = |&(u, v): &(usize, usize)| x.abs_diff(u).pow(2) + y.abs_diff(v).pow(2);
+            outside.iter().map(squared).min().unwrap()
+        };
+        let squared: Vec<_> = (0..inside.len()).map(nearest).collect();
         let largest = *squared.iter().max().unwrap().max(&1) as f32;
         squared.iter().map(|&d| (d as f32 / largest).sqrt()).collect()
     }

@@ -9,20 +9,13 @@ use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
 const SIDE: usize = 200;
 
 fn draw(c: &mut Criterion) {
-    let matern = Spectrum::Matern {
-        nu: 1.0,
-        length_px: 4.0,
-    };
+    let matern = Spectrum::Matern { nu: 1.0, length_px: 4.0 };
     let gaussian = Spectrum::Gaussian { sigma_px: 7.0 };
     let margin = Padding::Margin { px: 16 };
     let cases = [
         ("brownian/periodic", Spectrum::BROWNIAN, Padding::Periodic),
         ("brownian/margin 16", Spectrum::BROWNIAN, margin),
-        (
-            "brownian/decorrelated",
-            Spectrum::BROWNIAN,
-            Padding::Decorrelated,
-        ),
+        ("brownian/decorrelated", Spectrum::BROWNIAN, Padding::Decorrelated),
         ("matern/decorrelated", matern, Padding::Decorrelated),
         ("gaussian/decorrelated", gaussian, Padding::Decorrelated),
     ];
@@ -30,14 +23,8 @@ fn draw(c: &mut Criterion) {
         let mut group = c.benchmark_group(name);
         group.throughput(Throughput::Elements((SIDE * SIDE) as u64));
         for (case, spectrum, padding) in cases {
-            let field = SpectralField::new(&FieldParams {
-                width: SIDE,
-                height: SIDE,
-                spectrum,
-                fft,
-                padding,
-            })
-            .expect("valid parameters");
+            let field = SpectralField::new(&FieldParams { width: SIDE, height: SIDE, spectrum, fft, padding })
+                .expect("valid parameters");
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
             let mut out = vec![0.0; SIDE * SIDE];
             group.bench_function(case, |b| {
@@ -51,28 +38,11 @@ fn plan(c: &mut Criterion) {
     let mut group = c.benchmark_group("plan 200 x 200");
     for (name, spectrum) in [
         ("brownian", Spectrum::BROWNIAN),
-        (
-            "matern 1",
-            Spectrum::Matern {
-                nu: 1.0,
-                length_px: 4.0,
-            },
-        ),
-        (
-            "matern 0.8",
-            Spectrum::Matern {
-                nu: 0.8,
-                length_px: 4.0,
-            },
-        ),
+        ("matern 1", Spectrum::Matern { nu: 1.0, length_px: 4.0 }),
+        ("matern 0.8", Spectrum::Matern { nu: 0.8, length_px: 4.0 }),
         ("gaussian", Spectrum::Gaussian { sigma_px: 7.0 }),
     ] {
-        let params = FieldParams {
-            width: SIDE,
-            height: SIDE,
-            spectrum,
-            ..FieldParams::default()
-        };
+        let params = FieldParams { width: SIDE, height: SIDE, spectrum, ..FieldParams::default() };
         group.bench_function(name, |b| b.iter(|| SpectralField::new(black_box(&params))));
     }
 }

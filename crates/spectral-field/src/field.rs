@@ -47,17 +47,11 @@ impl SpectralField {
         let (rows, columns) = match params.fft {
             Fft::Fastest => {
                 let mut planner = FftPlanner::new();
-                (
-                    planner.plan_fft_inverse(grid[0]),
-                    planner.plan_fft_inverse(grid[1]),
-                )
+                (planner.plan_fft_inverse(grid[0]), planner.plan_fft_inverse(grid[1]))
             }
             Fft::Portable => {
                 let mut planner = FftPlannerScalar::new();
-                (
-                    planner.plan_fft_inverse(grid[0]),
-                    planner.plan_fft_inverse(grid[1]),
-                )
+                (planner.plan_fft_inverse(grid[0]), planner.plan_fft_inverse(grid[1]))
             }
         };
         let (amplitude, reach) = amplitudes(params, grid);
@@ -118,16 +112,10 @@ impl SpectralField {
         let mut scratch = vec![Complex32::ZERO; self.rows.get_inplace_scratch_len()];
         for (block, lines) in field.chunks_mut(ROWS * self.width).enumerate() {
             let first = block * ROWS;
-            let used = pairs
-                .len()
-                .min((lines.len() / self.width).div_ceil(2) * grid_width);
+            let used = pairs.len().min((lines.len() / self.width).div_ceil(2) * grid_width);
             self.gather(&spectrum, first, &mut pairs[..used]);
-            self.rows
-                .process_with_scratch(&mut pairs[..used], &mut scratch);
-            for (pair, two) in pairs
-                .chunks(grid_width)
-                .zip(lines.chunks_mut(2 * self.width))
-            {
+            self.rows.process_with_scratch(&mut pairs[..used], &mut scratch);
+            for (pair, two) in pairs.chunks(grid_width).zip(lines.chunks_mut(2 * self.width)) {
                 let (upper, lower) = two.split_at_mut(self.width);
                 for (out, z) in upper.iter_mut().zip(pair) {
                     *out = z.re;
@@ -152,11 +140,7 @@ impl SpectralField {
             let weight = if is_own_mirror(kx, width) { 2.0 } else { 4.0 };
             for (ky, &a) in column.iter().enumerate() {
                 let a = f64::from(a);
-                let ky = if 2 * ky > height {
-                    ky as f64 - height as f64
-                } else {
-                    ky as f64
-                };
+                let ky = if 2 * ky > height { ky as f64 - height as f64 } else { ky as f64 };
                 let along = TAU * lag[1] * ky / height as f64;
                 // cos(across + along), of which the mirrored ky cancels the odd part.
                 sum += weight * a * a * libm::cos(across) * libm::cos(along);
@@ -170,9 +154,7 @@ impl SpectralField {
         let height = self.grid[1];
         let mut spectrum = vec![Complex32::ZERO; self.amplitude.len()];
         let mut scratch = vec![Complex32::ZERO; self.columns.get_inplace_scratch_len()];
-        let columns = spectrum
-            .chunks_mut(height)
-            .zip(self.amplitude.chunks(height));
+        let columns = spectrum.chunks_mut(height).zip(self.amplitude.chunks(height));
         for ((column, amplitude), &reach) in columns.zip(&self.reach) {
             let mut colour = |from: usize, to: usize| {
                 for (z, &a) in column[from..to].iter_mut().zip(&amplitude[from..to]) {
@@ -247,11 +229,7 @@ fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) 
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = largest * NEGLIGIBLE * NEGLIGIBLE;
     // A grid of one pixel has no frequency but the constant one.
-    let scale = if total > 0.0 {
-        FRAC_1_SQRT_2 / total.sqrt()
-    } else {
-        0.0
-    };
+    let scale = if total > 0.0 { FRAC_1_SQRT_2 / total.sqrt() } else { 0.0 };
     let mut amplitude = Vec::new();
     let mut reach = Vec::new();
     for column in power.chunks(half) {
@@ -261,15 +239,8 @@ fn amplitudes(params: &FieldParams, grid: [usize; 2]) -> (Vec<f32>, Vec<usize>) 
         reach.push(last);
         amplitude.extend((0..height).map(|ky| {
             let s = column[ky.min(height - ky)];
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the FFT is single precision"
-            )]
-            let a = if s > least {
-                (scale * s.sqrt()) as f32
-            } else {
-                0.0
-            };
+            #[expect(clippy::cast_possible_truncation, reason = "the FFT is single precision")]
+            let a = if s > least { (scale * s.sqrt()) as f32 } else { 0.0 };
             a
         }));
     }

@@ -27,10 +27,7 @@ impl Ziggurat {
         let mut density = [1.0; LAYERS + 1];
         let mut x = TAIL;
         let store = |array: &mut [f32; LAYERS + 1], layer: usize, value: f64| {
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "tables are single precision"
-            )]
+            #[expect(clippy::cast_possible_truncation, reason = "tables are single precision")]
             {
                 array[layer] = value as f32;
             }
@@ -51,10 +48,7 @@ impl Ziggurat {
     #[expect(clippy::cast_possible_truncation, reason = "the two halves of a word")]
     pub(crate) fn pair<R: Rng + ?Sized>(&self, rng: &mut R) -> [f32; 2] {
         let word = rng.next_u64();
-        [
-            self.deviate(word as u32, rng),
-            self.deviate((word >> 32) as u32, rng),
-        ]
+        [self.deviate(word as u32, rng), self.deviate((word >> 32) as u32, rng)]
     }
 
     #[inline]
@@ -105,10 +99,7 @@ fn with_sign(x: f32, bits: u32) -> f32 {
 }
 
 /// A deviate beyond `TAIL` (Marsaglia 1964).
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a deviate is single precision"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a deviate is single precision")]
 fn tail<R: Rng + ?Sized>(rng: &mut R) -> f32 {
     loop {
         let x = -libm::log(f64::from(position(rng.next_u32()))) / TAIL;
@@ -129,10 +120,7 @@ mod tests {
     fn sample(n: usize) -> Vec<f64> {
         let ziggurat = Ziggurat::new();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        (0..n / 2)
-            .flat_map(|_| ziggurat.pair(&mut rng))
-            .map(f64::from)
-            .collect()
+        (0..n / 2).flat_map(|_| ziggurat.pair(&mut rng)).map(f64::from).collect()
     }
 
     #[test]
@@ -148,12 +136,7 @@ mod tests {
     fn moments_are_normal() {
         let n = 4_000_000;
         let deviates = sample(n);
-        let moment = |p: i32| {
-            deviates
-                .iter()
-                .map(|&x| (0..p).fold(1.0, |m, _| m * x))
-                .sum::<f64>()
-        };
+        let moment = |p: i32| deviates.iter().map(|&x| (0..p).fold(1.0, |m, _| m * x)).sum::<f64>();
         // Mean and variance of x^p of a standard normal; bounds of four standard errors.
         for (p, mean, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
             let z = (moment(p) / n as f64 - mean) / (variance / n as f64).sqrt();
@@ -167,19 +150,13 @@ mod tests {
         let mut deviates = sample(n);
         deviates.sort_by(f64::total_cmp);
         let cdf = |x: f64| 0.5 * libm::erfc(-x / core::f64::consts::SQRT_2);
-        let distance = deviates
-            .iter()
-            .enumerate()
-            .map(|(i, &x)| (cdf(x) - (i as f64 + 0.5) / n as f64).abs())
-            .fold(0.0, f64::max);
+        let distance =
+            deviates.iter().enumerate().map(|(i, &x)| (cdf(x) - (i as f64 + 0.5) / n as f64).abs()).fold(0.0, f64::max);
         // Kolmogorov-Smirnov, 0.1 % level: 1.95 / √n.
         assert!(distance < 1.95 / (n as f64).sqrt(), "{distance}");
         let tail = deviates.iter().filter(|x| x.abs() > TAIL).count() as f64;
         let expected = 2.0 * cdf(-TAIL) * n as f64;
-        assert!(
-            (tail - expected).abs() < 4.0 * expected.sqrt(),
-            "{tail} of {expected}"
-        );
+        assert!((tail - expected).abs() < 4.0 * expected.sqrt(), "{tail} of {expected}");
     }
 
     #[test]

@@ -39,10 +39,7 @@ impl FieldParams {
     /// that opposite edges match.
     #[must_use]
     pub fn paper() -> Self {
-        Self {
-            padding: Padding::Periodic,
-            ..Self::default()
-        }
+        Self { padding: Padding::Periodic, ..Self::default() }
     }
 
     /// The sides of the FFT grid, or the field that forbids one.
@@ -50,20 +47,12 @@ impl FieldParams {
         self.spectrum.check()?;
         let side = |field, size: usize| {
             if size == 0 || size > LONGEST_SIDE {
-                return Err(Error::Size {
-                    field,
-                    value: size,
-                    largest: LONGEST_SIDE,
-                });
+                return Err(Error::Size { field, value: size, largest: LONGEST_SIDE });
             }
             let margin = match self.padding {
                 Padding::Periodic => return Ok(size),
                 Padding::Margin { px } if px > LONGEST_SIDE => {
-                    return Err(Error::Size {
-                        field: "padding.px",
-                        value: px,
-                        largest: LONGEST_SIDE,
-                    });
+                    return Err(Error::Size { field: "padding.px", value: px, largest: LONGEST_SIDE });
                 }
                 Padding::Margin { px } => px,
                 Padding::Decorrelated => self.spectrum.reach_px(DECORRELATED, size),
@@ -147,13 +136,7 @@ mod tests {
     #[test]
     fn paddings_and_their_grids() {
         let grid = |padding, spectrum| {
-            let params = FieldParams {
-                width: 200,
-                height: 61,
-                spectrum,
-                padding,
-                ..FieldParams::default()
-            };
+            let params = FieldParams { width: 200, height: 61, spectrum, padding, ..FieldParams::default() };
             params.grid().unwrap()
         };
         let gaussian = Spectrum::Gaussian { sigma_px: 7.0 };
@@ -168,21 +151,10 @@ mod tests {
     #[test]
     fn impossible_sizes_are_errors() {
         for (width, height, px) in [(0, 5, 0), (5, 0, 0), (1 << 20, 5, 0), (5, 5, usize::MAX)] {
-            let params = FieldParams {
-                width,
-                height,
-                padding: Padding::Margin { px },
-                ..FieldParams::default()
-            };
+            let params = FieldParams { width, height, padding: Padding::Margin { px }, ..FieldParams::default() };
             assert!(matches!(params.grid(), Err(Error::Size { .. })));
         }
-        let message = FieldParams {
-            width: 0,
-            ..FieldParams::default()
-        }
-        .grid()
-        .unwrap_err()
-        .to_string();
+        let message = FieldParams { width: 0, ..FieldParams::default() }.grid().unwrap_err().to_string();
         assert_eq!(message, "width is 0 px; accepted: 1 to 16384");
     }
 }

@@ -65,11 +65,7 @@ impl Spectrum {
             Self::Matern { nu, length_px } => {
                 let x = (2.0 * nu).sqrt() * lag_px.abs() / length_px;
                 let scale = libm::exp2(1.0 - nu) / libm::tgamma(nu) * libm::pow(x, nu);
-                Some(if scale < f64::MIN_POSITIVE {
-                    1.0
-                } else {
-                    scale * bessel_k(nu, x)
-                })
+                Some(if scale < f64::MIN_POSITIVE { 1.0 } else { scale * bessel_k(nu, x) })
             }
             Self::Gaussian { sigma_px } => {
                 let x = lag_px / (2.0 * sigma_px);
@@ -80,15 +76,7 @@ impl Spectrum {
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         let within = |field, value: f64, accepted, inside: bool| {
-            if inside && value.is_finite() {
-                Ok(())
-            } else {
-                Err(Error::Spectrum {
-                    field,
-                    value,
-                    accepted,
-                })
-            }
+            if inside && value.is_finite() { Ok(()) } else { Err(Error::Spectrum { field, value, accepted }) }
         };
         match *self {
             Self::PowerLaw { exponent } => {
@@ -179,11 +167,7 @@ fn inverse_power(x: f64, p: f64) -> f64 {
     if halves != libm::floor(halves) {
         return libm::pow(x, -p);
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "whole, 0 to 42"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole, 0 to 42")]
     let mut exponent = halves as u32;
     let (mut base, mut power) = (1.0 / x.sqrt(), 1.0);
     while exponent > 0 {
@@ -239,10 +223,7 @@ mod tests {
 
     #[test]
     fn matern_of_one_half_is_exponential() {
-        let spectrum = Spectrum::Matern {
-            nu: 0.5,
-            length_px: 3.0,
-        };
+        let spectrum = Spectrum::Matern { nu: 0.5, length_px: 3.0 };
         for r in [0.0, 1e-200, 0.5, 1.0, 7.0, 40.0] {
             let c = spectrum.autocorrelation(r).unwrap();
             assert!((c - libm::exp(-r / 3.0)).abs() < 1e-13, "{r}: {c}");
@@ -261,18 +242,10 @@ mod tests {
 
     #[test]
     fn densities_integrate_to_one() {
-        for spectrum in [
-            Spectrum::Gaussian { sigma_px: 0.4 },
-            Spectrum::Matern {
-                nu: 0.8,
-                length_px: 1.5,
-            },
-        ] {
+        for spectrum in [Spectrum::Gaussian { sigma_px: 0.4 }, Spectrum::Matern { nu: 0.8, length_px: 1.5 }] {
             let step = 1e-3;
-            let inside: f64 = (0..3000)
-                .map(|i| (f64::from(i) + 0.5) * step)
-                .map(|f| TAU * f * spectrum.density(f) * step)
-                .sum();
+            let inside: f64 =
+                (0..3000).map(|i| (f64::from(i) + 0.5) * step).map(|f| TAU * f * spectrum.density(f) * step).sum();
             let beyond = spectrum.variance_beyond_square(9.0);
             assert!((inside + beyond - 1.0).abs() < 1e-5, "{spectrum:?}");
         }
@@ -283,22 +256,13 @@ mod tests {
         for bad in [f64::NAN, f64::INFINITY, -1.0] {
             assert!(Spectrum::PowerLaw { exponent: bad }.check().is_err());
             assert!(Spectrum::Gaussian { sigma_px: bad }.check().is_err());
-            let rough = Spectrum::Matern {
-                nu: bad,
-                length_px: 1.0,
-            };
+            let rough = Spectrum::Matern { nu: bad, length_px: 1.0 };
             assert!(rough.check().is_err());
-            let short = Spectrum::Matern {
-                nu: 1.0,
-                length_px: bad,
-            };
+            let short = Spectrum::Matern { nu: 1.0, length_px: bad };
             assert!(short.check().is_err());
         }
         assert!(Spectrum::Gaussian { sigma_px: 0.0 }.check().is_err());
         let message = Spectrum::PowerLaw { exponent: 9.0 }.check().unwrap_err();
-        assert_eq!(
-            message.to_string(),
-            "spectrum.exponent is 9; accepted: 0 to 8"
-        );
+        assert_eq!(message.to_string(), "spectrum.exponent is 9; accepted: 0 to 8");
     }
 }

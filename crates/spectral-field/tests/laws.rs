@@ -17,14 +17,8 @@ fn matern(nu: f64, length_px: f64) -> Spectrum {
 }
 
 fn periodic(width: usize, height: usize, spectrum: Spectrum) -> SpectralField {
-    SpectralField::new(&FieldParams {
-        width,
-        height,
-        spectrum,
-        padding: Padding::Periodic,
-        ..FieldParams::default()
-    })
-    .unwrap()
+    SpectralField::new(&FieldParams { width, height, spectrum, padding: Padding::Periodic, ..FieldParams::default() })
+        .unwrap()
 }
 
 /// Mean over pixels of field(x) · field(x + lag), wrapped.
@@ -56,60 +50,31 @@ fn mean_is_zero_and_variance_one() {
         (Spectrum::BROWNIAN, Padding::Periodic),
         (Spectrum::BROWNIAN, Padding::Decorrelated),
     ] {
-        let field = SpectralField::new(&FieldParams {
-            width: 96,
-            height: 64,
-            spectrum,
-            padding,
-            ..FieldParams::default()
-        })
-        .unwrap();
+        let field =
+            SpectralField::new(&FieldParams { width: 96, height: 64, spectrum, padding, ..FieldParams::default() })
+                .unwrap();
         let mut rng = rng();
         let draws: Vec<_> = (0..2000).map(|_| field.draw(&mut rng)).collect();
         let squares: Vec<_> = draws.iter().map(|f| product(f, 96, [0, 0])).collect();
         let (variance, error) = statistics(&squares);
-        assert!(
-            (variance - 1.0).abs() < 4.0 * error.min(0.005),
-            "{spectrum:?}: {variance}"
-        );
-        let means: Vec<_> = draws
-            .iter()
-            .map(|f| f.iter().map(|&v| f64::from(v)).sum::<f64>() / f.len() as f64)
-            .collect();
+        assert!((variance - 1.0).abs() < 4.0 * error.min(0.005), "{spectrum:?}: {variance}");
+        let means: Vec<_> =
+            draws.iter().map(|f| f.iter().map(|&v| f64::from(v)).sum::<f64>() / f.len() as f64).collect();
         let (mean, error) = statistics(&means);
-        assert!(
-            mean.abs() < 4.0 * error + 1e-6,
-            "{spectrum:?}: {mean} ± {error}"
-        );
+        assert!(mean.abs() < 4.0 * error + 1e-6, "{spectrum:?}: {mean} ± {error}");
     }
 }
 
 #[test]
 fn autocorrelation_is_the_analytic_one() {
-    for spectrum in [
-        matern(0.5, 2.0),
-        matern(1.0, 4.0),
-        matern(2.3, 1.5),
-        matern(0.2, 3.0),
-        GAUSSIAN,
-    ] {
+    for spectrum in [matern(0.5, 2.0), matern(1.0, 4.0), matern(2.3, 1.5), matern(0.2, 3.0), GAUSSIAN] {
         let field = periodic(128, 96, spectrum);
-        for lag in [
-            [0.0_f64, 0.0],
-            [1.0, 0.0],
-            [0.0, 2.0],
-            [3.0, 3.0],
-            [0.0, 7.0],
-            [12.0, 5.0],
-        ] {
+        for lag in [[0.0_f64, 0.0], [1.0, 0.0], [0.0, 2.0], [3.0, 3.0], [0.0, 7.0], [12.0, 5.0]] {
             let distance = (lag[0] * lag[0] + lag[1] * lag[1]).sqrt();
             let analytic = spectrum.autocorrelation(distance).unwrap();
             let planned = field.autocorrelation(lag);
             // The alias orders left out; the wrapped tail is below it.
-            assert!(
-                (planned - analytic).abs() < 2e-3,
-                "{spectrum:?} {lag:?}: {planned}, {analytic}"
-            );
+            assert!((planned - analytic).abs() < 2e-3, "{spectrum:?} {lag:?}: {planned}, {analytic}");
         }
     }
 }
@@ -121,22 +86,12 @@ fn drawn_fields_have_the_planned_autocorrelation() {
             let field = periodic(width, height, spectrum);
             let mut rng = rng();
             let draws: Vec<_> = (0..1500).map(|_| field.draw(&mut rng)).collect();
-            for lag in [
-                [0, 0],
-                [1, 0],
-                [0, 1],
-                [2, 3],
-                [7, 2],
-                [width / 2, height / 2],
-            ] {
+            for lag in [[0, 0], [1, 0], [0, 1], [2, 3], [7, 2], [width / 2, height / 2]] {
                 let products: Vec<_> = draws.iter().map(|f| product(f, width, lag)).collect();
                 let (mean, error) = statistics(&products);
                 let planned = field.autocorrelation(lag.map(|l| l as f64));
                 let z = (mean - planned) / error;
-                assert!(
-                    z.abs() < 4.0,
-                    "{width} x {height} {spectrum:?} {lag:?}: {z} standard errors"
-                );
+                assert!(z.abs() < 4.0, "{width} x {height} {spectrum:?} {lag:?}: {z} standard errors");
             }
         }
     }
@@ -147,10 +102,8 @@ fn half_turns_and_mirrors_are_equally_likely() {
     // An error of sign in the packing of rows would favour one diagonal.
     let field = periodic(32, 32, matern(1.0, 3.0));
     let mut rng = rng();
-    let difference: Vec<_> = (0..1500)
-        .map(|_| field.draw(&mut rng))
-        .map(|f| product(&f, 32, [3, 3]) - product(&f, 32, [3, 29]))
-        .collect();
+    let difference: Vec<_> =
+        (0..1500).map(|_| field.draw(&mut rng)).map(|f| product(&f, 32, [3, 3]) - product(&f, 32, [3, 29])).collect();
     let (mean, error) = statistics(&difference);
     assert!(mean.abs() < 4.0 * error, "{mean} ± {error}");
 }
@@ -164,9 +117,7 @@ fn fields_are_gaussian() {
         .map(|f| {
             f.iter()
                 .map(|&v| f64::from(v))
-                .fold([0.0; 2], |[third, fourth], v| {
-                    [third + v * v * v / 4096.0, fourth + v * v * v * v / 4096.0]
-                })
+                .fold([0.0; 2], |[third, fourth], v| [third + v * v * v / 4096.0, fourth + v * v * v * v / 4096.0])
         })
         .collect();
     for (order, expected) in [(0, 0.0), (1, 3.0)] {
@@ -197,21 +148,11 @@ fn brownian_power_falls_with_the_square_of_frequency() {
                 *p += z.norm_sqr();
             }
         }
-        let points: Vec<_> = (2..SIDE / 2)
-            .map(|k| (libm::log(k as f64), libm::log(power[k])))
-            .collect();
+        let points: Vec<_> = (2..SIDE / 2).map(|k| (libm::log(k as f64), libm::log(power[k]))).collect();
         let n = points.len() as f64;
-        let mean = points
-            .iter()
-            .fold([0.0; 2], |m, p| [m[0] + p.0 / n, m[1] + p.1 / n]);
-        let slope = points
-            .iter()
-            .map(|p| (p.0 - mean[0]) * (p.1 - mean[1]))
-            .sum::<f64>()
-            / points
-                .iter()
-                .map(|p| (p.0 - mean[0]) * (p.0 - mean[0]))
-                .sum::<f64>();
+        let mean = points.iter().fold([0.0; 2], |m, p| [m[0] + p.0 / n, m[1] + p.1 / n]);
+        let slope = points.iter().map(|p| (p.0 - mean[0]) * (p.1 - mean[1])).sum::<f64>()
+            / points.iter().map(|p| (p.0 - mean[0]) * (p.0 - mean[0])).sum::<f64>();
         assert!((slope + exponent).abs() < 0.1, "{slope}");
     }
 }
@@ -221,21 +162,14 @@ fn periodic_fields_tile_and_padded_ones_do_not() {
     const SIDE: usize = 120;
     let spectrum = Spectrum::Gaussian { sigma_px: 6.0 };
     let seam = |padding| {
-        let field = SpectralField::new(&FieldParams {
-            width: SIDE,
-            height: SIDE,
-            spectrum,
-            padding,
-            ..FieldParams::default()
-        })
-        .unwrap();
+        let field =
+            SpectralField::new(&FieldParams { width: SIDE, height: SIDE, spectrum, padding, ..FieldParams::default() })
+                .unwrap();
         let mut rng = rng();
         let products: Vec<_> = (0..300)
             .map(|_| field.draw(&mut rng))
             .map(|f| {
-                let rows = f
-                    .chunks(SIDE)
-                    .map(|row| f64::from(row[0]) * f64::from(row[SIDE - 1]));
+                let rows = f.chunks(SIDE).map(|row| f64::from(row[0]) * f64::from(row[SIDE - 1]));
                 rows.sum::<f64>() / SIDE as f64
             })
             .collect();
@@ -246,10 +180,7 @@ fn periodic_fields_tile_and_padded_ones_do_not() {
     assert!((tiled - neighbour).abs() < 4.0 * error, "{tiled} ± {error}");
     for padding in [Padding::Decorrelated, Padding::Margin { px: 40 }] {
         let (apart, error) = seam(padding);
-        assert!(
-            apart.abs() < 0.01 + 4.0 * error,
-            "{padding:?}: {apart} ± {error}"
-        );
+        assert!(apart.abs() < 0.01 + 4.0 * error, "{padding:?}: {apart} ± {error}");
     }
 }
 
@@ -278,21 +209,11 @@ fn draw_into_overwrites_with_the_same_bits() {
 fn both_transforms_draw_the_same_field() {
     for spectrum in [Spectrum::BROWNIAN, matern(1.0, 4.0), GAUSSIAN] {
         let draw = |fft| {
-            let params = FieldParams {
-                width: 150,
-                height: 101,
-                spectrum,
-                fft,
-                ..FieldParams::default()
-            };
+            let params = FieldParams { width: 150, height: 101, spectrum, fft, ..FieldParams::default() };
             SpectralField::new(&params).unwrap().draw(&mut rng())
         };
         let (fastest, portable) = (draw(Fft::Fastest), draw(Fft::Portable));
-        let worst = fastest
-            .iter()
-            .zip(&portable)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f32::max);
+        let worst = fastest.iter().zip(&portable).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-4, "{worst}");
     }
 }
@@ -314,18 +235,13 @@ fn detrend(values: &mut [f64], at: &[[f64; 2]]) {
         for _ in 0..2 {
             for earlier in &basis {
                 let along = dot(earlier, &term);
-                term.iter_mut()
-                    .zip(earlier)
-                    .for_each(|(t, e)| *t -= along * e);
+                term.iter_mut().zip(earlier).for_each(|(t, e)| *t -= along * e);
             }
         }
         let norm = dot(&term, &term).sqrt();
         term.iter_mut().for_each(|t| *t /= norm);
         let along = dot(&term, values);
-        values
-            .iter_mut()
-            .zip(&term)
-            .for_each(|(v, t)| *v -= along * t);
+        values.iter_mut().zip(&term).for_each(|(v, t)| *v -= along * t);
         basis.push(term);
     }
 }
@@ -346,20 +262,14 @@ fn matern_field_looks_like_chromatin() {
             x * x + y * y < 1.0
         })
         .collect();
-    let at: Vec<_> = inside
-        .iter()
-        .map(|i| [offset(i % SIDE), offset(i / SIDE)])
-        .collect();
+    let at: Vec<_> = inside.iter().map(|i| [offset(i % SIDE), offset(i / SIDE)]).collect();
     let mut rng = rng();
     let mut sums = [0.0; 7];
     for _ in 0..300 {
         let draw = field.draw(&mut rng);
         let pixel = |i: usize| {
             let corner = i / SIDE * 4 * SIDE + i % SIDE * 2;
-            [0, 1, 2 * SIDE, 2 * SIDE + 1]
-                .map(|d| f64::from(draw[corner + d]))
-                .iter()
-                .sum::<f64>()
+            [0, 1, 2 * SIDE, 2 * SIDE + 1].map(|d| f64::from(draw[corner + d])).iter().sum::<f64>()
         };
         let mut values: Vec<_> = inside.iter().map(|&i| pixel(i)).collect();
         detrend(&mut values, &at);
@@ -376,15 +286,9 @@ fn matern_field_looks_like_chromatin() {
                 .collect();
             *sum = pairs.iter().sum::<f64>() / pairs.len() as f64;
         }
-        sums.iter_mut()
-            .zip(lags)
-            .for_each(|(s, l)| *s += l / lags[0] / 300.0);
+        sums.iter_mut().zip(lags).for_each(|(s, l)| *s += l / lags[0] / 300.0);
     }
-    let squares: f64 = MEASURED
-        .iter()
-        .zip(&sums[1..])
-        .map(|(m, s)| (m - s) * (m - s))
-        .sum();
+    let squares: f64 = MEASURED.iter().zip(&sums[1..]).map(|(m, s)| (m - s) * (m - s)).sum();
     let rmse = (squares / 6.0).sqrt();
     assert!(rmse < 0.02, "{sums:?}: {rmse}");
 }

@@ -87,7 +87,10 @@ impl Bench {
 
     /// When every file below a folder was written.
     pub(crate) fn times(&self, folder: &str) -> BTreeMap<String, SystemTime> {
-        self.walk(folder).into_iter().map(|(name, path)| (name, fs::metadata(path).unwrap().modified().unwrap())).collect()
+        self.walk(folder)
+            .into_iter()
+            .map(|(name, path)| (name, fs::metadata(path).unwrap().modified().unwrap()))
+            .collect()
     }
 
     fn walk(&self, folder: &str) -> Vec<(String, PathBuf)> {
@@ -113,7 +116,8 @@ impl Bench {
         let mut encoder = png::Encoder::new(file, width, height);
         encoder.set_color(png::ColorType::Grayscale);
         encoder.set_depth(png::BitDepth::Eight);
-        let pixels: Vec<u8> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| grey(x, y)).collect();
+        let pixels: Vec<u8> =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| grey(x, y)).collect();
         encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
     }
 }
@@ -130,9 +134,7 @@ pub(crate) fn outlines(count: usize, points: usize, radius_px: f64) -> String {
     for outline in 0..count {
         for k in 0..points {
             let angle = std::f64::consts::TAU * k as f64 / points as f64;
-            let lobes = 1.0
-                + 0.10 * sine(3.0 * angle + outline as f64)
-                + 0.05 * sine((2 + outline % 4) as f64 * angle);
+            let lobes = 1.0 + 0.10 * sine(3.0 * angle + outline as f64) + 0.05 * sine((2 + outline % 4) as f64 * angle);
             let (x, y) = (sine(angle + std::f64::consts::FRAC_PI_2), sine(angle));
             text.push_str(&format!("{outline},{k},{:.3},{:.3}\n", radius_px * lobes * x, radius_px * lobes * y));
         }

@@ -6,4 +6,4 @@ mod tiff;
 
 pub(crate) use ome::description;
 pub(crate) use png::{grey_png, rgb_png};
-pub(crate) use tiff::{PageWriter, Pixels, label_tiff};
+pub(crate) use tiff::{PageWriter, Pixels, compressed, label_tiff};

@@ -55,15 +55,21 @@ impl<W: Write + Seek> PageWriter<W> {
 
 /// A label image of 16 bits, or of 32 if a label needs them.
 pub(crate) fn label_tiff(ids: &[u32], width: usize, pixel_um: f64) -> TiffResult<Vec<u8>> {
+    if ids.iter().copied().max() > Some(u16::MAX.into()) {
+        return compressed(Pixels::U32(ids), width, pixel_um);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "the largest fits")]
+    let narrow: Vec<u16> = ids.iter().map(|&id| id as u16).collect();
+    compressed(Pixels::U16(&narrow), width, pixel_um)
+}
+
+/// One page of few different values, compressed: differences along a row are nearly all zero.
+pub(crate) fn compressed(pixels: Pixels, width: usize, pixel_um: f64) -> TiffResult<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
     let mut encoder = TiffEncoder::new(&mut out)?
         .with_compression(Compression::Deflate(DeflateLevel::Fast))
         .with_predictor(Predictor::Horizontal);
-    let narrow: Result<Vec<u16>, _> = ids.iter().map(|&id| u16::try_from(id)).collect();
-    match &narrow {
-        Ok(narrow) => page(&mut encoder, Pixels::U16(narrow), width, pixel_um, None)?,
-        Err(_) => page(&mut encoder, Pixels::U32(ids), width, pixel_um, None)?,
-    }
+    page(&mut encoder, pixels, width, pixel_um, None)?;
     Ok(out.into_inner())
 }
 

@@ -52,9 +52,10 @@ fn detrended(nucleus: &Measured) -> Vec<f64> {
     let (mx, my) = (mean(&|i| (i % width) as f64), mean(&|i| (i / width) as f64));
     let ma = mean(&|i| nucleus.absorbance[i]);
     let about = |i: usize| [(i % width) as f64 - mx, (i / width) as f64 - my, nucleus.absorbance[i] - ma];
-    let [xx, xy, yy, xa, ya] = inside.iter().map(|&i| about(i)).fold([0.0; 5], |s, [x, y, a]| {
-        [s[0] + x * x, s[1] + x * y, s[2] + y * y, s[3] + x * a, s[4] + y * a]
-    });
+    let [xx, xy, yy, xa, ya] = inside
+        .iter()
+        .map(|&i| about(i))
+        .fold([0.0; 5], |s, [x, y, a]| [s[0] + x * x, s[1] + x * y, s[2] + y * y, s[3] + x * a, s[4] + y * a]);
     let determinant = xx * yy - xy * xy;
     let (bx, by) = if determinant.abs() > 1e-9 {
         ((xa * yy - ya * xy) / determinant, (ya * xx - xa * xy) / determinant)

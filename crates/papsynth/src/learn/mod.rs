@@ -10,8 +10,8 @@ use fsd_shape::{ShapeModel, ShapeModelParams, Spread};
 use crate::error::Error;
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
 
-pub use nucleus::NucleusImage;
 use nucleus::Measured;
+pub use nucleus::NucleusImage;
 
 /// A point in pixels: x right, y down.
 pub type Point = [f64; 2];
@@ -88,7 +88,8 @@ pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<
         class.bethesda.clone_from(&params.bethesda);
     }
     if !material.cytoplasm_outlines.is_empty() {
-        let (shapes, radius) = shapes(material.cytoplasm_outlines, CYTOPLASM_HARMONICS, params.pixel_um, "cell").map_err(fail)?;
+        let (shapes, radius) =
+            shapes(material.cytoplasm_outlines, CYTOPLASM_HARMONICS, params.pixel_um, "cell").map_err(fail)?;
         class.cytoplasm.shapes = shapes;
         class.cytoplasm.radius_um = radius;
         note("outlines of cells", material.cytoplasm_outlines.len());
@@ -142,8 +143,7 @@ fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnPar
     chromatin.rim_to_centre = nucleus::mean_profile(measured).into_iter().map(rounded).collect();
     let pixels: usize = measured.iter().map(|m| m.absorbance.iter().filter(|a| !a.is_nan()).count()).sum();
     let area_um2 = pixels as f64 / measured.len() as f64 * params.pixel_um * params.pixel_um;
-    let (nu, length_um) =
-        chromatin::fit_matern(&chromatin::mean_autocorrelation(measured), params.pixel_um, area_um2);
+    let (nu, length_um) = chromatin::fit_matern(&chromatin::mean_autocorrelation(measured), params.pixel_um, area_um2);
     chromatin.nu = nu;
     chromatin.length_um = rounded(length_um);
     nucleus.donors = match params.donors {

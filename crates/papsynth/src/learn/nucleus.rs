@@ -35,7 +35,7 @@ pub(super) struct Measured {
 }
 
 impl NucleusImage {
-    /// Measures absorbance inside the mask against the surroundings of the nucleus.
+    /// Measures absorbance inside the mask against the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
     pub(super) fn measure(&self) -> Result<Measured, String> {
         /// Points of a traced outline.
         const POINTS: usize = 64;
@@ -46,7 +46,7 @@ impl NucleusImage {
         /// Pixels of surroundings that a median can be trusted with.
         const FEWEST: usize = 12;
         let fail = |message: String| format!("{}: {message}", self.name);
-        if self.width == 0 || self.light.len() != self.mask.len() || self.light.len() % self.width != 0 {
+        if self.width == 0 || self.light.len() != self.mask.len() || !self.light.len().is_multiple_of(self.width) {
             return Err(fail(format!(
                 "its image has {} pixels, its mask {}; expected as many, in rows of {}",
                 self.light.len(),
@@ -72,7 +72,7 @@ impl NucleusImage {
         if surroundings <= 0.0 {
             return Err(fail("its surroundings are black".to_owned()));
         }
-        // Eq. 11 against the surroundings; black pixels count as half a step of the darkest light seen.
+        // Eq. 11: A = −log₁₀(I₁/I₀) against the surroundings; black pixels count as half a step of the darkest light seen.
         let floor = surroundings / 512.0;
         let absorbance: Vec<f64> = (0..self.light.len())
             .map(|i| {
@@ -121,7 +121,10 @@ fn profile(absorbance: &[f64], distance: &[f64], mean: f64) -> [f64; PROFILE] {
 /// The profile of a class, relative to its mean absorbance.
 pub(super) fn mean_profile(measured: &[Measured]) -> Vec<f64> {
     let mean: f64 = measured.iter().map(|m| m.mean).sum();
-    (0..PROFILE).map(|step| measured.iter().map(|m| m.profile[step]).sum::<f64>() / mean.max(1e-9)).map(|v| v.max(0.0)).collect()
+    (0..PROFILE)
+        .map(|step| measured.iter().map(|m| m.profile[step]).sum::<f64>() / mean.max(1e-9))
+        .map(|v| v.max(0.0))
+        .collect()
 }
 
 impl Measured {

@@ -27,11 +27,14 @@ const GRANULE: f64 = 0.75;
 const SKEW: f64 = 0.45;
 
 /// Makes cells, sixteen sheets at a time.
-pub(super) fn make(studio: &Studio, scene: &Scene, pools: &Pools, cells: &[(&Object, &CellBody)]) -> Result<Vec<Phantom>, String> {
-    let plans = cells
-        .iter()
-        .map(|(object, body)| Plan::new(studio, scene, object, body))
-        .collect::<Result<Vec<_>, _>>()?;
+pub(super) fn make(
+    studio: &Studio,
+    scene: &Scene,
+    pools: &Pools,
+    cells: &[(&Object, &CellBody)],
+) -> Result<Vec<Phantom>, String> {
+    let plans =
+        cells.iter().map(|(object, body)| Plan::new(studio, scene, object, body)).collect::<Result<Vec<_>, _>>()?;
     let sheets = crumple(studio, scene, cells, &plans)?;
     cells
         .iter()
@@ -77,10 +80,8 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
     let nucleus_radius = body.nucleus.radius_um / scene.view.pixel_um;
     let crease = |direction: f64| {
         let normal = [libm::cos(direction), libm::sin(direction)];
-        let reach = outline
-            .iter()
-            .map(|p| (p[0] - centre[0]) * normal[0] + (p[1] - centre[1]) * normal[1])
-            .fold(0.0, f64::max);
+        let reach =
+            outline.iter().map(|p| (p[0] - centre[0]) * normal[0] + (p[1] - centre[1]) * normal[1]).fold(0.0, f64::max);
         // The crease passes clear of the nucleus, which is too stiff to fold.
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
         let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
@@ -103,13 +104,20 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
     }
     match fold.form {
         // The second side is never turned in quite parallel to the first.
-        FoldForm::Cigar => vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))],
+        FoldForm::Cigar => {
+            vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))]
+        }
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
     }
 }
 
 /// Presses the sheets of all cells, those with meshes of the same excess together.
-fn crumple(studio: &Studio, scene: &Scene, cells: &[(&Object, &CellBody)], plans: &[Plan]) -> Result<Vec<Option<Sheet>>, String> {
+fn crumple(
+    studio: &Studio,
+    scene: &Scene,
+    cells: &[(&Object, &CellBody)],
+    plans: &[Plan],
+) -> Result<Vec<Option<Sheet>>, String> {
     let mut sheets: Vec<Option<Sheet>> = plans.iter().map(|_| None).collect();
     let choice: Vec<usize> = cells.iter().map(|(_, body)| studio.cloth(body.detail.excess)).collect();
     for (index, (_, cloth)) in studio.cloths.iter().enumerate() {
@@ -124,6 +132,8 @@ fn crumple(studio: &Studio, scene: &Scene, cells: &[(&Object, &CellBody)], plans
     Ok(sheets)
 }
 
+/// Presses, folds and stains a cell. Its absorbance is that of a dye along the light's path (Eq. 12): A = κ·c·l, where
+/// l is the sheet's thickness and κ·c the cell's stain.
 fn finish(
     studio: &Studio,
     scene: &Scene,
@@ -155,7 +165,9 @@ fn finish(
                 sheet.fold(crease).map_err(|e| e.to_string())?;
             }
             let view = View { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel: 1.0 };
-            sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| interpolate(profile, 1.0 - radius));
+            sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
+                interpolate(profile, 1.0 - radius)
+            });
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
@@ -165,6 +177,7 @@ fn finish(
     }
     add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     for (value, cover) in absorbance.values.iter_mut().zip(&coverage.values) {
+        // Eq. 12: A = κ·c·l.
         *value *= cover * body.cytoplasm_absorbance as f32;
     }
     let area_px = coverage.values.iter().map(|v| f64::from(*v)).sum();
@@ -208,7 +221,9 @@ fn roughened(outline: &[Point], depth_px: f64, rng: &mut Stream) -> Vec<Point> {
     let fine = fsd_shape::resample(outline, count);
     // Slow waves say where the rim is frayed, quick ones how: a first-order autoregression of either.
     let (mut slow, mut quick) = (random::normal(rng), random::normal(rng));
-    let step = |state: f64, memory: f64, rng: &mut Stream| memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng);
+    let step = |state: f64, memory: f64, rng: &mut Stream| {
+        memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
+    };
     (0..count)
         .map(|i| {
             slow = step(slow, 0.985, rng);
@@ -231,27 +246,44 @@ fn add_detail(absorbance: &mut Tile, coverage: &Tile, body: &CellBody, pools: &P
     let threshold = pools.flecks.quantile(detail.flecks_threshold);
     let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
     let width = absorbance.width;
-    let mut factor = vec![1.0_f32; width];
+    let mut buffers = vec![0.0_f32; 2 * width];
     let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
     for (y, (row, cover)) in rows.enumerate() {
-        let inside = |share: &f32| *share > 0.0;
-        let (Some(first), Some(last)) = (cover.iter().position(inside), cover.iter().rposition(inside)) else { continue };
-        let (at, row) = ([first as f64, y as f64], &mut row[first..=last]);
-        let factor = &mut factor[..row.len()];
+        let Some((first, end)) = covered(cover) else { continue };
+        let (at, row) = ([first as f64, y as f64], &mut row[first..end]);
+        let (factor, field) = buffers.split_at_mut(width);
+        let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
         factor.fill(1.0);
         if cloud > 0.0 {
-            pools.clouds.row(&clouds, at, row.len(), |x, v| factor[x] += cloud * v);
+            pools.clouds.row_into(field, &clouds, at);
+            add_above(factor, field, cloud, f32::NEG_INFINITY);
         }
         if fleck > 0.0 {
-            pools.flecks.row(&flecks, at, row.len(), |x, v| factor[x] += fleck * (v - threshold).max(0.0));
+            pools.flecks.row_into(field, &flecks, at);
+            field.iter_mut().for_each(|value| *value -= threshold);
+            add_above(factor, field, fleck, 0.0);
         }
         if grainy > 0.0 {
-            pools.grain.row(&grain, at, row.len(), |x, v| factor[x] += grainy * v);
+            pools.grain.row_into(field, &grain, at);
+            add_above(factor, field, grainy, f32::NEG_INFINITY);
         }
         for (value, factor) in row.iter_mut().zip(factor) {
             *value *= factor.max(0.0);
         }
     }
+}
+
+/// Adds what of a field lies above a value, that value elsewhere.
+fn add_above(factor: &mut [f32], field: &[f32], strength: f32, least: f32) {
+    for (factor, value) in factor.iter_mut().zip(field) {
+        *factor += strength * value.max(least);
+    }
+}
+
+/// From the first pixel of a row with a share to behind the last.
+fn covered(row: &[f32]) -> Option<(usize, usize)> {
+    let inside = |share: &f32| *share > 0.0;
+    Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
 }
 
 /// The third level of detail.

@@ -48,7 +48,9 @@ impl Donors {
             Some(first) => {
                 let same = nucleus.donors.iter().all(|d| (d.pixel_um - first.pixel_um).abs() < 1e-6);
                 if !same {
-                    return Err(format!("classes.{name}.nucleus.donors: their pixels differ in size; expected one size"));
+                    return Err(format!(
+                        "classes.{name}.nucleus.donors: their pixels differ in size; expected one size"
+                    ));
                 }
                 (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
@@ -70,7 +72,8 @@ impl Donors {
         params: &QuiltParams,
         rng: &mut Stream,
     ) -> Result<Vec<f32>, String> {
-        let chosen: Vec<&Source> = choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
+        let chosen: Vec<&Source> =
+            choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
         let quilter = Quilter::new(&chosen, params).map_err(|e| e.to_string())?;
         let grid = Grid::new(coverage, pixel_um / self.pixel_um);
         let texture = quilter.synthesise(&grid.mask, grid.width, rng);
@@ -109,10 +112,17 @@ fn learned(donor: &Donor) -> Result<Source, String> {
 }
 
 /// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
-fn made(name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel, field: &FieldSource) -> Result<Source, String> {
+fn made(
+    name: &str,
+    index: u64,
+    nucleus: &NucleusStatistics,
+    shapes: &ShapeModel,
+    field: &FieldSource,
+) -> Result<Source, String> {
     // Donors belong to the model, not to an image: their key is the same for every data set.
     let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
-    let radius = nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
+    let radius =
+        nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
     /// Smallest donor worth taking patches from, px.
     const SMALLEST: f64 = 9.0;
     let drawn = shapes.draw(radius.max(SMALLEST), &mut rng).map_err(|e| e.to_string())?;
@@ -172,7 +182,11 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
     let height = mask.len() / width;
     let mut depth: Vec<f64> = mask.iter().map(|m| if *m >= 0.5 { f64::INFINITY } else { 0.0 }).collect();
     let get = |depth: &[f64], x: i64, y: i64| {
-        if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 { 0.0 } else { depth[y as usize * width + x as usize] }
+        if x < 0 || y < 0 || x >= width as i64 || y >= height as i64 {
+            0.0
+        } else {
+            depth[y as usize * width + x as usize]
+        }
     };
     let relax = |depth: &mut Vec<f64>, x: i64, y: i64, neighbours: [(i64, i64, f64); 4]| {
         let at = y as usize * width + x as usize;
@@ -224,7 +238,9 @@ fn blur_attenuation(chromatin: &ChromatinStatistics) -> f64 {
     for step in 0..STEPS {
         let f = HIGHEST * (step as f64 + 0.5) / STEPS as f64;
         let power = spectrum.density(f) * f;
-        let transfer = libm::exp(-2.0 * (core::f64::consts::PI * MEASURED_SIGMA_UM * f) * (core::f64::consts::PI * MEASURED_SIGMA_UM * f));
+        let transfer = libm::exp(
+            -2.0 * (core::f64::consts::PI * MEASURED_SIGMA_UM * f) * (core::f64::consts::PI * MEASURED_SIGMA_UM * f),
+        );
         all += power;
         passed += power * transfer * transfer;
     }
@@ -271,7 +287,8 @@ impl Grid {
         for y in 0..coverage.height() {
             for x in 0..coverage.width {
                 let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
-                let (x0, y0) = (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
+                let (x0, y0) =
+                    (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
                 let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
                 let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
                 let at = |x: usize, y: usize| texture[y * self.width + x];
@@ -301,7 +318,8 @@ mod tests {
 
     #[test]
     fn depth_grows_from_the_rim() {
-        let mask: Vec<f32> = (0..81).map(|i| if (1..8).contains(&(i % 9)) && (1..8).contains(&(i / 9)) { 1.0 } else { 0.0 }).collect();
+        let mask: Vec<f32> =
+            (0..81).map(|i| if (1..8).contains(&(i % 9)) && (1..8).contains(&(i / 9)) { 1.0 } else { 0.0 }).collect();
         let depth = depth_from_rim(&mask, 9);
         assert_eq!(depth[4 * 9 + 4], 1.0);
         assert_eq!(depth[0], 0.0);

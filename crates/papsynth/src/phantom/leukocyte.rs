@@ -45,8 +45,7 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
             })
             .collect()
     };
-    let body = (halo >= FAINTEST_HALO)
-        .then(|| place(wobbled_circle(radius * HALO, 0.10, 0.10, &mut rng), [0.0, 0.0]));
+    let body = (halo >= FAINTEST_HALO).then(|| place(wobbled_circle(radius * HALO, 0.10, 0.10, &mut rng), [0.0, 0.0]));
     let mut nucleus = Tile::around(shapes.iter().chain(&body).flatten(), 2.0);
     let mut coverage = nucleus.blank();
     for shape in &shapes {

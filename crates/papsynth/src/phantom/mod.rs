@@ -76,6 +76,9 @@ pub(crate) const BATCH: usize = 16;
 impl Phantom {
     /// A phantom without parts of its own.
     fn whole(absorbance: Tile, coverage: Tile, area_px: f64) -> Self {
-        Self { pieces: vec![Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false }], traits: Vec::new() }
+        Self {
+            pieces: vec![Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false }],
+            traits: Vec::new(),
+        }
     }
 }

@@ -50,8 +50,10 @@ pub(super) fn make(
     coverage.cover(&outline);
     let mut inner = coverage.blank();
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
-    let inside: Vec<Point> =
-        outline.iter().map(|p| [centre[0] + shrink * (p[0] - centre[0]), centre[1] + shrink * (p[1] - centre[1])]).collect();
+    let inside: Vec<Point> = outline
+        .iter()
+        .map(|p| [centre[0] + shrink * (p[0] - centre[0]), centre[1] + shrink * (p[1] - centre[1])])
+        .collect();
     inner.cover(&inside);
 
     let mut rng = scene.key.stream("cell", object.number, "nucleus.texture");
@@ -86,7 +88,8 @@ fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut crate::key::Stream) {
         let angle = libm::atan2(point[1], point[0]);
         let length = (point[0] * point[0] + point[1] * point[1]).sqrt();
         // The absolute value gives notches a corner and leaves bulges round, as a wrinkled membrane has them.
-        let push: f64 = waves.iter().map(|[h, a, phase]| -a.abs() * (libm::cos(h * angle + phase)).abs() + 0.6 * a.abs()).sum();
+        let push: f64 =
+            waves.iter().map(|[h, a, phase]| -a.abs() * (libm::cos(h * angle + phase)).abs() + 0.6 * a.abs()).sum();
         let scale = ((length + push) / length.max(1e-9)).clamp(0.5, 1.5);
         point[0] *= scale;
         point[1] *= scale;

@@ -1,4 +1,4 @@
-//! Random fields that the cells of one image share, each cell looking at another place of them at another angle.
+//! Random fields that the cells of one image share, each cell looking at another place of them, mirrored or not.
 
 use rand_core::Rng;
 use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
@@ -43,12 +43,20 @@ pub(crate) struct Pool {
     ranked: Vec<f32>,
 }
 
-/// Where and at which angle one cell looks at a pool.
+/// Where one cell looks at a pool, and in which of its four mirror images.
+///
+/// Looks run along the pool's rows, not at an angle: the fields have no direction of their own, and a row of pixels then
+/// needs two rows of texels only.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Look {
     origin: Point,
-    across: Point,
+    /// Texels from a pixel to the next one on the right, and to the one below; negative where mirrored.
+    step: Point,
 }
+
+/// Where between texels looks lie that step from texel to texel: f with 2f(1 − f) = ⅓, the mean of all f from 0 to 1, so
+/// that interpolation leaves every cell the variance that it leaves on average.
+const BETWEEN: f64 = 0.211_324_865_405_187_1;
 
 impl PoolMaker {
     pub(crate) fn new(fft: Fft) -> Result<Self, String> {
@@ -75,14 +83,13 @@ impl PoolMaker {
 }
 
 impl Look {
-    /// A random place and angle, with texels of `texel_px` pixels.
+    /// A random place and mirror image, with texels of `texel_px` pixels.
     pub(crate) fn new<R: Rng + ?Sized>(texel_px: f64, rng: &mut R) -> Self {
-        let angle = random::direction(rng);
-        let step = 1.0 / texel_px;
-        Self {
-            origin: [random::between(0.0, SIDE as f64, rng), random::between(0.0, SIDE as f64, rng)],
-            across: [step * libm::cos(angle), step * libm::sin(angle)],
-        }
+        let mut texel = || random::below(SIDE, rng) as f64 + BETWEEN;
+        let origin = [texel(), texel()];
+        let mirrored = random::below(4, rng);
+        let step = |bit: usize| if mirrored & bit == 0 { 1.0 / texel_px } else { -1.0 / texel_px };
+        Self { origin, step: [step(1), step(2)] }
     }
 
     /// For flecks and grain, whose texels have a size of their own.
@@ -112,29 +119,56 @@ impl Pool {
         self.ranked.get(rank).copied().unwrap_or(0.0)
     }
 
-    /// Visits a row of a tile: the field at each pixel, by linear interpolation.
-    pub(crate) fn row(&self, look: &Look, first: Point, count: usize, mut visit: impl FnMut(usize, f32)) {
-        /// Positions are kept in 2⁻¹⁶ texels: whole numbers wrap without rounding.
-        const ONE: f64 = 65_536.0;
-        const MASK: u32 = SIDE as u32 - 1;
-        let [ax, ay] = look.across;
-        let x = look.origin[0] + first[0] * ax - first[1] * ay;
-        let y = look.origin[1] + first[0] * ay + first[1] * ax;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wraps on purpose")]
-        let fixed = |value: f64| (value * ONE).floor() as i64 as u32;
-        let (mut x, mut y, dx, dy) = (fixed(x), fixed(y), fixed(ax), fixed(ay));
-        for column in 0..count {
-            let fraction = |value: u32| (value & 0xffff) as f32 * (1.0 / 65_536.0);
-            let (fx, fy) = (fraction(x), fraction(y));
-            let (x0, y0) = ((x >> 16 & MASK) as usize, (y >> 16 & MASK) as usize);
-            let (x1, y1) = ((x0 + 1) & MASK as usize, (y0 + 1) & MASK as usize);
-            let at = |x: usize, y: usize| self.values[y * SIDE + x];
-            let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
-            let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
-            visit(column, upper + fy * (lower - upper));
-            x = x.wrapping_add(dx);
-            y = y.wrapping_add(dy);
-        }
+    /// A row of a tile, the pixel at `first` and those right of it: the field at each, by linear interpolation.
+    pub(crate) fn row_into(&self, row: &mut [f32], look: &Look, first: Point) {
+        let x = fixed(look.origin[0] + first[0] * look.step[0]);
+        let y = fixed(look.origin[1] + first[1] * look.step[1]);
+        let upper = wrapped(y) * SIDE;
+        let lower = wrapped(y.wrapping_add(ONE)) * SIDE;
+        let mut texels = [0.0; SIDE + 1];
+        between(&mut texels, &self.values[upper..upper + SIDE], &self.values[lower..lower + SIDE], fraction(y));
+        sample(row, &texels, x, fixed(look.step[0]));
+    }
+}
+
+/// Positions are kept in 2⁻¹⁶ texels: whole numbers wrap without rounding.
+const ONE: u32 = 1 << 16;
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wraps on purpose")]
+fn fixed(texels: f64) -> u32 {
+    (texels * f64::from(ONE)).floor() as i64 as u32
+}
+
+/// The texel that a position lies in, within the pool.
+#[inline(always)]
+fn wrapped(position: u32) -> usize {
+    (position >> 16) as usize % SIDE
+}
+
+/// How far into its texel a position lies.
+#[inline(always)]
+fn fraction(position: u32) -> f32 {
+    (position % ONE) as f32 * (1.0 / ONE as f32)
+}
+
+/// Blends two rows of texels; the first stands once more behind the last.
+#[multiversion::multiversion(targets = "simd")]
+fn between(texels: &mut [f32; SIDE + 1], upper: &[f32], lower: &[f32], share: f32) {
+    for ((texel, upper), lower) in texels.iter_mut().zip(upper).zip(lower) {
+        *texel = upper + share * (lower - upper);
+    }
+    texels[SIDE] = texels[0];
+}
+
+/// Interpolates in a row of texels at even steps.
+#[multiversion::multiversion(targets = "simd")]
+fn sample(row: &mut [f32], texels: &[f32; SIDE + 1], first: u32, step: u32) {
+    let mut position = first;
+    for value in row {
+        let (texel, share) = (wrapped(position), fraction(position));
+        let left = texels[texel];
+        *value = left + share * (texels[texel + 1] - left);
+        position = position.wrapping_add(step);
     }
 }
 
@@ -146,12 +180,22 @@ mod tests {
     fn a_look_reads_the_field_and_wraps() {
         let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE) as f32).collect();
         let pool = Pool::new(values);
-        let look = Look { origin: [510.25, 3.0], across: [1.0, 0.0] };
-        let mut seen = Vec::new();
-        pool.row(&look, [0.0, 0.0], 4, |_, v| seen.push(v));
+        let look = Look { origin: [510.25, 3.0], step: [1.0, 1.0] };
+        let mut seen = [0.0; 4];
+        pool.row_into(&mut seen, &look, [0.0, 0.0]);
         assert_eq!(seen[0], 510.25);
         assert_eq!(seen[1], 511.0 + 0.25 * (0.0 - 511.0), "between the last column and the first");
         assert_eq!(seen[2], 0.25);
         assert!((pool.quantile(0.5) - 256.0).abs() < 8.0);
+    }
+
+    #[test]
+    fn a_mirrored_look_reads_backwards_and_rows_follow_each_other() {
+        let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE + 1000 * (i / SIDE)) as f32).collect();
+        let pool = Pool::new(values);
+        let look = Look { origin: [1.5, 2.0], step: [-0.5, 0.25] };
+        let mut seen = [0.0; 3];
+        pool.row_into(&mut seen, &look, [1.0, 2.0]);
+        assert_eq!(seen, [2501.0, 2500.5, 2500.0]);
     }
 }

@@ -43,8 +43,6 @@ impl Tile {
         self.values.len() / self.width
     }
 
-    /// The position of a pixel's centre in the large image.
-
     /// Applies a function of position to every pixel.
     pub(crate) fn for_each(&mut self, mut visit: impl FnMut(Point, &mut f32)) {
         let (width, [x0, y0]) = (self.width, self.origin);
@@ -88,7 +86,12 @@ pub(crate) fn add_tile(image: &mut [f32], width: usize, height: usize, origin: [
 }
 
 /// The columns and rows of a tile that lie within an image.
-fn overlap(width: usize, height: usize, origin: [i64; 2], tile: &Tile) -> Option<(core::ops::Range<usize>, core::ops::Range<usize>)> {
+fn overlap(
+    width: usize,
+    height: usize,
+    origin: [i64; 2],
+    tile: &Tile,
+) -> Option<(core::ops::Range<usize>, core::ops::Range<usize>)> {
     let span = |axis: usize, length: usize, whole: usize| {
         let first = (origin[axis] - tile.origin[axis]).max(0);
         let last = (origin[axis] + whole as i64 - tile.origin[axis]).min(length as i64);
@@ -127,7 +130,8 @@ mod tests {
             x += p[0] * f64::from(*v);
             y += p[1] * f64::from(*v);
         });
-        assert!((x / sum + 3.3).abs() < 1e-3 && (y / sum - 17.8).abs() < 1e-3, "pixel centres at whole numbers");
+        // A pixel covered in part counts at its centre: right to a hundredth, where a shifted grid would be off by a half.
+        assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres at whole numbers");
     }
 
     #[test]

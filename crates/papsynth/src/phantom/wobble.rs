@@ -22,6 +22,7 @@ pub(crate) fn wobbled_circle<R: Rng + ?Sized>(radius: f64, alpha: f64, beta: f64
             let theta = core::f64::consts::TAU * i as f64 / CORNERS as f64;
             let [tx, ty] = [random::between(-beta, beta, rng), random::between(-beta, beta, rng)];
             let [ax, ay] = [random::between(-alpha, alpha, rng), random::between(-alpha, alpha, rng)];
+            // Eq. 7: s·[U(−α, α) + cos(θᵢ + U(−β, β))], and the same with the sine.
             [radius * (ax + libm::cos(theta + tx)), radius * (ay + libm::sin(theta + ty))]
         })
         .collect();
@@ -47,7 +48,15 @@ pub(crate) fn smooth(corners: &[Point], between: usize) -> Vec<Point> {
 }
 
 /// Fills what a tile covers with an absorbance that Perlin noise varies, with cells of `cell_px` pixels about `centre`.
-pub(crate) fn textured(tile: &mut Tile, centre: Point, cell_px: f64, octaves: usize, strength: f32, absorbance: f64, key: u64) {
+pub(crate) fn textured(
+    tile: &mut Tile,
+    centre: Point,
+    cell_px: f64,
+    octaves: usize,
+    strength: f32,
+    absorbance: f64,
+    key: u64,
+) {
     let Ok(noise) = Fractal::new(&FractalParams { octaves, ..FractalParams::default() }, key) else { return };
     let step = 1.0 / cell_px;
     let window = Window { origin: [-centre[0] * step, -centre[1] * step], step, first: tile.origin };

@@ -45,7 +45,10 @@ pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
     if recipe.version != RECIPE_VERSION {
         check.problems.push(Problem {
             field: "version".to_owned(),
-            message: format!("{} is not a version of recipes that is known here; expected {RECIPE_VERSION}", recipe.version),
+            message: format!(
+                "{} is not a version of recipes that is known here; expected {RECIPE_VERSION}",
+                recipe.version
+            ),
         });
     }
     imaging(recipe, &mut check);
@@ -57,11 +60,14 @@ pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
 
 fn imaging(recipe: &Recipe, check: &mut Check) {
     let Recipe { field, focus, background, optics, camera, .. } = recipe;
-    check.numbers("field", &[
-        ("width_px", &field.width_px, 16.0, 32_768.0),
-        ("height_px", &field.height_px, 16.0, 32_768.0),
-        ("pixel_um", &field.pixel_um, 0.05, 4.0),
-    ]);
+    check.numbers(
+        "field",
+        &[
+            ("width_px", &field.width_px, 16.0, 32_768.0),
+            ("height_px", &field.height_px, 16.0, 32_768.0),
+            ("pixel_um", &field.pixel_um, 0.05, 4.0),
+        ],
+    );
     let [_, width] = field.width_px.bounds();
     let [_, height] = field.height_px.bounds();
     if width * height > MAX_PIXELS {
@@ -70,42 +76,53 @@ fn imaging(recipe: &Recipe, check: &mut Check) {
             message: format!("{width} x {height} pixels are more than the {MAX_PIXELS} that an image may have"),
         });
     }
-    check.numbers("focus", &[
-        ("planes", &focus.planes, 1.0, 1024.0),
-        ("step_um", &focus.step_um, 1e-3, 100.0),
-        ("centre_um", &focus.centre_um, -1000.0, 1000.0),
-    ]);
-    check.numbers("background", &[
-        ("level", &background.level, 0.01, 1.0),
-        ("scatter", &background.scatter, 0.0, 0.5),
-        ("scatter_um", &background.scatter_um, 1.0, 10_000.0),
-    ]);
+    check.numbers(
+        "focus",
+        &[
+            ("planes", &focus.planes, 1.0, 1024.0),
+            ("step_um", &focus.step_um, 1e-3, 100.0),
+            ("centre_um", &focus.centre_um, -1000.0, 1000.0),
+        ],
+    );
+    check.numbers(
+        "background",
+        &[
+            ("level", &background.level, 0.01, 1.0),
+            ("scatter", &background.scatter, 0.0, 0.5),
+            ("scatter_um", &background.scatter_um, 1.0, 10_000.0),
+        ],
+    );
     match &background.illumination {
         Illumination::Border { exponent } => check.number("background.illumination.exponent", exponent, 0.0, 2.0),
-        Illumination::Bowl { x2, y2, off_centre } => check.numbers("background.illumination", &[
-            ("x2", x2, 0.0, 0.45),
-            ("y2", y2, 0.0, 0.45),
-            ("off_centre", off_centre, 0.0, 0.9),
-        ]),
+        Illumination::Bowl { x2, y2, off_centre } => check.numbers(
+            "background.illumination",
+            &[("x2", x2, 0.0, 0.45), ("y2", y2, 0.0, 0.45), ("off_centre", off_centre, 0.0, 0.9)],
+        ),
     }
     // Eq. 10 takes the logarithm of H − c·I_pe, which must stay above zero.
     let ([level, _], [_, scatter]) = (background.level.bounds(), background.scatter.bounds());
     if scatter >= level {
         check.problems.push(Problem {
             field: "background.scatter".to_owned(),
-            message: format!("{} takes more light than `background.level` = {} leaves; expected less than {level}", background.scatter, background.level),
+            message: format!(
+                "{} takes more light than `background.level` = {} leaves; expected less than {level}",
+                background.scatter, background.level
+            ),
         });
     }
-    check.numbers("optics", &[
-        ("sigma_xy_um", &optics.sigma_xy_um, 0.0, 20.0),
-        ("sigma_z_um_per_um", &optics.sigma_z_um_per_um, 0.0, 10.0),
-    ]);
-    check.numbers("camera", &[
-        ("bits", &camera.bits, 8.0, 16.0),
-        ("full_well_e", &camera.full_well_e, 10.0, 1e7),
-        ("read_noise_e", &camera.read_noise_e, 0.0, 1e5),
-        ("offset_dn", &camera.offset_dn, 0.0, 4096.0),
-    ]);
+    check.numbers(
+        "optics",
+        &[("sigma_xy_um", &optics.sigma_xy_um, 0.0, 20.0), ("sigma_z_um_per_um", &optics.sigma_z_um_per_um, 0.0, 10.0)],
+    );
+    check.numbers(
+        "camera",
+        &[
+            ("bits", &camera.bits, 8.0, 16.0),
+            ("full_well_e", &camera.full_well_e, 10.0, 1e7),
+            ("read_noise_e", &camera.read_noise_e, 0.0, 1e5),
+            ("offset_dn", &camera.offset_dn, 0.0, 4096.0),
+        ],
+    );
     let [bits, _] = camera.bits.bounds();
     let [_, offset] = camera.offset_dn.bounds();
     if offset >= libm::exp2(bits) / 2.0 {
@@ -118,20 +135,22 @@ fn imaging(recipe: &Recipe, check: &mut Check) {
 
 fn layout(recipe: &Recipe, check: &mut Check) {
     let slide = &recipe.slide;
-    check.numbers("slide", &[
-        ("depth_um", &slide.depth_um, 0.0, 1000.0),
-        ("relief_um", &slide.relief_um, 1.0, 10_000.0),
-        ("median_um", &slide.median_um, 0.0, 1000.0),
-        ("stacking_um", &slide.stacking_um, 0.0, 100.0),
-        ("spacing_um", &slide.spacing_um, 0.0, 1000.0),
-    ]);
+    check.numbers(
+        "slide",
+        &[
+            ("depth_um", &slide.depth_um, 0.0, 1000.0),
+            ("relief_um", &slide.relief_um, 1.0, 10_000.0),
+            ("median_um", &slide.median_um, 0.0, 1000.0),
+            ("stacking_um", &slide.stacking_um, 0.0, 100.0),
+            ("spacing_um", &slide.spacing_um, 0.0, 1000.0),
+        ],
+    );
     match &recipe.layout {
         Layout::Uniform {} | Layout::Map { .. } => {}
-        Layout::Clusters { count, radius_um, outside } => check.numbers("layout", &[
-            ("count", count, 1.0, 1e4),
-            ("radius_um", radius_um, 1.0, 1e4),
-            ("outside", outside, 0.0, 1.0),
-        ]),
+        Layout::Clusters { count, radius_um, outside } => check.numbers(
+            "layout",
+            &[("count", count, 1.0, 1e4), ("radius_um", radius_um, 1.0, 1e4), ("outside", outside, 0.0, 1.0)],
+        ),
         Layout::Swath { width_um, outside } => {
             check.numbers("layout", &[("width_um", width_um, 1.0, 1e4), ("outside", outside, 0.0, 1.0)]);
         }
@@ -141,100 +160,132 @@ fn layout(recipe: &Recipe, check: &mut Check) {
 
 fn cells(recipe: &Recipe, check: &mut Check) {
     for (class, mix) in &recipe.cells {
-        check.numbers(&format!("cells.{class}"), &[
-            ("count", &mix.count, 0.0, 1e5),
-            ("size", &mix.size, 0.1, 10.0),
-            ("cytoplasm_stain", &mix.cytoplasm_stain, 0.0, 20.0),
-            ("nucleus_stain", &mix.nucleus_stain, 0.0, 20.0),
-        ]);
+        check.numbers(
+            &format!("cells.{class}"),
+            &[
+                ("count", &mix.count, 0.0, 1e5),
+                ("size", &mix.size, 0.1, 10.0),
+                ("cytoplasm_stain", &mix.cytoplasm_stain, 0.0, 20.0),
+                ("nucleus_stain", &mix.nucleus_stain, 0.0, 20.0),
+            ],
+        );
     }
     let cytoplasm = &recipe.cytoplasm;
-    check.numbers("cytoplasm", &[
-        ("excess", &cytoplasm.excess, 1.0, 2.0),
-        ("clouds", &cytoplasm.clouds, 0.0, 2.0),
-        ("clouds_um", &cytoplasm.clouds_um, 0.1, 100.0),
-        ("flecks", &cytoplasm.flecks, 0.0, 5.0),
-        ("flecks_threshold", &cytoplasm.flecks_threshold, 0.0, 0.999),
-        ("cytoskeleton", &cytoplasm.cytoskeleton, 0.0, 2.0),
-        ("grain", &cytoplasm.grain, 0.0, 2.0),
-        ("granular", &cytoplasm.granular, 0.0, 1.0),
-        ("granules", &cytoplasm.granules, 0.0, 1000.0),
-        ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
-    ]);
+    check.numbers(
+        "cytoplasm",
+        &[
+            ("excess", &cytoplasm.excess, 1.0, 2.0),
+            ("clouds", &cytoplasm.clouds, 0.0, 2.0),
+            ("clouds_um", &cytoplasm.clouds_um, 0.1, 100.0),
+            ("flecks", &cytoplasm.flecks, 0.0, 5.0),
+            ("flecks_threshold", &cytoplasm.flecks_threshold, 0.0, 0.999),
+            ("cytoskeleton", &cytoplasm.cytoskeleton, 0.0, 2.0),
+            ("grain", &cytoplasm.grain, 0.0, 2.0),
+            ("granular", &cytoplasm.granular, 0.0, 1.0),
+            ("granules", &cytoplasm.granules, 0.0, 1000.0),
+            ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
+        ],
+    );
     let folds = &cytoplasm.folds;
-    check.numbers("cytoplasm.folds", &[
-        ("flap", &folds.flap, 0.0, 1.0),
-        ("roll", &folds.roll, 0.0, 1.0),
-        ("cigar", &folds.cigar, 0.0, 1.0),
-        ("depth", &folds.depth, 0.02, 0.9),
-        ("radius_um", &folds.radius_um, 0.1, 5.0),
-    ]);
+    check.numbers(
+        "cytoplasm.folds",
+        &[
+            ("flap", &folds.flap, 0.0, 1.0),
+            ("roll", &folds.roll, 0.0, 1.0),
+            ("cigar", &folds.cigar, 0.0, 1.0),
+            ("depth", &folds.depth, 0.02, 0.9),
+            ("radius_um", &folds.radius_um, 0.1, 5.0),
+        ],
+    );
     let nucleus = &recipe.nucleus;
-    check.numbers("nucleus", &[
-        ("donors", &nucleus.donors, 1.0, 64.0),
-        ("patch_um", &nucleus.patch_um, 0.5, 20.0),
-        ("overlap_um", &nucleus.overlap_um, 0.25, 10.0),
-        ("d_max", &nucleus.d_max, 0.0, 10.0),
-        ("restore_feather_um", &nucleus.restore_feather_um, 0.0, 5.0),
-        ("pyknotic", &nucleus.pyknotic, 0.0, 1.0),
-        ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
-        ("rim", &nucleus.rim, 0.0, 2.0),
-    ]);
+    check.numbers(
+        "nucleus",
+        &[
+            ("donors", &nucleus.donors, 1.0, 64.0),
+            ("patch_um", &nucleus.patch_um, 0.5, 20.0),
+            ("overlap_um", &nucleus.overlap_um, 0.25, 10.0),
+            ("d_max", &nucleus.d_max, 0.0, 10.0),
+            ("restore_feather_um", &nucleus.restore_feather_um, 0.0, 5.0),
+            ("pyknotic", &nucleus.pyknotic, 0.0, 1.0),
+            ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
+            ("rim", &nucleus.rim, 0.0, 2.0),
+        ],
+    );
     let ([patch, _], [_, overlap]) = (nucleus.patch_um.bounds(), nucleus.overlap_um.bounds());
     if overlap > patch / 2.0 {
         check.problems.push(Problem {
             field: "nucleus.overlap_um".to_owned(),
-            message: format!("{} is more than half of `nucleus.patch_um` = {}; expected at most {}", nucleus.overlap_um, nucleus.patch_um, patch / 2.0),
+            message: format!(
+                "{} is more than half of `nucleus.patch_um` = {}; expected at most {}",
+                nucleus.overlap_um,
+                nucleus.patch_um,
+                patch / 2.0
+            ),
         });
     }
     let stain = &recipe.stain;
-    check.numbers("stain", &[
-        ("field_cytoplasm", &stain.field_cytoplasm, 0.0, 20.0),
-        ("field_nucleus", &stain.field_nucleus, 0.0, 20.0),
-        ("field_texture", &stain.field_texture, 0.0, 20.0),
-    ]);
+    check.numbers(
+        "stain",
+        &[
+            ("field_cytoplasm", &stain.field_cytoplasm, 0.0, 20.0),
+            ("field_nucleus", &stain.field_nucleus, 0.0, 20.0),
+            ("field_texture", &stain.field_texture, 0.0, 20.0),
+        ],
+    );
 }
 
 fn debris(recipe: &Recipe, check: &mut Check) {
     let debris = &recipe.debris;
     let leukocytes = &debris.leukocytes;
-    check.numbers("debris.leukocytes", &[
-        ("clusters", &leukocytes.clusters, 0.0, 1e5),
-        ("per_cluster", &leukocytes.per_cluster, 1.0, 1e4),
-        ("cluster_um", &leukocytes.cluster_um, 0.0, 1000.0),
-        ("on_cells", &leukocytes.on_cells, 0.0, 1.0),
-        ("radius_um", &leukocytes.radius_um, 0.3, 20.0),
-        ("alpha", &leukocytes.alpha, 0.0, 0.5),
-        ("beta", &leukocytes.beta, 0.0, 0.5),
-        ("absorbance", &leukocytes.absorbance, 0.0, 4.0),
-        ("halo", &leukocytes.halo, 0.0, 4.0),
-    ]);
+    check.numbers(
+        "debris.leukocytes",
+        &[
+            ("clusters", &leukocytes.clusters, 0.0, 1e5),
+            ("per_cluster", &leukocytes.per_cluster, 1.0, 1e4),
+            ("cluster_um", &leukocytes.cluster_um, 0.0, 1000.0),
+            ("on_cells", &leukocytes.on_cells, 0.0, 1.0),
+            ("radius_um", &leukocytes.radius_um, 0.3, 20.0),
+            ("alpha", &leukocytes.alpha, 0.0, 0.5),
+            ("beta", &leukocytes.beta, 0.0, 0.5),
+            ("absorbance", &leukocytes.absorbance, 0.0, 4.0),
+            ("halo", &leukocytes.halo, 0.0, 4.0),
+        ],
+    );
     let bacilli = &debris.bacilli;
-    check.numbers("debris.bacilli", &[
-        ("clusters", &bacilli.clusters, 0.0, 1e5),
-        ("per_cluster", &bacilli.per_cluster, 1.0, 1e4),
-        ("cluster_um", &bacilli.cluster_um, 0.0, 1000.0),
-        ("on_cells", &bacilli.on_cells, 0.0, 1.0),
-        ("length_um", &bacilli.length_um, 0.3, 50.0),
-        ("width_um", &bacilli.width_um, 0.1, 5.0),
-        ("bend_deg", &bacilli.bend_deg, 0.0, 120.0),
-        ("absorbance", &bacilli.absorbance, 0.0, 4.0),
-    ]);
+    check.numbers(
+        "debris.bacilli",
+        &[
+            ("clusters", &bacilli.clusters, 0.0, 1e5),
+            ("per_cluster", &bacilli.per_cluster, 1.0, 1e4),
+            ("cluster_um", &bacilli.cluster_um, 0.0, 1000.0),
+            ("on_cells", &bacilli.on_cells, 0.0, 1.0),
+            ("length_um", &bacilli.length_um, 0.3, 50.0),
+            ("width_um", &bacilli.width_um, 0.1, 5.0),
+            ("bend_deg", &bacilli.bend_deg, 0.0, 120.0),
+            ("absorbance", &bacilli.absorbance, 0.0, 4.0),
+        ],
+    );
     let speckles = &debris.speckles;
-    check.numbers("debris.speckles", &[
-        ("count", &speckles.count, 0.0, 1e6),
-        ("dilations", &speckles.dilations, 0.0, 50.0),
-        ("absorbance", &speckles.absorbance, 0.0, 4.0),
-    ]);
+    check.numbers(
+        "debris.speckles",
+        &[
+            ("count", &speckles.count, 0.0, 1e6),
+            ("dilations", &speckles.dilations, 0.0, 50.0),
+            ("absorbance", &speckles.absorbance, 0.0, 4.0),
+        ],
+    );
     let blobs = &debris.out_of_focus;
-    check.numbers("debris.out_of_focus", &[
-        ("count", &blobs.count, 0.0, 1e5),
-        ("radius_um", &blobs.radius_um, 0.3, 500.0),
-        ("alpha", &blobs.alpha, 0.0, 0.5),
-        ("beta", &blobs.beta, 0.0, 0.5),
-        ("depth_um", &blobs.depth_um, 0.0, 1000.0),
-        ("absorbance", &blobs.absorbance, 0.0, 4.0),
-    ]);
+    check.numbers(
+        "debris.out_of_focus",
+        &[
+            ("count", &blobs.count, 0.0, 1e5),
+            ("radius_um", &blobs.radius_um, 0.3, 500.0),
+            ("alpha", &blobs.alpha, 0.0, 0.5),
+            ("beta", &blobs.beta, 0.0, 0.5),
+            ("depth_um", &blobs.depth_um, 0.0, 1000.0),
+            ("absorbance", &blobs.absorbance, 0.0, 4.0),
+        ],
+    );
 }
 
 #[cfg(test)]

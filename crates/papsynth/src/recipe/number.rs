@@ -322,7 +322,8 @@ impl<'de> Visitor<'de> for NumberVisitor {
                 other => return Err(de::Error::unknown_field(other, LAWS)),
             }
         }
-        let law = law.ok_or_else(|| de::Error::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
+        let law =
+            law.ok_or_else(|| de::Error::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
         Ok(Number::Drawn { law, min, max })
     }
 }
@@ -370,9 +371,14 @@ mod tests {
 
     #[test]
     fn every_form_reads_back_as_written() {
-        for text in ["3", "2.5", "{ uniform = [1, 2.5] }", "{ normal = [1, 0.1], min = 0.9 }",
-            "{ log_normal = [2, 0.4], max = 3 }", "{ choice = [1, 2, 4] }"]
-        {
+        for text in [
+            "3",
+            "2.5",
+            "{ uniform = [1, 2.5] }",
+            "{ normal = [1, 0.1], min = 0.9 }",
+            "{ log_normal = [2, 0.4], max = 3 }",
+            "{ choice = [1, 2, 4] }",
+        ] {
             let number = parse(text).unwrap();
             assert_eq!(parse(&number.to_string()).unwrap(), number, "{text}");
             assert_eq!(number.problem(-100.0, 100.0), None, "{text}");
@@ -382,9 +388,14 @@ mod tests {
     #[test]
     fn draws_stay_within_their_bounds() {
         let mut rng = Key { seed: 1, index: 0 }.stream("test", 0, "number");
-        for text in ["{ uniform = [1, 2.5] }", "{ normal = [1, 0.5], min = 0.9 }", "{ log_normal = [2, 0.4], max = 3 }",
-            "{ normal = [0, 1], min = 3.9 }", "{ choice = [1, 2, 4] }", "7"]
-        {
+        for text in [
+            "{ uniform = [1, 2.5] }",
+            "{ normal = [1, 0.5], min = 0.9 }",
+            "{ log_normal = [2, 0.4], max = 3 }",
+            "{ normal = [0, 1], min = 3.9 }",
+            "{ choice = [1, 2, 4] }",
+            "7",
+        ] {
             let number = parse(text).unwrap();
             let [low, high] = number.bounds();
             for _ in 0..500 {

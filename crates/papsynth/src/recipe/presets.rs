@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     Acceptance, Background, Camera, CellMix, Chromatin, Cytoplasm, Debris, Field, Focus, Folds, Illumination, Layout,
-    Nucleus, NucleusForm, Number, Optics, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, Stain, RECIPE_VERSION,
+    Nucleus, NucleusForm, Number, Optics, RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, Stain,
 };
 
 /// A named recipe.
@@ -113,7 +113,11 @@ fn sparse() -> Recipe {
 
 fn dense() -> Recipe {
     let mut recipe = lbc();
-    recipe.layout = Layout::Clusters { count: Number::uniform(2.0, 4.0), radius_um: Number::uniform(70.0, 130.0), outside: 0.2.into() };
+    recipe.layout = Layout::Clusters {
+        count: Number::uniform(2.0, 4.0),
+        radius_um: Number::uniform(70.0, 130.0),
+        outside: 0.2.into(),
+    };
     recipe.cells = mix([("intermediate", Number::uniform(45.0, 75.0)), ("superficial", Number::uniform(15.0, 30.0))]);
     recipe.slide.depth_um = Number::uniform(5.0, 10.0);
     recipe.slide.stacking_um = 1.5.into();
@@ -144,7 +148,13 @@ fn inflamed() -> Recipe {
 /// The values of the paper where it states them, else those of the authors' released code.
 fn paper() -> Recipe {
     let mut recipe = lbc();
-    recipe.slide = Slide { depth_um: 0.4.into(), relief_um: 60.0.into(), median_um: 8.0.into(), stacking_um: 0.0.into(), spacing_um: 0.0.into() };
+    recipe.slide = Slide {
+        depth_um: 0.4.into(),
+        relief_um: 60.0.into(),
+        median_um: 8.0.into(),
+        stacking_um: 0.0.into(),
+        spacing_um: 0.0.into(),
+    };
     recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
     recipe.cells = mix([("intermediate", 30.0.into())]);
     recipe.cytoplasm = Cytoplasm {
@@ -186,11 +196,8 @@ fn paper() -> Recipe {
     recipe.debris.bacilli.per_cluster = Number::uniform(8.0, 20.0);
     recipe.debris.speckles.absorbance = 0.25.into();
     recipe.debris.speckles.count = 120.0.into();
-    recipe.debris.speckles.dilations = Number::Drawn {
-        law: super::Law::Choice(vec![0.0, 0.0, 1.0]),
-        min: f64::NEG_INFINITY,
-        max: f64::INFINITY,
-    };
+    recipe.debris.speckles.dilations =
+        Number::Drawn { law: super::Law::Choice(vec![0.0, 0.0, 1.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
     recipe.debris.out_of_focus.absorbance = 0.35.into();
     recipe.debris.out_of_focus.count = 5.0.into();
     recipe.background = Background {

@@ -67,10 +67,9 @@ fn property(schema: &Value, name: &str, fields: &serde_json::Map<String, Value>)
         return found;
     }
     for variant in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
-        if variant.pointer("/properties/kind/const") == fields.get("kind") {
-            if let Some(found) = direct(variant) {
-                return found;
-            }
+        let chosen = variant.pointer("/properties/kind/const") == fields.get("kind");
+        if let (true, Some(found)) = (chosen, direct(variant)) {
+            return found;
         }
     }
     schema.get("additionalProperties").cloned().unwrap_or_default()
@@ -82,7 +81,13 @@ fn resolve(schema: &Value, root: &Value) -> Value {
 }
 
 /// The documentation of a field and, where it is one of a few words, those words.
-fn describe(schema: &Value, name: &str, value: &Value, fields: &serde_json::Map<String, Value>, root: &Value) -> String {
+fn describe(
+    schema: &Value,
+    name: &str,
+    value: &Value,
+    fields: &serde_json::Map<String, Value>,
+    root: &Value,
+) -> String {
     let text = |schema: &Value| schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
     let found = property(schema, name, fields);
     let mut words = if name == "kind" { String::new() } else { text(&found) };

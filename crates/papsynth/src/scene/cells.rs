@@ -79,7 +79,14 @@ struct FieldStain {
     texture: f64,
 }
 
-fn draw_body(recipe: &Recipe, name: &str, class: &CellClass, mix: &CellMix, stain: &FieldStain, rng: &mut Stream) -> CellBody {
+fn draw_body(
+    recipe: &Recipe,
+    name: &str,
+    class: &CellClass,
+    mix: &CellMix,
+    stain: &FieldStain,
+    rng: &mut Stream,
+) -> CellBody {
     let size = mix.size.draw(rng);
     let cytoplasm = &class.cytoplasm;
     let nucleus = &class.nucleus;

@@ -8,7 +8,12 @@ use super::draw::FieldNumbers;
 use super::{Body, Object, View};
 
 /// Adds the debris of a field to its cells.
-pub(super) fn draw_debris(recipe: &Recipe, view: View, field: &FieldNumbers, objects: &mut Vec<Object>) -> Result<(), String> {
+pub(super) fn draw_debris(
+    recipe: &Recipe,
+    view: View,
+    field: &FieldNumbers,
+    objects: &mut Vec<Object>,
+) -> Result<(), String> {
     let cells: Vec<CellPlace> = objects.iter().filter_map(CellPlace::of).collect();
     let debris = &recipe.debris;
     objects.extend(leukocytes(&debris.leukocytes, view, field, &cells));
@@ -60,7 +65,8 @@ fn cluster(on_cells: &Number, radius_um: &Number, view: View, cells: &[CellPlace
     match cells.get(cell) {
         Some(cell) if on_cell => {
             let reach = distance * cell.radius_um * 0.9;
-            let centre_um = [cell.centre_um[0] + reach * libm::cos(angle), cell.centre_um[1] + reach * libm::sin(angle)];
+            let centre_um =
+                [cell.centre_um[0] + reach * libm::cos(angle), cell.centre_um[1] + reach * libm::sin(angle)];
             Cluster { centre_um, depth_um: cell.depth_um + ON_TOP_UM, radius_um }
         }
         _ => Cluster { centre_um: anywhere, depth_um: random::normal(rng), radius_um },

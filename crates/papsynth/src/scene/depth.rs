@@ -14,13 +14,20 @@ pub(crate) struct Relief {
 impl Relief {
     /// A relief of `depth_um` over a field of `size_um`, from Perlin noise with cells of `relief_um` behind a median
     /// filter of `median_um`.
-    pub(crate) fn new(size_um: [f64; 2], depth_um: f64, relief_um: f64, median_um: f64, key: u64) -> Result<Self, String> {
+    pub(crate) fn new(
+        size_um: [f64; 2],
+        depth_um: f64,
+        relief_um: f64,
+        median_um: f64,
+        key: u64,
+    ) -> Result<Self, String> {
         /// Samples to a cell of the noise: enough for linear interpolation between them.
         const SAMPLES: f64 = 8.0;
         let pitch_um = relief_um / SAMPLES;
         let samples = |length: f64| crate::random::count((length / pitch_um).ceil()) + 2;
         let (width, height) = (samples(size_um[0]), samples(size_um[1]));
-        let noise = Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key).map_err(|e| e.to_string())?;
+        let noise =
+            Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key).map_err(|e| e.to_string())?;
         let mut raw = Vec::with_capacity(width * height);
         for y in 0..height {
             for x in 0..width {
@@ -61,7 +68,9 @@ fn median(values: &[f64], width: usize, radius: usize) -> Vec<f64> {
         for x in 0..width {
             window.clear();
             for row in y.saturating_sub(radius)..(y + radius + 1).min(height) {
-                window.extend_from_slice(&values[row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)]);
+                window.extend_from_slice(
+                    &values[row * width + x.saturating_sub(radius)..row * width + (x + radius + 1).min(width)],
+                );
             }
             let middle = window.len() / 2;
             out.push(*window.select_nth_unstable_by(middle, f64::total_cmp).1);

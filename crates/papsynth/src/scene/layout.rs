@@ -5,9 +5,9 @@ use rand_core::Rng;
 use crate::random;
 use crate::recipe::Layout;
 
+use super::View;
 use super::draw::FieldNumbers;
 use super::weight::{Sampler, WeightMap};
-use super::View;
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
 const PITCH_UM: f64 = 4.0;
@@ -23,7 +23,12 @@ const MOST_TRIES: f64 = 1e9;
 const JAMMED: f64 = 0.547;
 
 /// The weight map of a layout.
-pub(super) fn weight_map(layout: &Layout, given: Option<&WeightMap>, view: View, field: &FieldNumbers) -> Result<WeightMap, String> {
+pub(super) fn weight_map(
+    layout: &Layout,
+    given: Option<&WeightMap>,
+    view: View,
+    field: &FieldNumbers,
+) -> Result<WeightMap, String> {
     let [width_um, height_um] = view.size_um();
     let pixels = |length: f64| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS);
     let (width, height) = (pixels(width_um), pixels(height_um));
@@ -66,7 +71,8 @@ pub(super) fn weight_map(layout: &Layout, given: Option<&WeightMap>, view: View,
             given.cloned().ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))
         }
         Layout::Labels { path, smooth_um } => {
-            let map = given.ok_or_else(|| format!("`layout.path` = \"{path}\" names a label image that was not given"))?;
+            let map =
+                given.ok_or_else(|| format!("`layout.path` = \"{path}\" names a label image that was not given"))?;
             let smooth = field.draw("layout.smooth_um", smooth_um);
             smoothed(map, smooth * map.width as f64 / width_um)
         }

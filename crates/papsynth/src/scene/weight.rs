@@ -39,19 +39,31 @@ impl WeightMap {
 
     /// Prepares the map, or says why nothing can be drawn from it.
     pub(crate) fn sampler(&self) -> Result<Sampler, String> {
-        if self.width == 0 || self.weights.is_empty() || self.weights.len() % self.width != 0 {
+        if self.width == 0 || self.weights.is_empty() || !self.weights.len().is_multiple_of(self.width) {
             return Err(format!("a weight map of {} pixels cannot have rows of {}", self.weights.len(), self.width));
         }
         if let Some(bad) = self.weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
             let (x, y) = (bad % self.width, bad / self.width);
-            return Err(format!("the weight at pixel ({x}, {y}) is {}; expected a finite number of 0 or more", self.weights[bad]));
+            return Err(format!(
+                "the weight at pixel ({x}, {y}) is {}; expected a finite number of 0 or more",
+                self.weights[bad]
+            ));
         }
         let largest = self.weights.iter().fold(0.0_f32, |a, b| a.max(*b));
         if largest <= 0.0 {
-            return Err("every weight is zero, so no object can ever be placed; expected at least one place above zero".to_owned());
+            return Err(
+                "every weight is zero, so no object can ever be placed; expected at least one place above zero"
+                    .to_owned(),
+            );
         }
         let possible = (0_u32..).zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(i, _)| i).collect();
-        Ok(Sampler { width: self.width, height: self.weights.len() / self.width, weights: self.weights.clone(), largest, possible })
+        Ok(Sampler {
+            width: self.width,
+            height: self.weights.len() / self.width,
+            weights: self.weights.clone(),
+            largest,
+            possible,
+        })
     }
 }
 
@@ -73,6 +85,7 @@ impl Sampler {
     /// W(x, y) / max W.
     pub(crate) fn try_place<R: Rng + ?Sized>(&self, rng: &mut R) -> Option<[f64; 2]> {
         let pixel = *self.possible.get(random::below(self.possible.len(), rng))? as usize;
+        // Eq. 5: x = U(0, M), y = U(0, N).
         let place = [
             ((pixel % self.width) as f64 + random::uniform(rng)) / self.width as f64,
             ((pixel / self.width) as f64 + random::uniform(rng)) / self.height as f64,
@@ -100,10 +113,16 @@ mod tests {
             }
         }
         let sum: f32 = map.weights.iter().sum();
-        let chi2: f64 = map.weights.iter().zip(counts).filter(|(w, _)| **w > 0.0).map(|(w, n)| {
-            let expected = accepted * f64::from(w / sum);
-            (n - expected) * (n - expected) / expected
-        }).sum();
+        let chi2: f64 = map
+            .weights
+            .iter()
+            .zip(counts)
+            .filter(|(w, _)| **w > 0.0)
+            .map(|(w, n)| {
+                let expected = accepted * f64::from(w / sum);
+                (n - expected) * (n - expected) / expected
+            })
+            .sum();
         // Five degrees of freedom: 20.5 is exceeded once in a thousand.
         assert!(chi2 < 20.5, "{chi2}");
         assert_eq!(counts[0] + counts[5], 0.0);

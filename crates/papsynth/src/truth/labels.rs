@@ -1,6 +1,6 @@
 //! Views of the masks: label maps, front-most masks, layers.
 
-use super::mask::{Mask, Run};
+use super::mask::{Mask, Run, next};
 
 /// The id of an object at each pixel, 0 where there is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,22 +44,20 @@ fn visible(id: u32, mask: &Mask, ids: &[u32], width: usize) -> Mask {
     let mut runs: Vec<Run> = Vec::new();
     for run in mask.runs() {
         let row = run.y as usize * width;
-        let mut open = false;
-        for x in run.x0..run.x1 {
-            let shown = ids[row + x as usize] == id;
-            match (shown, open) {
-                (true, false) => runs.push(Run { y: run.y, x0: x, x1: x + 1 }),
-                (true, true) => {
-                    if let Some(last) = runs.last_mut() {
-                        last.x1 = x + 1;
-                    }
-                }
-                _ => {}
-            }
-            open = shown;
+        let ids = &ids[row..row + run.x1 as usize];
+        let mut x = run.x0 as usize;
+        while let Some(x0) = next(ids, x, |other| other == id) {
+            let x1 = next(ids, x0, |other| other != id).unwrap_or(ids.len());
+            runs.push(Run { y: run.y, x0: column(x0), x1: column(x1) });
+            x = x1;
         }
     }
     Mask::from_runs(runs)
+}
+
+/// A column of an image, all of which fit.
+fn column(x: usize) -> u32 {
+    u32::try_from(x).unwrap_or(u32::MAX)
 }
 
 /// How many of the masks cover each pixel.

@@ -36,7 +36,14 @@ impl Mask {
     /// The pixels where `inside` holds of a tile of `tile_width` columns whose upper left pixel lies at `origin`,
     /// clipped to an image of `width` x `height`.
     #[must_use]
-    pub fn from_tile(tile: &[f32], tile_width: usize, origin: [i64; 2], width: usize, height: usize, inside: impl Fn(f32) -> bool) -> Self {
+    pub fn from_tile(
+        tile: &[f32],
+        tile_width: usize,
+        origin: [i64; 2],
+        width: usize,
+        height: usize,
+        inside: impl Fn(f32) -> bool,
+    ) -> Self {
         let mut runs = Vec::new();
         for (row, values) in tile.chunks_exact(tile_width.max(1)).enumerate() {
             let y = origin[1] + row as i64;
@@ -45,19 +52,12 @@ impl Mask {
             }
             let first = (-origin[0]).clamp(0, tile_width as i64) as usize;
             let last = (width as i64 - origin[0]).clamp(0, tile_width as i64) as usize;
-            let mut start = None;
-            for column in first..last.max(first) {
-                match (inside(values[column]), start) {
-                    (true, None) => start = Some(column),
-                    (false, Some(from)) => {
-                        runs.push(run(y, origin[0], from, column));
-                        start = None;
-                    }
-                    _ => {}
-                }
-            }
-            if let Some(from) = start {
-                runs.push(run(y, origin[0], from, last));
+            let values = &values[..last.max(first)];
+            let mut at = first;
+            while let Some(from) = next(values, at, &inside) {
+                let end = next(values, from, |value| !inside(value)).unwrap_or(values.len());
+                runs.push(run(y, origin[0], from, end));
+                at = end;
             }
         }
         Self { runs }
@@ -121,6 +121,17 @@ impl Mask {
             row + r.x0 as usize..row + r.x1 as usize
         })
     }
+}
+
+/// The first place from `start` on where `is` holds. Whole blocks are passed over at once.
+#[inline(always)]
+pub(super) fn next<T: Copy>(values: &[T], start: usize, is: impl Fn(T) -> bool) -> Option<usize> {
+    /// Values that are looked at side by side.
+    const BLOCK: usize = 16;
+    let rest = &values[start..];
+    let none = |block: &&[T]| !block.iter().fold(false, |any, &value| any | is(value));
+    let passed = BLOCK * rest.chunks_exact(BLOCK).take_while(none).count();
+    rest[passed..].iter().position(|&value| is(value)).map(|place| start + passed + place)
 }
 
 fn run(y: i64, left: i64, from: usize, to: usize) -> Run {
