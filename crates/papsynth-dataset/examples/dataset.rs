@@ -26,7 +26,7 @@ fn main() -> Result<(), Error> {
     let engine = Engine::new(&recipe, &model, &Inputs::default())?;
     let dataset = Dataset::create_or_resume(&folder, &DatasetInfo { recipe: &recipe, model: &model, seed: 1 })?;
     let stop = AtomicBool::new(false);
-    dataset.generate(&engine, &Run { frames: 0..2, at_once: 2, threads: Threads::One, stop: &stop }, &|_| ())?;
+    dataset.generate(&engine, &Run { frames: 0..1, at_once: 1, threads: Threads::One, stop: &stop }, &|_| ())?;
     dataset.finish()?;
     Ok(())
 }

@@ -26,7 +26,7 @@ fn replay(target: &str, check: fn(&[u8])) {
     assert!(!paths.is_empty(), "{} is empty", folder.display());
     for path in paths {
         // Shown if the check fails.
-        println!("{}", path.display());
+        eprintln!("{}", path.display());
         let bytes = fs::read(&path).unwrap();
         for length in [bytes.len(), bytes.len() * 3 / 4, bytes.len() / 2, bytes.len().min(9)] {
             check(&bytes[..length]);

@@ -1,5 +1,7 @@
 //! No bytes make a reader panic, hang, or ask for vast memory.
 
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
 mod support;
 
 use papsynth::model::Model;

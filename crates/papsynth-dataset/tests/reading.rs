@@ -1,5 +1,7 @@
 //! What users bring is read as it is meant, or refused by what is wrong with it.
 
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
 mod support;
 
 use std::fs;

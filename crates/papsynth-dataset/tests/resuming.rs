@@ -1,5 +1,7 @@
 //! A data set goes on where it was left, and nothing else is touched.
 
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
 mod support;
 
 use std::fs::{self, File};

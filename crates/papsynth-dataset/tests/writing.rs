@@ -1,5 +1,7 @@
 //! What is written is what was handed over, read back by decoders.
 
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
 mod support;
 
 use std::collections::BTreeSet;

@@ -6,40 +6,45 @@ use png::{BitDepth, ColorType, Compression, Encoder, Filter, PixelDimensions, Un
 
 /// A grey image of 8 bits if `bits` are no more, else 16; `pixel_um` goes into its physical size.
 pub(crate) fn grey_png(grey: &[u16], width: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
-    if bits <= 8 {
+    let (bytes, depth): (Vec<u8>, _) = if bits <= 8 {
         #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]
-        let narrow: Vec<u8> = grey.iter().map(|&g| g as u8).collect();
-        encode(&narrow, width, ColorType::Grayscale, BitDepth::Eight, Some(pixel_um))
+        let narrow = grey.iter().map(|&g| g as u8).collect();
+        (narrow, BitDepth::Eight)
     } else {
-        let wide: Vec<u8> = grey.iter().flat_map(|g| g.to_be_bytes()).collect();
-        encode(&wide, width, ColorType::Grayscale, BitDepth::Sixteen, Some(pixel_um))
-    }
-}
-
-/// An image in colour, three bytes a pixel.
-pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
-    encode(rgb, width, ColorType::Rgb, BitDepth::Eight, None)
-}
-
-fn encode(bytes: &[u8], width: usize, color: ColorType, depth: BitDepth, pixel_um: Option<f64>) -> io::Result<Vec<u8>> {
-    let pixel_bytes = color.samples() * (depth as usize / 8);
-    let height = bytes.len() / (width * pixel_bytes).max(1);
+        (grey.iter().flat_map(|g| g.to_be_bytes()).collect(), BitDepth::Sixteen)
+    };
     let mut out = Vec::with_capacity(bytes.len());
-    let side = |pixels: usize| u32::try_from(pixels).map_err(io::Error::other);
-    let mut encoder = Encoder::new(&mut out, side(width)?, side(height)?);
-    encoder.set_color(color);
+    let mut encoder = Encoder::new(&mut out, side(width)?, side(grey.len() / width.max(1))?);
+    encoder.set_color(ColorType::Grayscale);
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
     // One filter for all rows: as small on noisy images as a choice for each row, and twice as fast.
     encoder.set_filter(Filter::Up);
-    encoder.set_pixel_dims(pixel_um.map(|um| {
-        let per_metre = pixels_per_metre(um);
-        PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }
-    }));
+    let per_metre = pixels_per_metre(pixel_um);
+    encoder.set_pixel_dims(Some(PixelDimensions { xppu: per_metre, yppu: per_metre, unit: Unit::Meter }));
+    write(encoder, &bytes)?;
+    Ok(out)
+}
+
+/// An image in colour, three bytes a pixel: one a data set, and small.
+pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
+    let mut out = Vec::new();
+    let mut encoder = Encoder::new(&mut out, side(width)?, side(rgb.len() / (3 * width.max(1)))?);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::High);
+    write(encoder, rgb)?;
+    Ok(out)
+}
+
+fn write(encoder: Encoder<&mut Vec<u8>>, bytes: &[u8]) -> io::Result<()> {
     let mut writer = encoder.write_header()?;
     writer.write_image_data(bytes)?;
-    writer.finish()?;
-    Ok(out)
+    Ok(writer.finish()?)
+}
+
+fn side(pixels: usize) -> io::Result<u32> {
+    u32::try_from(pixels).map_err(io::Error::other)
 }
 
 fn pixels_per_metre(pixel_um: f64) -> u32 {

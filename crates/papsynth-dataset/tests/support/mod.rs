@@ -1,4 +1,5 @@
 //! Small frames made by hand, and folders that vanish.
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 #![allow(dead_code, reason = "each test uses its part")]
 
 use std::fs;

@@ -54,17 +54,16 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
     let mut tile = nucleus.clone();
     domed(&mut tile, &shapes);
     textured(&mut tile, centre, NOISE_CELL * radius, 2, NOISE_STRENGTH, absorbance, rng.next_u64());
-    let mut whole = shapes.iter().map(|shape| area(shape)).sum();
     if let Some(body) = &body {
         coverage.cover(body);
         for (value, cover) in tile.values.iter_mut().zip(&coverage.values) {
             *value += cover * halo as f32;
         }
-        whole = area(body);
     }
     for (cover, inside) in coverage.values.iter_mut().zip(&nucleus.values) {
         *cover = cover.max(*inside);
     }
+    let whole = coverage.values.iter().map(|share| f64::from(*share)).sum();
     Phantom::whole(tile, coverage, whole)
 }
 
