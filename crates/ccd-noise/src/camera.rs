@@ -112,10 +112,7 @@ impl Camera {
     /// If `out` is not as long as `electrons`.
     pub fn mean_dn_into(&self, electrons: &[f32], out: &mut [f32]) {
         assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
-        let chain = &self.chain;
-        for (dn, &mean) in out.iter_mut().zip(electrons) {
-            *dn = chain.level(at_least_nothing(mean).min(chain.full_well)).max(0.0).min(chain.highest);
-        }
+        mean_row(&self.chain, electrons, out);
     }
 
     /// Rounds grey levels, half up, and clips them to 0 … 2ᵇ - 1. Returns how many are at the
@@ -192,11 +189,20 @@ impl Chain {
 }
 
 #[multiversion::multiversion(targets = "simd")]
+fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
+    for (dn, &mean) in out.iter_mut().zip(electrons) {
+        *dn = chain.level(at_least_nothing(mean).min(chain.full_well)).max(0.0).min(chain.highest);
+    }
+}
+
+#[multiversion::multiversion(targets = "simd")]
 fn expose_row(chain: &Chain, row: &RowWords, x: u32, electrons: &[f32], out: &mut [u16]) -> usize {
     let mut saturated = 0;
     let both = electrons.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
     for (x, (electrons, out)) in blocks(x).zip(both) {
-        let (before, after) = chain.charges(&padded(electrons), row, x);
+        // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
+        let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
+        let (before, after) = chain.charges(&electrons, row, x);
         let mut codes = [0; BLOCK];
         let mut full = [0; BLOCK];
         for i in 0..BLOCK {
@@ -205,8 +211,13 @@ fn expose_row(chain: &Chain, row: &RowWords, x: u32, electrons: &[f32], out: &mu
             let saturated = (before[i] >= chain.full_well) | (dn + 0.5 >= chain.highest);
             full[i] = u32::from(saturated);
         }
-        out.copy_from_slice(&codes[..out.len()]);
-        saturated += full[..out.len()].iter().sum::<u32>() as usize;
+        if let Some(out) = out.first_chunk_mut() {
+            *out = codes;
+        } else {
+            full[out.len()..].fill(0);
+            out.copy_from_slice(&codes[..out.len()]);
+        }
+        saturated += full.iter().sum::<u32>() as usize;
     }
     saturated
 }

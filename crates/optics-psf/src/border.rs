@@ -33,6 +33,11 @@ impl Border {
         let skipped = usize::try_from(start).unwrap_or(0).min(row.len());
         let inside = (row.len() - skipped).min(line.len() - before);
         line[before..before + inside].copy_from_slice(&row[skipped..skipped + inside]);
+        if self == Self::Zero {
+            line[..before].fill(0.0);
+            line[before + inside..].fill(0.0);
+            return;
+        }
         for i in (0..before).chain(before + inside..line.len()) {
             let source = self.source(start + i.cast_signed(), row.len());
             line[i] = source.map_or(0.0, |s| row[s]);

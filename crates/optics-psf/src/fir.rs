@@ -4,7 +4,7 @@ use crate::{Border, Scratch};
 
 /// Columns of a strip. One strip of a camera frame (1038 rows) fits in the second-level cache and
 /// the rows that one output row needs in the first.
-const STRIP: usize = 128;
+const STRIP: usize = 256;
 
 /// Pixels whose sums are held in registers while the taps go by.
 const BLOCK: usize = 64;
@@ -33,10 +33,23 @@ impl Source<'_> {
 /// Blurs `source` into `dst`, which is larger by `margin` on each side, with the taps
 /// `half[0]` at the centre and `half[k]` at ±k.
 pub(crate) fn blur(source: Source<'_>, half: &[f32], margin: usize, dst: &mut [f32], scratch: &mut Scratch) {
+    blur_rows(source, half, margin, -margin.cast_signed(), dst, scratch);
+}
+
+/// As many rows of that as `dst` holds, from the one at row `first` of `source` on, which lies before it where
+/// negative.
+pub(crate) fn blur_rows(
+    source: Source<'_>,
+    half: &[f32],
+    margin: usize,
+    first: isize,
+    dst: &mut [f32],
+    scratch: &mut Scratch,
+) {
     let dst_width = source.width + 2 * margin;
     for x in (0..dst_width).step_by(STRIP) {
         let columns = STRIP.min(dst_width - x);
-        blur_strip(source, half, margin, x, columns, dst, &mut scratch.strip, &mut scratch.line);
+        blur_strip(source, half, margin, first, x, columns, dst, &mut scratch.strip, &mut scratch.line);
     }
 }
 
@@ -47,6 +60,7 @@ fn blur_strip(
     source: Source<'_>,
     half: &[f32],
     margin: usize,
+    first: isize,
     x: usize,
     columns: usize,
     dst: &mut [f32],
@@ -56,36 +70,29 @@ fn blur_strip(
     let (width, height, border) = (source.width, source.height(), source.border);
     let radius = half.len() - 1;
     let pitch = columns.next_multiple_of(LANES);
-    let above = margin + radius;
-    strip.resize((height + 2 * above) * pitch, 0.0);
+    let dst_width = width + 2 * margin;
+    strip.resize((dst.len() / dst_width + 2 * radius) * pitch, 0.0);
     line.resize(pitch + 2 * radius, 0.0);
 
-    // Along the rows.
-    let start = x.cast_signed() - above.cast_signed();
+    // Along the rows: those that the rows of `dst` need.
+    let start = x.cast_signed() - (margin + radius).cast_signed();
     let taps = useful(border, radius, start + radius.cast_signed(), columns, width);
     let interior = usize::try_from(start).ok().filter(|&s| s + line.len() <= width);
-    for y in 0..height {
-        let out = &mut strip[(above + y) * pitch..][..pitch];
-        if let Some(start) = interior {
-            fir(&source.row(y)[start..], radius, 1, half, taps, out);
-        } else {
-            border.extend(source.row(y), start, line);
-            fir(line, radius, 1, half, taps, out);
-        }
-    }
-
-    // The rows beyond the image are copies of rows within, or nothing.
-    for i in (0..above).chain(above + height..height + 2 * above) {
-        match border.source(i.cast_signed() - above.cast_signed(), height) {
-            Some(y) => strip.copy_within((above + y) * pitch..(above + y + 1) * pitch, i * pitch),
-            None => strip[i * pitch..(i + 1) * pitch].fill(0.0),
+    let above = first - radius.cast_signed();
+    for (out, y) in strip.chunks_exact_mut(pitch).zip(above..) {
+        match (border.source(y, height), interior) {
+            (None, _) => out.fill(0.0),
+            (Some(y), Some(start)) => fir(&source.row(y)[start..], radius, 1, half, taps, out),
+            (Some(y), None) => {
+                border.extend(source.row(y), start, line);
+                fir(line, radius, 1, half, taps, out);
+            }
         }
     }
 
     // Along the columns.
-    let dst_width = width + 2 * margin;
     for (i, row) in dst.chunks_exact_mut(dst_width).enumerate() {
-        let y = i.cast_signed() - margin.cast_signed();
+        let y = first + i.cast_signed();
         let taps = useful(border, radius, y, 1, height);
         fir(strip, (i + radius) * pitch, pitch, half, taps, &mut row[x..x + columns]);
     }

@@ -1,11 +1,14 @@
 use crate::error::{Error, require};
 use crate::fir::{self, Source};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, LOST_TAIL};
 use crate::pyramid::{self, Pyramid};
 use crate::{Border, Scratch};
 
 /// Wider than any field of view; it bounds the memory of the taps.
 const WIDEST_PX: f64 = 4096.0;
+
+/// With more of its tail lost a kernel is a Gaussian no longer.
+const MOST_LOST: f64 = 1e-2;
 
 /// How a blur is computed. The kernel that is meant is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,7 +32,8 @@ pub enum Method {
 /// normal distribution wₙ ∝ exp(-n²/2s²) with s solved for ∑ n² wₙ = σ² (1e-12), at every
 /// σ ≥ 0. It is positive, sums to one, and moves continuously through a focus stack: from the
 /// identity at σ = 0 to s = σ (within 1e-8) above a little more than a pixel. Variances add, as
-/// they do for light. Taps are kept out to where less than 1e-7 of the sum is lost; the variance
+/// they do for light. Taps are kept out to where less than 1e-7 of the sum is lost, or as
+/// [`truncated`](Self::truncated) says; the variance
 /// is exact for those that are kept.
 ///
 /// # Differences from the paper
@@ -59,15 +63,28 @@ impl Gaussian {
     ///
     /// If `sigma_px` is outside that range or not a number.
     pub fn with_method(sigma_px: f64, method: Method) -> Result<Self, Error> {
+        Self::truncated(sigma_px, method, LOST_TAIL)
+    }
+
+    /// A blur whose taps reach out to where less than `lost_tail` of the sum is lost, 1e-7 to 1e-2:
+    /// a third fewer taps at 1e-4. The sum is still one and the variance still exact; no pixel
+    /// errs by more than about `lost_tail` of the range of the image.
+    ///
+    /// # Errors
+    ///
+    /// If `sigma_px` is not a number from 0 to 4096 or `lost_tail` outside its range.
+    pub fn truncated(sigma_px: f64, method: Method, lost_tail: f64) -> Result<Self, Error> {
         let accepted = (0.0..=WIDEST_PX).contains(&sigma_px);
         require("sigma_px", sigma_px, accepted, "a number from 0 to 4096")?;
-        let kernel = Kernel::new(sigma_px);
+        let accepted = (LOST_TAIL..=MOST_LOST).contains(&lost_tail);
+        require("lost_tail", lost_tail, accepted, "a number from 1e-7 to 1e-2")?;
+        let kernel = Kernel::new(sigma_px, lost_tail);
         let narrowest = match method {
             Method::Direct => None,
             Method::Decimated => Some(pyramid::NARROWEST),
             Method::Auto => Some(pyramid::NARROWEST_BY_DEFAULT),
         };
-        let pyramid = narrowest.and_then(|n| Pyramid::new(sigma_px, n, kernel.radius()));
+        let pyramid = narrowest.and_then(|n| Pyramid::new(sigma_px, n, kernel.radius(), lost_tail));
         Ok(Self { sigma_px, kernel, pyramid })
     }
 
@@ -77,7 +94,8 @@ impl Gaussian {
         self.sigma_px
     }
 
-    /// The distance in pixels to the last tap: beyond it lies less than 1e-7 of the sum.
+    /// The distance in pixels to the last tap: beyond it lies less than 1e-7 of the sum, or
+    /// what [`truncated`](Self::truncated) was given.
     #[must_use]
     pub fn radius(&self) -> usize {
         self.kernel.radius()
@@ -108,6 +126,31 @@ impl Gaussian {
     /// If `src` is empty or not whole rows of `width`, or `dst` is not as long as it.
     pub fn blur_into(&self, src: &[f32], width: usize, border: Border, dst: &mut [f32], scratch: &mut Scratch) {
         self.apply(src, width, border, 0, dst, scratch);
+    }
+
+    /// Blurs some rows of `src`, any values in rows of `width` pixels: those from row `first` on, as
+    /// many as `dst` holds, as they are in the whole. Every tap is summed, as with
+    /// [`Method::Direct`].
+    ///
+    /// # Panics
+    ///
+    /// If `src` is empty or not whole rows of `width`, or `dst` not whole rows of it or beyond the
+    /// last.
+    pub fn blur_rows_into(
+        &self,
+        src: &[f32],
+        width: usize,
+        border: Border,
+        first: usize,
+        dst: &mut [f32],
+        scratch: &mut Scratch,
+    ) {
+        whole_rows(src, width);
+        let rows = src.len() / width;
+        let within = dst.len().is_multiple_of(width) && first + dst.len() / width <= rows;
+        assert!(within, "{} pixels from row {first} on are no rows of the {rows} there are", dst.len());
+        let source = Source { pixels: src, width, border };
+        fir::blur_rows(source, self.kernel.half(), 0, first.cast_signed(), dst, scratch);
     }
 
     /// Blurs an object that is alone in its `tile` and returns the larger tile it then fills, and
@@ -148,11 +191,7 @@ impl Gaussian {
         dst: &mut [f32],
         scratch: &mut Scratch,
     ) {
-        assert!(
-            width > 0 && !pixels.is_empty() && pixels.len().is_multiple_of(width),
-            "{} pixels are not whole rows of {width}",
-            pixels.len(),
-        );
+        whole_rows(pixels, width);
         let expected = (width + 2 * margin) * (pixels.len() / width + 2 * margin);
         assert_eq!(dst.len(), expected, "dst has the wrong number of pixels");
         let source = Source { pixels, width, border };
@@ -161,4 +200,9 @@ impl Gaussian {
             None => fir::blur(source, self.kernel.half(), margin, dst, scratch),
         }
     }
+}
+
+fn whole_rows(pixels: &[f32], width: usize) {
+    let whole = width > 0 && !pixels.is_empty() && pixels.len().is_multiple_of(width);
+    assert!(whole, "{} pixels are not whole rows of {width}", pixels.len());
 }

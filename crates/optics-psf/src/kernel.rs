@@ -1,6 +1,15 @@
 /// Mass of the infinite kernel that lies beyond the last tap is below this: half a unit in the
 /// last place of a single-precision 1.
-const LOST_TAIL: f64 = 1e-7;
+pub(crate) const LOST_TAIL: f64 = 1e-7;
+
+/// Up to this radius the taps follow from one another; beyond, the roundings would add up.
+const FEW_TAPS: usize = 64;
+
+/// A step of Newton's method, as a share, after which the next one would be below the rounding: its square.
+const SETTLED: f64 = 1e-9;
+
+/// From this width on the kernel is the sampled normal density.
+const DENSITY_FROM: f64 = 1.0;
 
 /// The discrete normal distribution of exact variance: wₙ ∝ exp(-t n²), of all distributions on
 /// the lattice with that variance the one of greatest entropy.
@@ -16,15 +25,17 @@ pub(crate) struct Kernel {
 }
 
 impl Kernel {
-    /// `sigma` finite and >= 0.
-    pub(crate) fn new(sigma: f64) -> Self {
+    /// `sigma` finite and >= 0; less than `lost_tail` of the mass lies beyond the last tap.
+    pub(crate) fn new(sigma: f64, lost_tail: f64) -> Self {
         let variance = sigma * sigma;
         // Narrower than this, the side taps vanish even in double precision.
         if variance < f64::MIN_POSITIVE {
             return Self::from_taps(vec![1.0]);
         }
         let wide = ample_radius(sigma);
-        let radius = radius_of(&normalised(exponent(variance, wide), wide));
+        // Where s = σ but for 1e-8, the radius needs no more.
+        let t = if sigma > DENSITY_FROM { 0.5 / variance } else { exponent(variance, wide) };
+        let radius = radius_of(&normalised(t, wide), lost_tail);
         Self::from_taps(normalised(exponent(variance, radius), radius))
     }
 
@@ -60,11 +71,11 @@ fn ample_radius(sigma: f64) -> usize {
     2 + (8.0 * sigma).ceil() as usize
 }
 
-/// The smallest radius, at least 1, beyond which less than `LOST_TAIL` lies.
-fn radius_of(taps: &[f64]) -> usize {
+/// The smallest radius, at least 1, beyond which less than `lost_tail` lies.
+fn radius_of(taps: &[f64], lost_tail: f64) -> usize {
     let mut tail = 0.0;
     let mut radius = taps.len() - 1;
-    while radius > 1 && tail + 2.0 * taps[radius] < LOST_TAIL {
+    while radius > 1 && tail + 2.0 * taps[radius] < lost_tail {
         tail += 2.0 * taps[radius];
         radius -= 1;
     }
@@ -72,34 +83,49 @@ fn radius_of(taps: &[f64]) -> usize {
 }
 
 fn normalised(t: f64, radius: usize) -> Vec<f64> {
-    let mut taps: Vec<f64> = (0..=radius)
-        .map(|n| {
-            let n = n as f64;
-            libm::exp(-t * n * n)
-        })
-        .collect();
+    let mut taps = Vec::with_capacity(radius + 1);
+    each(t, radius, |_, tap| taps.push(tap));
     let sum = 1.0 + 2.0 * taps[1..].iter().rev().sum::<f64>();
     taps.iter_mut().for_each(|w| *w /= sum);
     taps
+}
+
+/// Hands over n and exp(-t n²), from 0 to `radius`.
+#[inline]
+fn each(t: f64, radius: usize, mut visit: impl FnMut(f64, f64)) {
+    if radius > FEW_TAPS {
+        (0..=radius).map(|n| n as f64).for_each(|n| visit(n, libm::exp(-t * n * n)));
+        return;
+    }
+    // The ratios of neighbours, exp(-t (2n + 1)), are a geometric series.
+    let mut ratio = libm::exp(-t);
+    let (mut tap, step) = (1.0, ratio * ratio);
+    for n in 0..=radius {
+        visit(n as f64, tap);
+        tap *= ratio;
+        ratio *= step;
+    }
 }
 
 /// The t at which the taps up to `radius` have this variance, by Newton's method on its logarithm.
 fn exponent(variance: f64, radius: usize) -> f64 {
     // Both ends are known: t = 1/(2σ²) for a wide kernel, and for a narrow one w₁ = exp(-t) = σ²/2.
     let mut t = if variance > 0.36 { 0.5 / variance } else { libm::log(2.0 / variance) };
-    // It takes three to five steps; the rest is a bound for the loop.
+    // It takes two to five steps; the rest is a bound for the loop.
     for _ in 0..50 {
-        let taps = normalised(t, radius);
-        let (mut second, mut fourth) = (0.0, 0.0);
-        for (n, w) in taps.iter().enumerate().rev() {
-            let square = (n * n) as f64;
+        let (mut mass, mut second, mut fourth) = (1.0, 0.0, 0.0);
+        each(t, radius, |n, w| {
+            let square = n * n;
+            mass += if n > 0.0 { 2.0 * w } else { 0.0 };
             second += 2.0 * square * w;
             fourth += 2.0 * square * square * w;
-        }
+        });
+        second /= mass;
+        fourth /= mass;
         // d ln(variance) / dt = -(m₄ - m₂²) / m₂
         let step = libm::log(second / variance) * second / (fourth - second * second);
         t += step;
-        if step.abs() <= 1e-15 * t {
+        if step.abs() <= SETTLED * t {
             break;
         }
     }
@@ -109,6 +135,10 @@ fn exponent(variance: f64, radius: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn kernel(sigma: f64) -> Kernel {
+        Kernel::new(sigma, LOST_TAIL)
+    }
 
     fn variance(kernel: &Kernel) -> f64 {
         let side = |(n, w): (usize, &f64)| 2.0 * (n * n) as f64 * w;
@@ -122,17 +152,17 @@ mod tests {
     #[test]
     fn variance_is_exact_at_every_width() {
         for sigma in [0.05, 0.2, 0.5, 0.6, 0.9, 1.0, 3.6, 20.0, 300.0].into_iter().chain(widths()) {
-            let error = variance(&Kernel::new(sigma)) / (sigma * sigma) - 1.0;
+            let error = variance(&kernel(sigma)) / (sigma * sigma) - 1.0;
             assert!(error.abs() < 1e-12, "sigma {sigma}: {error}");
         }
-        assert_eq!(Kernel::new(0.0).taps(), [1.0]);
-        assert_eq!(Kernel::new(1e-200).taps(), [1.0]);
+        assert_eq!(kernel(0.0).taps(), [1.0]);
+        assert_eq!(kernel(1e-200).taps(), [1.0]);
     }
 
     #[test]
     fn taps_are_positive_falling_and_sum_to_one() {
         for sigma in widths() {
-            let kernel = Kernel::new(sigma);
+            let kernel = kernel(sigma);
             let taps = kernel.taps();
             assert!(taps.iter().all(|&w| w > 0.0));
             assert!(taps.windows(2).all(|w| w[0] > w[1]));
@@ -152,7 +182,7 @@ mod tests {
             };
             let bound = if sigma > 1.0 { 1e-8 } else { 1.1e-7 };
             assert!((ratio - 1.0).abs() < bound, "sigma {sigma}: {ratio}");
-            for (n, w) in Kernel::new(sigma).taps().iter().enumerate() {
+            for (n, w) in kernel(sigma).taps().iter().enumerate() {
                 let z = n as f64 / sigma;
                 let density = 0.398_942_280_401_432_7 / sigma * libm::exp(-0.5 * z * z);
                 assert!((w - density).abs() < 1e-6 / sigma, "sigma {sigma}, tap {n}");
@@ -163,9 +193,9 @@ mod tests {
     #[test]
     fn the_kernel_is_continuous_through_focus() {
         // No tap moves by more than the width itself does, from in focus to far out of it.
-        let mut before = Kernel::new(0.0);
+        let mut before = kernel(0.0);
         for i in 1..4000 {
-            let now = Kernel::new(0.002 * f64::from(i));
+            let now = kernel(0.002 * f64::from(i));
             for n in 0..=now.radius() {
                 let tap = |k: &Kernel| k.taps().get(n).copied().unwrap_or(0.0);
                 let moved = (tap(&now) - tap(&before)).abs();

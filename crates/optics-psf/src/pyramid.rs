@@ -31,7 +31,7 @@ pub(crate) struct Pyramid {
 
 impl Pyramid {
     /// None where the kernel is too narrow to be halved even once.
-    pub(crate) fn new(sigma: f64, narrowest: f64, radius: usize) -> Option<Self> {
+    pub(crate) fn new(sigma: f64, narrowest: f64, radius: usize, lost_tail: f64) -> Option<Self> {
         let split = |halvings: u32| {
             let area = f64::from(4_u32.pow(halvings));
             let rest = (sigma * sigma - 2.0 * (area - 1.0) / 3.0) / area;
@@ -41,7 +41,7 @@ impl Pyramid {
         let step = 1 << halvings;
         Some(Self {
             halvings,
-            kernel: Kernel::new(rest),
+            kernel: Kernel::new(rest, lost_tail),
             // The taps of all halvings, or of all doublings, reach less than two small pixels.
             reach_of_nothing: 2 * step,
             reach: (radius + 2 * step).next_multiple_of(step),

@@ -275,6 +275,54 @@ fn narrow_kernels_are_never_decimated() {
 }
 
 #[test]
+fn rows_are_those_of_the_whole() {
+    let (width, height) = (150, 43);
+    let image = noise(width * height);
+    let mut scratch = Scratch::new();
+    for sigma in [0.0, 0.9, 3.6, 20.0] {
+        for border in BORDERS {
+            let whole = direct(sigma).blur(&image, width, border);
+            for (first, rows) in [(0, 1), (0, 43), (5, 16), (42, 1), (43, 0)] {
+                let mut part = vec![f32::NAN; rows * width];
+                let gaussian = Gaussian::new(sigma).unwrap();
+                gaussian.blur_rows_into(&image, width, border, first, &mut part, &mut scratch);
+                assert_eq!(part, whole[first * width..][..part.len()], "{sigma}, {border:?}, {first}");
+            }
+        }
+    }
+}
+
+#[test]
+#[should_panic(expected = "rows of the 3 there are")]
+fn rows_beyond_the_last_are_a_mistake() {
+    direct(1.0).blur_rows_into(&[0.0; 9], 3, Border::Zero, 2, &mut [0.0; 6], &mut Scratch::new());
+}
+
+#[test]
+fn a_truncated_kernel_errs_by_its_tail() {
+    let (width, height) = (301, 219);
+    let images = phantoms(width, height);
+    for (lost_tail, shorter) in [(1e-5, 0.9), (1e-4, 0.75), (1e-3, 0.65)] {
+        for sigma in [0.9, 2.3, 3.4, 8.0] {
+            let (exact, short) = (direct(sigma), Gaussian::truncated(sigma, Method::Direct, lost_tail).unwrap());
+            assert!((short.radius() as f64) < shorter * exact.radius() as f64 + 0.5, "{sigma}, {lost_tail}");
+            let variance: f64 = short.taps().iter().enumerate().map(|(n, w)| 2.0 * (n * n) as f64 * w).sum();
+            assert!((variance / (sigma * sigma) - 1.0).abs() < 1e-12, "{sigma}, {lost_tail}: {variance}");
+            for image in &images {
+                let blur = |gaussian: &Gaussian| gaussian.blur(image, width, Border::Reflect);
+                let error = f64::from(largest_difference(&blur(&short), &blur(&exact)));
+                assert!(error < 1.5 * lost_tail, "{sigma}, {lost_tail}: {error}");
+            }
+        }
+    }
+    assert_eq!(Gaussian::truncated(2.0, Method::Auto, 1e-7), Gaussian::new(2.0));
+    for bad in [0.0, 9e-8, 0.02, f64::NAN] {
+        let error = Gaussian::truncated(1.0, Method::Auto, bad).unwrap_err();
+        assert!(matches!(error, Error::OutOfRange { field: "lost_tail", .. }), "{error}");
+    }
+}
+
+#[test]
 fn scratch_carries_nothing_from_call_to_call() {
     let mut scratch = Scratch::new();
     for (width, height, sigma) in [(300, 200, 20.0), (40, 30, 3.6), (131, 90, 9.9), (7, 5, 0.9), (90, 90, 30.0)] {

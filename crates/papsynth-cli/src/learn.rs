@@ -1,14 +1,10 @@
 //! `papsynth learn`: files of real material in, a model file out.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
+use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn, outline};
 use papsynth::model::Model;
-use papsynth_dataset::read::{
-    GreyImage, Limits, NucleusSample, components, read_label_map, read_nuclei, read_outlines,
-};
+use papsynth_dataset::read::{Limits, components, image_files, read_label_map, read_nuclei, read_outlines, read_pairs};
 use papsynth_dataset::{Error, write_file};
 
 use crate::args::Learn;
@@ -92,7 +88,7 @@ fn source(args: &Learn) -> String {
 fn nuclei(folder: &Path, masks: Option<&Path>, limits: &Limits) -> Result<Vec<NucleusImage>, Failure> {
     let samples = match masks {
         None => read_nuclei(folder, limits)?,
-        Some(masks) => pairs(folder, masks, limits)?,
+        Some(masks) => read_pairs(folder, masks, limits)?,
     };
     Ok(samples
         .into_iter()
@@ -105,26 +101,6 @@ fn nuclei(folder: &Path, masks: Option<&Path>, limits: &Limits) -> Result<Vec<Nu
         .collect())
 }
 
-/// Images and masks of the same name, endings aside.
-fn pairs(images: &Path, masks: &Path, limits: &Limits) -> Result<Vec<NucleusSample>, Failure> {
-    let (images_found, masks_found) = (images_in(images)?, images_in(masks)?);
-    let lonely = |path: &Path, wanted: &str, folder: &Path| {
-        let message = format!("{}: has no {wanted} of the same name in {}", path.display(), folder.display());
-        Failure::input(Complaint::new(message))
-    };
-    if let Some((_, path)) = masks_found.iter().find(|(name, _)| !images_found.contains_key(*name)) {
-        return Err(lonely(path, "image", images));
-    }
-    let mut samples = Vec::new();
-    for (name, path) in &images_found {
-        let mask = masks_found.get(name).ok_or_else(|| lonely(path, "mask", masks))?;
-        let (image, labels) = (GreyImage::read(path, limits)?, read_label_map(mask, limits)?);
-        let sample = NucleusSample::new(name, image, &labels);
-        samples.push(sample.map_err(|problem| Error::Input { path: mask.clone(), problem })?);
-    }
-    Ok(samples)
-}
-
 fn outlines(file: &Path, limits: &Limits) -> Result<Vec<Vec<Point>>, Failure> {
     Ok(read_outlines(file, limits)?.into_iter().map(|outline| outline.points).collect())
 }
@@ -133,14 +109,13 @@ fn outlines(file: &Path, limits: &Limits) -> Result<Vec<Vec<Point>>, Failure> {
 fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point>>, Failure> {
     let smallest_px = SMALLEST_CELL_UM2 / (pixel_um * pixel_um);
     let mut outlines = Vec::new();
-    for path in images_in(folder)?.values() {
+    for path in image_files(folder)?.values() {
         let refuse = |what: String| Failure::input(Complaint::new(format!("{}: {what}", path.display())));
         let labels = read_label_map(path, limits)?;
         let regions = components(&labels, limits).map_err(|problem| Error::Input { path: path.clone(), problem })?;
         for region in regions.iter().filter(|r| !r.at_border && r.mask.area() as f64 >= smallest_px) {
             let (tile, width, _) = region.tile();
-            let outline = fsd_shape::trace(&tile, width, 0.5).map_err(|error| refuse(error.to_string()))?;
-            outlines.push(fsd_shape::resample(&outline, TRACED_POINTS));
+            outlines.push(outline(&tile, width, TRACED_POINTS).map_err(refuse)?);
         }
     }
     if outlines.is_empty() {
@@ -149,27 +124,4 @@ fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
     Ok(outlines)
-}
-
-/// The PNG and TIFF files of a folder by their names without ending.
-fn images_in(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Failure> {
-    let failed = |error: std::io::Error| Failure::file("read", folder, &error);
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).unwrap_or_default();
-        let Some(name) = path.file_stem().map(|name| name.to_string_lossy().into_owned()) else { continue };
-        if !["png", "tif", "tiff"].contains(&ending.as_str()) || name.starts_with('.') {
-            continue;
-        }
-        if let Some(other) = found.insert(name, path.clone()) {
-            let message =
-                format!("{} and {} have the same name, apart from their endings", other.display(), path.display());
-            return Err(Failure::input(Complaint::new(message)));
-        }
-    }
-    if found.is_empty() {
-        return Err(Failure::input(Complaint::new(format!("{}: holds no PNG or TIFF file", folder.display()))));
-    }
-    Ok(found)
 }

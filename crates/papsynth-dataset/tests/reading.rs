@@ -295,7 +295,7 @@ proptest! {
         for (component, (label, pixels)) in found.iter().zip(&expected) {
             prop_assert_eq!(component.label, *label);
             prop_assert_eq!(&component.mask.pixels(width).collect::<Vec<_>>(), pixels);
-            let border = |i: &usize| i % width == 0 || i % width == width - 1 || i / width == 0 || i / width == height - 1;
+            let border = |&i: &usize| [0, width - 1].contains(&(i % width)) || [0, height - 1].contains(&(i / width));
             prop_assert_eq!(component.at_border, pixels.iter().any(border));
             let (tile, tile_width, [x, y]) = component.tile();
             let drawn = (0..tile.len()).filter(|&i| tile[i] > 0.0);

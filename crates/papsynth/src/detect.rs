@@ -1,9 +1,11 @@
 //! Signal detection: from light to grey levels (Eq. 13), and how detectable an object is in them.
 
 use ccd_noise::{Camera, CameraParams};
+use multiversion::multiversion;
 
 use crate::recipe::PhotonNoise;
 use crate::scene::{Scene, SceneCamera};
+use crate::truth::Run;
 
 /// Electrons above which [`PhotonNoise::Normal`] draws one normal deviate: the skewness 1/√µ is below 0.05.
 const NORMAL_ABOVE_E: f64 = 400.0;
@@ -34,7 +36,6 @@ impl Detector {
                 PhotonNoise::Normal => ccd_noise::PhotonNoise::NormalAbove { mean_e: NORMAL_ABOVE_E },
                 PhotonNoise::Off => ccd_noise::PhotonNoise::Off,
             },
-            ..CameraParams::default()
         };
         Ok(Self { camera: Camera::new(&params).map_err(|e| format!("camera: {e}"))?, scene: camera, gain })
     }
@@ -61,4 +62,31 @@ impl Detector {
         let read = self.scene.read_noise_e * self.scene.read_noise_e;
         (self.gain * self.gain * (shot + read) + ROUNDING).sqrt()
     }
+}
+
+/// Sum of the pixels of these runs, as far as they lie in a tile of rows of `width` whose upper left pixel is pixel
+/// `origin` of the image. The order of the additions is fixed.
+#[multiversion(targets = "simd")]
+pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2]) -> f64 {
+    /// Sums that grow side by side.
+    const LANES: usize = 16;
+    let mut sums = [0.0_f64; LANES];
+    let height = tile.len() / width;
+    for run in runs {
+        let Ok(y) = usize::try_from(i64::from(run.y) - origin[1]) else { continue };
+        if y >= height {
+            continue;
+        }
+        let clip = |x: u32| usize::try_from(i64::from(x) - origin[0]).unwrap_or(0).min(width);
+        let mut blocks = tile[y * width + clip(run.x0)..y * width + clip(run.x1)].chunks_exact(LANES);
+        for block in &mut blocks {
+            for (sum, value) in sums.iter_mut().zip(block) {
+                *sum += f64::from(*value);
+            }
+        }
+        for (sum, value) in sums.iter_mut().zip(blocks.remainder()) {
+            *sum += f64::from(*value);
+        }
+    }
+    sums.iter().sum()
 }

@@ -1,13 +1,15 @@
 //! One scene on its way to an image: phantoms, masks, planes, truth.
 
-use crate::detect::Detector;
+use rand_core::Rng;
+
+use crate::detect::{Detector, sum_over};
 use crate::frame::{Finished, Plane};
 use crate::phantom::{self, Phantom, Studio};
 use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
-use crate::transmit::{self, FocusAt, LightPath};
-use crate::truth::{COVERED, Group, LabelMap, Mask, ObjectTruth, Part, Truth, front_masks, layers};
+use crate::transmit::{self, Band, Feathered, FocusAt, Light, LightPath};
+use crate::truth::{COVERED, Group, LabelMap, Mask, ObjectTruth, Part, Run, Truth, front_masks, layers};
 
 /// A scene with its phantoms made.
 pub(crate) struct Rendering {
@@ -16,6 +18,7 @@ pub(crate) struct Rendering {
     /// Complete masks of every piece of every phantom.
     masks: Vec<Vec<Mask>>,
     path: LightPath,
+    light: Light,
     detector: Detector,
     /// How detectable each piece is, plane by plane.
     detectability: Vec<Vec<f64>>,
@@ -41,7 +44,7 @@ impl Rendering {
         });
         let path = LightPath::new(&scene, &phantoms, threads)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, masks, path, detector, detectability: Vec::new() })
+        Ok(Self { scene, phantoms, masks, path, light: Light::default(), detector, detectability: Vec::new() })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -51,56 +54,29 @@ impl Rendering {
     /// Images one plane. Planes are asked for in order, each once.
     pub(crate) fn plane(&mut self, index: usize) -> Result<Plane, String> {
         let depth_um = self.scene.planes_um[index];
-        let mut light = self.path.image(&self.scene, &self.phantoms, &self.masks, FocusAt::Depth(depth_um))?;
-        let feathered = self.path.feathered.as_deref();
-        let late = self.scene.optics.restore == Restore::AfterDetection;
-        let width = self.scene.view.width;
-        let mut rng = self.scene.key.stream("plane", index as u64, "camera");
-        let mut electrons = core::mem::take(&mut light.spread);
-        if let (Some(feathered), false) = (feathered, late) {
-            transmit::restore(&mut electrons, &light.sharp, feathered);
-        }
-        self.detector.electrons(&mut electrons);
-        let mut grey = vec![0; electrons.len()];
-        // Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g.
-        let saturated = self.detector.camera.expose_into(&electrons, width, &mut grey, &mut rng);
-        let mut noise_free = vec![0.0; electrons.len()];
-        self.detector.camera.mean_dn_into(&electrons, &mut noise_free);
-        if let (Some(feathered), true) = (feathered, late) {
-            self.restore_finished(&mut grey, &mut noise_free, &mut light.sharp, feathered);
-        }
-        let detectability = self.detectabilities(&light.absorbances, &electrons);
+        let mut light = core::mem::take(&mut self.light);
+        let focus = FocusAt::Depth(depth_um);
+        let absorbances = self.path.absorb(&self.scene, &self.phantoms, &self.masks, focus, &mut light)?;
+        let mut exposure = Exposure::new(self, self.scene.key.stream("plane", index as u64, "camera").next_u64());
+        self.path.spread(&mut light, |band| exposure.add(band));
+        let Exposure { grey, noise_free, saturated, electrons, .. } = exposure;
+        let detectability = self.detectabilities(&absorbances, &electrons.sums());
         self.detectability.push(detectability);
+        self.light = light;
         Ok(Plane { index, depth_um, grey, noise_free, saturated })
     }
 
-    /// Eq. 15 on finished grey levels: restored nuclei carry no noise of this camera.
-    fn restore_finished(&self, grey: &mut [u16], noise_free: &mut [f32], sharp: &mut [f32], feathered: &[f32]) {
-        self.detector.electrons(sharp);
-        let mut clean = vec![0.0; sharp.len()];
-        self.detector.camera.mean_dn_into(sharp, &mut clean);
-        transmit::restore(noise_free, &clean, feathered);
-        for ((grey, clean), share) in grey.iter_mut().zip(&clean).zip(feathered) {
-            let seen = f32::from(*grey);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
-            let restored = (seen + share * (clean - seen) + 0.5) as u16;
-            *grey = restored;
-        }
-    }
-
     /// Contrast over noise of every piece: (Ī·10^Ā − Ī) / noise, with Ī the mean grey level over its mask and Ā its mean
-    /// absorbance there, both as they are in this plane.
-    fn detectabilities(&self, absorbances: &[f64], electrons: &[f32]) -> Vec<f64> {
-        let width = self.scene.view.width;
-        let masks = self.masks.iter().flatten();
-        masks
-            .zip(absorbances)
-            .map(|(mask, absorbance)| {
+    /// absorbance there, both as they are in this plane. `electrons` are summed over the masks.
+    fn detectabilities(&self, absorbances: &[f64], electrons: &[f64]) -> Vec<f64> {
+        let pieces = self.masks.iter().flatten().zip(absorbances).zip(electrons);
+        pieces
+            .map(|((mask, absorbance), sum)| {
                 let area = mask.area();
                 if area == 0 {
                     return 0.0;
                 }
-                let mean = mask.pixels(width).map(|p| f64::from(electrons[p])).sum::<f64>() / area as f64;
+                let mean = sum / area as f64;
                 let without = mean * libm::exp10(*absorbance);
                 let contrast = self.detector.expected_dn(without) - self.detector.expected_dn(mean);
                 contrast / self.detector.noise_dn(mean).max(f64::MIN_POSITIVE)
@@ -109,20 +85,23 @@ impl Rendering {
     }
 
     /// The all-in-focus image and the truth.
-    pub(crate) fn finish(self) -> Result<Finished, String> {
+    pub(crate) fn finish(mut self) -> Result<Finished, String> {
         let all_in_focus = if self.planes() > 1 { self.all_in_focus()? } else { Vec::new() };
         let truth = self.truth();
         Ok(Finished { scene: self.scene, truth, all_in_focus })
     }
 
-    fn all_in_focus(&self) -> Result<Vec<f32>, String> {
-        let mut light = self.path.image(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere)?;
-        if let Some(feathered) = &self.path.feathered {
-            transmit::restore(&mut light.spread, &light.sharp, feathered);
-        }
-        self.detector.electrons(&mut light.spread);
-        let mut all_in_focus = vec![0.0; light.spread.len()];
-        self.detector.camera.mean_dn_into(&light.spread, &mut all_in_focus);
+    fn all_in_focus(&mut self) -> Result<Vec<f32>, String> {
+        let mut light = core::mem::take(&mut self.light);
+        self.path.absorb(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere, &mut light)?;
+        let (width, feathered) = (self.scene.view.width, self.path.feathered.as_ref());
+        let mut all_in_focus = Vec::with_capacity(width * self.scene.view.height);
+        self.path.spread(&mut light, |Band { first, sharp, spread }| {
+            restore_light(feathered, first * width, sharp, spread);
+            self.detector.electrons(spread);
+            all_in_focus.resize(first * width + spread.len(), 0.0);
+            self.detector.camera.mean_dn_into(spread, &mut all_in_focus[first * width..]);
+        });
         Ok(all_in_focus)
     }
 
@@ -190,6 +169,114 @@ impl Rendering {
             front: Mask::default(),
             defocus_um: self.scene.planes_um.iter().map(|plane| plane - object.depth_um).collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
+        }
+    }
+}
+
+/// One plane on its way through the camera.
+struct Exposure<'a> {
+    rendering: &'a Rendering,
+    key: u64,
+    grey: Vec<u16>,
+    noise_free: Vec<f32>,
+    saturated: usize,
+    electrons: MaskSums<'a>,
+}
+
+impl<'a> Exposure<'a> {
+    fn new(rendering: &'a Rendering, key: u64) -> Self {
+        let pixels = rendering.scene.view.width * rendering.scene.view.height;
+        Self {
+            rendering,
+            key,
+            grey: Vec::with_capacity(pixels),
+            noise_free: Vec::with_capacity(pixels),
+            saturated: 0,
+            electrons: MaskSums::new(&rendering.masks),
+        }
+    }
+
+    /// Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g, and Eq. 15 before or after it.
+    fn add(&mut self, Band { first, sharp, spread }: Band<'_>) {
+        let Rendering { scene, path, detector, .. } = self.rendering;
+        let width = scene.view.width;
+        let (early, late) = match scene.optics.restore {
+            Restore::AfterDetection => (None, path.feathered.as_ref()),
+            Restore::Off | Restore::BeforeDetection => (path.feathered.as_ref(), None),
+        };
+        restore_light(early, first * width, sharp, spread);
+        detector.electrons(spread);
+        let pixels = first * width..first * width + spread.len();
+        self.grey.resize(pixels.end, 0);
+        self.noise_free.resize(pixels.end, 0.0);
+        let (grey, noise_free) = (&mut self.grey[pixels.clone()], &mut self.noise_free[pixels]);
+        let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
+        self.saturated += detector.camera.expose_window(spread, width, origin, self.key, grey);
+        detector.camera.mean_dn_into(spread, noise_free);
+        self.electrons.add(spread, width, first);
+        if let Some(feathered) = late {
+            restore_finished(detector, feathered, first * width, sharp, grey, noise_free);
+        }
+    }
+}
+
+/// Sums over masks of an image that comes in bands of rows.
+struct MaskSums<'a> {
+    /// The runs that are still to come, and the sum so far.
+    masks: Vec<(&'a [Run], f64)>,
+}
+
+impl<'a> MaskSums<'a> {
+    fn new(masks: &'a [Vec<Mask>]) -> Self {
+        Self { masks: masks.iter().flatten().map(|mask| (mask.runs(), 0.0)).collect() }
+    }
+
+    fn add(&mut self, band: &[f32], width: usize, first: usize) {
+        let end = first + band.len() / width;
+        for (runs, sum) in &mut self.masks {
+            let (here, below) = runs.split_at(runs.partition_point(|run| (run.y as usize) < end));
+            if !here.is_empty() {
+                *sum += sum_over(here, band, width, [0, first as i64]);
+            }
+            *runs = below;
+        }
+    }
+
+    fn sums(&self) -> Vec<f64> {
+        self.masks.iter().map(|(_, sum)| *sum).collect()
+    }
+}
+
+/// Eq. 15 on light, for rows that start at pixel `first`.
+fn restore_light(feathered: Option<&Feathered>, first: usize, sharp: &[f32], spread: &mut [f32]) {
+    let Some(feathered) = feathered else { return };
+    for (span, shares) in feathered.within(first, spread.len()) {
+        transmit::restore(&mut spread[span.clone()], &sharp[span], shares);
+    }
+}
+
+/// Eq. 15 on finished grey levels: restored nuclei carry no noise of this camera.
+fn restore_finished(
+    detector: &Detector,
+    feathered: &Feathered,
+    first: usize,
+    sharp: &[f32],
+    grey: &mut [u16],
+    noise_free: &mut [f32],
+) {
+    let (mut electrons, mut clean) = (Vec::new(), Vec::new());
+    for (span, shares) in feathered.within(first, sharp.len()) {
+        electrons.clear();
+        electrons.extend_from_slice(&sharp[span.clone()]);
+        detector.electrons(&mut electrons);
+        clean.resize(electrons.len(), 0.0);
+        detector.camera.mean_dn_into(&electrons, &mut clean);
+        transmit::restore(&mut noise_free[span.clone()], &clean, shares);
+        for ((grey, clean), share) in grey[span].iter_mut().zip(&clean).zip(shares) {
+            let seen = f32::from(*grey);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
+            let restored = (seen + share * (clean - seen) + 0.5) as u16;
+            *grey = restored;
         }
     }
 }

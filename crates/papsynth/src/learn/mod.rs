@@ -116,6 +116,15 @@ pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<
     Ok(model)
 }
 
+/// The outline of a mask by so many points at equal distances along it.
+///
+/// # Errors
+/// If the mask is empty, has several components or cannot be an image: it says which.
+pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, String> {
+    let outline = fsd_shape::trace(mask, width, crate::truth::COVERED).map_err(|e| e.to_string())?;
+    Ok(fsd_shape::resample(&outline, points))
+}
+
 /// Statistics of outlines in both ways, and of their size.
 fn shapes(outlines: &[Vec<Point>], harmonics: usize, pixel_um: f64, what: &str) -> Result<(Shapes, LogNormal), String> {
     if outlines.len() < FEWEST {

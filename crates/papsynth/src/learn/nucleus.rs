@@ -57,8 +57,7 @@ impl NucleusImage {
         if let Some(bad) = self.light.iter().position(|v| !v.is_finite() || *v < 0.0) {
             return Err(fail(format!("pixel ({}, {}) is {}", bad % self.width, bad / self.width, self.light[bad])));
         }
-        let outline = fsd_shape::trace(&self.mask, self.width, 0.5).map_err(|e| fail(format!("its mask: {e}")))?;
-        let outline = fsd_shape::resample(&outline, POINTS);
+        let outline = super::outline(&self.mask, self.width, POINTS).map_err(|e| fail(format!("its mask: {e}")))?;
         let distance = self.distances(&outline);
         let mut around: Vec<f64> = (0..self.light.len())
             .filter(|&i| self.mask[i] < 0.5 && (GAP..REACH).contains(&distance[i]))

@@ -180,7 +180,7 @@ impl Default for Cytoplasm {
             folds: Folds::default(),
             clouds: Number::uniform(0.03, 0.10),
             clouds_um: 3.0.into(),
-            flecks: Number::log_normal(0.14, 0.6),
+            flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
             flecks_threshold: Number::uniform(0.55, 0.85),
             cytoskeleton: Number::uniform(0.05, 0.18),
             grain: Number::uniform(0.06, 0.18),
