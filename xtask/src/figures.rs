@@ -33,22 +33,16 @@ const fn engine(number: u32, shows: &'static str, arguments: &'static [&'static 
 
 const FIGURES: [Figure; 11] = [
     engine(1, "bacilli, leukocytes, speckles, objects out of focus", &["1"]),
-    Figure { number: 3, shows: "drawn outlines", package: "fsd-shape", example: "compare", arguments: &[] },
+    Figure { number: 3, shows: "drawn outlines", package: "fsd-shape", example: "sheet", arguments: &[] },
     Figure {
         number: 4,
         shows: "patches and their overlaps",
         package: "quilt-texture",
-        example: "quilt",
+        example: "nucleus",
         arguments: &[],
     },
     engine(5, "a nucleus and its three donors", &["5"]),
-    Figure {
-        number: 6,
-        shows: "the sheet in its outline",
-        package: "cloth-verlet",
-        example: "crumple",
-        arguments: &[],
-    },
+    Figure { number: 6, shows: "the sheet in its outline", package: "cloth-verlet", example: "figure", arguments: &[] },
     engine(7, "levels of detail of a cytoplasm", &["7"]),
     engine(8, "weight maps and what they scatter", &["8"]),
     engine(9, "a cluster of leukocytes, step by step", &["9"]),

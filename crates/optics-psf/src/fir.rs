@@ -71,8 +71,8 @@ fn blur_strip(
     let radius = half.len() - 1;
     let pitch = columns.next_multiple_of(LANES);
     let dst_width = width + 2 * margin;
-    strip.resize((dst.len() / dst_width + 2 * radius) * pitch, 0.0);
-    line.resize(pitch + 2 * radius, 0.0);
+    let strip = at_least(strip, (dst.len() / dst_width + 2 * radius) * pitch);
+    let line = at_least(line, pitch + 2 * radius);
 
     // Along the rows: those that the rows of `dst` need.
     let start = x.cast_signed() - (margin + radius).cast_signed();
@@ -96,6 +96,14 @@ fn blur_strip(
         let taps = useful(border, radius, y, 1, height);
         fir(strip, (i + radius) * pitch, pitch, half, taps, &mut row[x..x + columns]);
     }
+}
+
+/// The first `len` values of memory that grows where it must. What they hold is left over from before.
+fn at_least(memory: &mut Vec<f32>, len: usize) -> &mut [f32] {
+    if memory.len() < len {
+        memory.resize(len, 0.0);
+    }
+    &mut memory[..len]
 }
 
 /// First and last tap that can meet a pixel of `0..len` from the `count` places from `from` on,

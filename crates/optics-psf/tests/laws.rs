@@ -311,7 +311,8 @@ fn a_truncated_kernel_errs_by_its_tail() {
             for image in &images {
                 let blur = |gaussian: &Gaussian| gaussian.blur(image, width, Border::Reflect);
                 let error = f64::from(largest_difference(&blur(&short), &blur(&exact)));
-                assert!(error < 1.5 * lost_tail, "{sigma}, {lost_tail}: {error}");
+                // The worst image there is would err by 5.2 times that along each axis.
+                assert!(error < 5.0 * lost_tail, "{sigma}, {lost_tail}: {error}");
             }
         }
     }

@@ -90,3 +90,24 @@ pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2
     }
     sums.iter().sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sum_is_that_of_the_pixels_in_the_tile() {
+        let tile: Vec<f32> = (0..40 * 5).map(|i| i as f32 * 0.37).collect();
+        let run = |y, x0, x1| Run { y, x0, x1 };
+        let runs = [run(2, 0, 90), run(9, 0, 90), run(10, 25, 30), run(12, 3, 47), run(14, 59, 70), run(15, 20, 60)];
+        let slow: f64 = runs
+            .iter()
+            .flat_map(|r| (r.x0..r.x1).map(|x| (x, r.y)))
+            .filter(|(x, y)| (20..60).contains(x) && (10..15).contains(y))
+            .map(|(x, y)| f64::from(tile[((y - 10) * 40 + x - 20) as usize]))
+            .sum();
+        let fast = sum_over(&runs, &tile, 40, [20, 10]);
+        assert!((fast - slow).abs() < 1e-9 * slow, "{fast} {slow}");
+        assert_eq!(sum_over(&[], &tile, 40, [20, 10]), 0.0);
+    }
+}

@@ -21,8 +21,8 @@ use crate::truth::{COVERED, Mask};
 /// Spread below which a Gaussian changes nothing that 16 bits could show, px.
 const SHARP_PX: f64 = 0.03;
 
-/// Share of an object's absorbance that lies beyond the ends of its blur and is left out: a tenth of what the
-/// decimated blur may err by, and far below a grey level of 8 bits.
+/// Share of an object's absorbance that lies beyond the ends of its blur and is left out. It errs by ten times
+/// that at the worst, which is what the decimated blur may err by.
 const LOST_TAIL: f64 = 1e-4;
 
 /// The same for the spread in the image plane, which everything passes.
@@ -84,6 +84,7 @@ pub(crate) enum FocusAt {
 struct Blurred<'a> {
     origin: [i64; 2],
     width: usize,
+    /// Nothing if the tile lies outside the image.
     values: Cow<'a, [f32]>,
     /// Mean over the mask of the piece.
     mean: f64,
@@ -190,8 +191,10 @@ impl LightPath {
         let margin = gaussian.map_or(0, Gaussian::radius);
         let origin = tile.origin.map(|at| at - margin as i64);
         let (width, height) = (tile.width + 2 * margin, tile.height() + 2 * margin);
+        if !self.meets(origin, width, height) {
+            return Blurred { origin, width, values: Cow::Borrowed(&[]), mean: 0.0 };
+        }
         let values = match gaussian {
-            Some(_) if !self.meets(origin, width, height) => Cow::Borrowed(&[][..]),
             None => Cow::Borrowed(&tile.values[..]),
             Some(gaussian) => {
                 let mut values = self.spare().tiles.pop().unwrap_or_default();
@@ -314,4 +317,24 @@ fn background(scene: &Scene) -> Result<Background, String> {
     };
     let key = scene.key.stream("field", 0, "background").next_u64();
     Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adding_clips_at_every_side_as_for_whole_tiles() {
+        for (x, y, width, height) in
+            [(-2, -3, 9, 8), (3, 2, 2, 2), (5, 4, 9, 9), (-4, 1, 4, 2), (0, 6, 3, 3), (8, 0, 2, 2)]
+        {
+            let values: Vec<f32> = (1..=width * height).map(|i| i as f32).collect();
+            let tile = Tile { origin: [x, y], width, values };
+            let blurred = Blurred { origin: tile.origin, width, values: Cow::Borrowed(&tile.values), mean: 0.0 };
+            let (mut fast, mut slow) = (vec![0.5; 48], vec![0.5; 48]);
+            add(&mut fast, 8, &blurred);
+            add_tile(&mut slow, 8, 6, [0, 0], &tile);
+            assert_eq!(fast, slow, "{x} {y}");
+        }
+    }
 }

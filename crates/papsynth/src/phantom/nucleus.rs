@@ -66,9 +66,11 @@ pub(super) fn make(
     };
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
+    // An imaged donor shows the rim of its own nucleus.
+    let rim_strength = if imaged { 0.0 } else { nucleus.rim as f32 };
     let mut absorbance = coverage.clone();
     for (i, value) in absorbance.values.iter_mut().enumerate() {
-        let rim = (coverage.values[i] - inner.values[i]).max(0.0) * nucleus.rim as f32;
+        let rim = (coverage.values[i] - inner.values[i]).max(0.0) * rim_strength;
         let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }

@@ -281,7 +281,7 @@ impl Default for Nucleus {
             restore_feather_um: 0.3.into(),
             pyknotic: 0.05.into(),
             wrinkled: 0.15.into(),
-            rim: Number::uniform(0.1, 0.4),
+            rim: Number::uniform(0.0, 0.25),
         }
     }
 }

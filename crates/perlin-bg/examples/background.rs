@@ -1,4 +1,4 @@
-//! Writes the picture of the README: `cargo run --release --example picture [path]`.
+//! Writes the picture of the README: `cargo run --release --example background [path]`.
 //!
 //! Above: fractal noise of 1, 3 and 5 octaves. Below: the paper's background and ours. Every panel is stretched to its
 //! own extremes; the backgrounds vary by some percent of their level only.

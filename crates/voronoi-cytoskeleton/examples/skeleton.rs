@@ -1,4 +1,4 @@
-//! Writes the picture of the README: `cargo run --release --example picture [path]`.
+//! Writes the picture of the README: `cargo run --release --example skeleton [path]`.
 //!
 //! Left: sites drawn uniformly, and their diagram. Middle: after two passes of Lloyd's algorithm. Right: the trees.
 
