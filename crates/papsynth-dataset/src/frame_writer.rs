@@ -136,15 +136,17 @@ impl<'a> FrameWriter<'a> {
             self.write_grey(&layout::all_in_focus(index), &grey)?;
         }
         let view = self.geometry.view;
+        let mut ids = Vec::new();
         for group in Group::ALL {
-            let ids = &truth.labels_of(group).ids;
-            self.write_tiff(&layout::labels(group, index), label_tiff(ids, view.width, view.pixel_um))?;
+            truth.labels_into(group, &mut ids);
+            self.write_tiff(&layout::labels(group, index), label_tiff(&ids, view.width, view.pixel_um))?;
         }
-        let layers = compressed(Pixels::U16(&truth.layers), view.width, view.pixel_um);
-        self.write_tiff(&layout::layers(index), layers)?;
+        let layers = truth.layers();
+        let most_layers = layers.iter().copied().max().unwrap_or(0);
+        self.write_tiff(&layout::layers(index), compressed(Pixels::U16(&layers), view.width, view.pixel_um))?;
         let rows = table(truth, index).map_err(|e| self.wrong(e.to_string()))?;
         self.write(&layout::table(index), &rows)?;
-        let summary = summary(&self.geometry, truth, std::mem::take(&mut self.saturated));
+        let summary = summary(&self.geometry, truth, most_layers, std::mem::take(&mut self.saturated));
         let document = Document::of_frame(truth, &summary, &self.dataset.categories)
             .map_err(|name| self.wrong(format!("the recipe knows no category `{name}`")))?;
         let document = serde_json::to_vec(&document).map_err(|e| self.wrong(e.to_string()))?;
@@ -198,9 +200,9 @@ impl<'a> FrameWriter<'a> {
         if due > 1 {
             self.check_size("all-in-focus values", finished.all_in_focus.len(), pixels)?;
         }
-        self.check_size("layer counts", truth.layers.len(), pixels)?;
-        for group in Group::ALL {
-            self.check_size("labels", truth.labels_of(group).ids.len(), pixels)?;
+        if [truth.width, truth.height] != [view.width, view.height] {
+            let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
+            return Err(self.wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}")));
         }
         let outside = truth.objects.iter().find(|object| {
             [&object.amodal, &object.front]
@@ -236,7 +238,7 @@ fn rounded(values: &[f32], white: u16) -> Vec<u16> {
     values.iter().map(|&v| round(v)).collect()
 }
 
-fn summary(geometry: &Geometry, truth: &Truth, saturated: Vec<usize>) -> FrameSummary {
+fn summary(geometry: &Geometry, truth: &Truth, most_layers: u16, saturated: Vec<usize>) -> FrameSummary {
     let mut objects = BTreeMap::new();
     for object in &truth.objects {
         *objects.entry(category_name(&object.class, object.part)).or_insert(0) += 1;
@@ -251,6 +253,6 @@ fn summary(geometry: &Geometry, truth: &Truth, saturated: Vec<usize>) -> FrameSu
         saturated,
         objects,
         truncated: truth.objects.iter().filter(|o| o.truncated).count() as u64,
-        most_layers: truth.layers.iter().copied().max().unwrap_or(0),
+        most_layers,
     }
 }

@@ -99,7 +99,7 @@ impl Dataset {
         let key = Key { seed: self.identity.seed, index };
         let scene = engine.scene(key)?;
         let mut writer = self.frame_writer(&scene)?;
-        let finished = engine.image::<Error>(scene, threads, |plane| writer.write_plane(&plane))?;
+        let finished = engine.image::<Error>(scene, threads, |plane| writer.write_plane(plane))?;
         report(Progress::Made(&writer.finish(&finished)?));
         Ok(Made::Now)
     }

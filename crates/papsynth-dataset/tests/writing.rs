@@ -53,10 +53,10 @@ fn check_labels(scratch: &Scratch, frame: &Frame) {
     let name = format!("{:06}.tif", frame.finished.scene.key.index);
     for group in Group::ALL {
         let path = scratch.join(&format!("labels/{}/{name}", group.name()));
-        assert_eq!(&read_label_map(&path, &Limits::default()).unwrap(), frame.finished.truth.labels_of(group));
+        assert_eq!(&read_label_map(&path, &Limits::default()).unwrap(), &frame.finished.truth.labels(group));
     }
     let layers = read_label_map(&scratch.join(&format!("labels/layers/{name}")), &Limits::default()).unwrap();
-    let expected: Vec<u32> = frame.finished.truth.layers.iter().map(|&n| n.into()).collect();
+    let expected: Vec<u32> = frame.finished.truth.layers().iter().map(|&n| n.into()).collect();
     assert_eq!(layers.ids, expected);
 }
 
@@ -298,8 +298,8 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     finished.truth.objects[0].class = "unheard of".to_owned();
     refused(both().finish(&finished).unwrap_err(), "unheard of cytoplasm");
     let mut finished = good.finished.clone();
-    finished.truth.layers.pop();
-    refused(both().finish(&finished).unwrap_err(), "3499 layer counts");
+    finished.truth.width += 1;
+    refused(both().finish(&finished).unwrap_err(), "the truth is that of 71 x 50 pixels");
     let mut scene = good.finished.scene.clone();
     scene.key.seed += 1;
     refused(dataset.frame_writer(&scene).err().unwrap(), "seed");

@@ -196,7 +196,7 @@ fn leukocytes() -> Outcome<GrayImage> {
     let frame = frame(&recipe, 2)?;
     let first = of_kind(&frame, Kind::Leukocyte).first().copied().ok_or("no leukocyte")?;
     let mut masks = frame.clone();
-    let ids = &frame.finished.truth.labels_of(papsynth::truth::Group::Debris).ids;
+    let ids = &frame.finished.truth.labels(papsynth::truth::Group::Debris).ids;
     for (grey, id) in masks.planes[0].grey.iter_mut().zip(ids) {
         *grey = if *id == 0 { 0 } else { 90 + (*id as u16 * 37) % 160 };
     }

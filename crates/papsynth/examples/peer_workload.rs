@@ -10,6 +10,7 @@ use std::time::Instant;
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Number, Recipe};
+use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Threads};
 
 /// The recipe that mirrors the peer's defaults.
@@ -26,14 +27,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         recipe.focus.step_um = Number::Fixed(0.4);
     }
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
+    let mut views = Views::default();
     if what == "throughput" {
         return throughput(&engine, count, threads);
     }
-    render(&engine, 0)?;
+    render(&engine, 0, &mut views)?;
     let (mut cpu, mut wall) = (Vec::new(), Vec::new());
     for index in 1..=count {
         let (c, w) = (cpu_seconds(), now());
-        render(&engine, index)?;
+        render(&engine, index, &mut views)?;
         cpu.push(cpu_seconds() - c);
         wall.push(w.elapsed().as_secs_f64());
     }
@@ -51,22 +53,39 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn throughput(engine: &Engine, count: u64, threads: u64) -> Result<(), Box<dyn std::error::Error>> {
     let start = now();
     std::thread::scope(|scope| {
-        for thread in 0..threads {
-            scope.spawn(move || (thread..count).step_by(threads as usize).try_for_each(|index| render(engine, index)));
-        }
-    });
+        let work = |thread: u64| {
+            let mut views = Views::default();
+            (thread..count).step_by(threads as usize).try_for_each(|index| render(engine, index, &mut views))
+        };
+        let workers: Vec<_> = (0..threads).map(|thread| scope.spawn(move || work(thread))).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().expect("no thread panics"))
+    })?;
     let seconds = start.elapsed().as_secs_f64();
     println!("{{\"what\":\"throughput\",\"threads\":{threads},\"frames_per_s\":{:.4}}}", count as f64 / seconds);
     Ok(())
 }
 
-fn render(engine: &Engine, index: u64) -> Result<(), Error> {
+/// Memory for label maps and layers.
+#[derive(Default)]
+struct Views {
+    ids: Vec<u32>,
+    layers: Vec<u16>,
+}
+
+fn render(engine: &Engine, index: u64, views: &mut Views) -> Result<(), Error> {
     let mut sum = 0_u64;
-    let finished = engine.stream::<Error>(Key { seed: 3, index }, Threads::One, |plane| {
-        sum += plane.grey.iter().map(|g| u64::from(*g)).sum::<u64>();
-        Ok(())
-    })?;
-    std::hint::black_box((sum, finished.truth.objects.len()));
+    let truth = engine
+        .stream::<Error>(Key { seed: 3, index }, Threads::One, |plane| {
+            sum += plane.grey.iter().map(|g| u64::from(*g)).sum::<u64>();
+            Ok(())
+        })?
+        .truth;
+    for group in Group::ALL {
+        truth.labels_into(group, &mut views.ids);
+        std::hint::black_box(&views.ids);
+    }
+    truth.layers_into(&mut views.layers);
+    std::hint::black_box((sum, &views.layers, truth.objects.len()));
     Ok(())
 }
 

@@ -1,12 +1,14 @@
 //! The engine: recipe, model, seed and index in; image and truth out.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use crate::error::Error;
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::Studio;
 use crate::recipe::Recipe;
-use crate::render::Rendering;
+use crate::render::{Desk, Rendering};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 
@@ -37,6 +39,8 @@ pub struct Engine {
     model: Model,
     weight_map: Option<WeightMap>,
     studio: Studio,
+    /// Memory of finished images: as many as were ever made side by side.
+    desks: Mutex<Vec<Desk>>,
 }
 
 impl Engine {
@@ -56,7 +60,13 @@ impl Engine {
         };
         scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
         let studio = Studio::new(recipe, model, fft).map_err(Error::Model)?;
-        Ok(Self { recipe: recipe.clone(), model: model.clone(), weight_map: inputs.weight_map.clone(), studio })
+        Ok(Self {
+            recipe: recipe.clone(),
+            model: model.clone(),
+            weight_map: inputs.weight_map.clone(),
+            studio,
+            desks: Mutex::default(),
+        })
     }
 
     /// The recipe of this engine.
@@ -73,7 +83,7 @@ impl Engine {
         scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key)
     }
 
-    /// Makes an image and its truth, handing over each plane as soon as it is done.
+    /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.
     ///
     /// # Errors
     /// What `sink` returned, or why the scene cannot be drawn.
@@ -81,7 +91,7 @@ impl Engine {
         &self,
         key: Key,
         threads: Threads,
-        sink: impl FnMut(Plane) -> Result<(), E>,
+        sink: impl FnMut(&Plane) -> Result<(), E>,
     ) -> Result<Finished, E> {
         let scene = self.scene(key)?;
         self.image(scene, threads, sink)
@@ -95,15 +105,22 @@ impl Engine {
         &self,
         scene: Scene,
         threads: Threads,
-        mut sink: impl FnMut(Plane) -> Result<(), E>,
+        mut sink: impl FnMut(&Plane) -> Result<(), E>,
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |message| E::from(Error::Image { index, message });
-        let mut rendering = Rendering::new(&self.studio, scene, threads).map_err(fail)?;
+        let desk = self.desks().pop().unwrap_or_default();
+        let mut rendering = Rendering::new(&self.studio, scene, threads, desk).map_err(fail)?;
         for plane in 0..rendering.planes() {
             sink(rendering.plane(plane).map_err(fail)?)?;
         }
-        rendering.finish().map_err(fail)
+        let (finished, desk) = rendering.finish().map_err(fail)?;
+        self.desks().push(desk);
+        Ok(finished)
+    }
+
+    fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {
+        self.desks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Makes an image and its truth, whole.
@@ -113,7 +130,7 @@ impl Engine {
     pub fn frame(&self, key: Key) -> Result<Frame, Error> {
         let mut planes = Vec::new();
         let finished = self.stream::<Error>(key, Threads::All, |plane| {
-            planes.push(plane);
+            planes.push(plane.clone());
             Ok(())
         })?;
         Ok(Frame { planes, finished })

@@ -4,7 +4,7 @@ use crate::scene::Scene;
 use crate::truth::Truth;
 
 /// One focal plane.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plane {
     /// Its place in the stack, from 0.
     pub index: usize,

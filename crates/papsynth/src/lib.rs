@@ -17,6 +17,7 @@ mod phantom;
 mod random;
 pub mod recipe;
 mod render;
+mod restore;
 pub mod scene;
 mod threads;
 mod transmit;

@@ -6,10 +6,20 @@ use crate::detect::{Detector, sum_over};
 use crate::frame::{Finished, Plane};
 use crate::phantom::{self, Phantom, Studio};
 use crate::recipe::Restore;
+use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
-use crate::transmit::{self, Band, Feathered, FocusAt, Light, LightPath};
-use crate::truth::{COVERED, Group, LabelMap, Mask, ObjectTruth, Part, Run, Truth, front_masks, layers};
+use crate::transmit::{Band, FocusAt, Light, LightPath};
+use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts};
+
+/// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
+#[derive(Debug, Default)]
+pub(crate) struct Desk {
+    light: Light,
+    plane: Plane,
+    /// All zero between images.
+    ids: Vec<u32>,
+}
 
 /// A scene with its phantoms made.
 pub(crate) struct Rendering {
@@ -18,14 +28,14 @@ pub(crate) struct Rendering {
     /// Complete masks of every piece of every phantom.
     masks: Vec<Vec<Mask>>,
     path: LightPath,
-    light: Light,
+    desk: Desk,
     detector: Detector,
     /// How detectable each piece is, plane by plane.
     detectability: Vec<Vec<f64>>,
 }
 
 impl Rendering {
-    pub(crate) fn new(studio: &Studio, scene: Scene, threads: Threads) -> Result<Self, String> {
+    pub(crate) fn new(studio: &Studio, scene: Scene, threads: Threads, mut desk: Desk) -> Result<Self, String> {
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
         let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
@@ -42,9 +52,9 @@ impl Rendering {
             };
             phantom.pieces.iter().map(mask).collect()
         });
-        let path = LightPath::new(&scene, &phantoms, threads)?;
+        let path = LightPath::new(&scene, &phantoms, threads, &mut desk.light)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, masks, path, light: Light::default(), detector, detectability: Vec::new() })
+        Ok(Self { scene, phantoms, masks, path, desk, detector, detectability: Vec::new() })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -52,18 +62,19 @@ impl Rendering {
     }
 
     /// Images one plane. Planes are asked for in order, each once.
-    pub(crate) fn plane(&mut self, index: usize) -> Result<Plane, String> {
+    pub(crate) fn plane(&mut self, index: usize) -> Result<&Plane, String> {
         let depth_um = self.scene.planes_um[index];
-        let mut light = core::mem::take(&mut self.light);
+        let Desk { mut light, mut plane, ids } = core::mem::take(&mut self.desk);
         let focus = FocusAt::Depth(depth_um);
         let absorbances = self.path.absorb(&self.scene, &self.phantoms, &self.masks, focus, &mut light)?;
-        let mut exposure = Exposure::new(self, self.scene.key.stream("plane", index as u64, "camera").next_u64());
+        plane.start(index, depth_um, self.scene.view.width * self.scene.view.height);
+        let mut exposure = Exposure::new(self, &mut plane);
         self.path.spread(&mut light, |band| exposure.add(band));
-        let Exposure { grey, noise_free, saturated, electrons, .. } = exposure;
-        let detectability = self.detectabilities(&absorbances, &electrons.sums());
+        let electrons = exposure.electrons.sums();
+        let detectability = self.detectabilities(&absorbances, &electrons);
         self.detectability.push(detectability);
-        self.light = light;
-        Ok(Plane { index, depth_um, grey, noise_free, saturated })
+        self.desk = Desk { light, plane, ids };
+        Ok(&self.desk.plane)
     }
 
     /// Contrast over noise of every piece: (Ī·10^Ā − Ī) / noise, with Ī the mean grey level over its mask and Ā its mean
@@ -84,19 +95,20 @@ impl Rendering {
             .collect()
     }
 
-    /// The all-in-focus image and the truth.
-    pub(crate) fn finish(mut self) -> Result<Finished, String> {
+    /// The all-in-focus image and the truth, and the memory for the next image.
+    pub(crate) fn finish(mut self) -> Result<(Finished, Desk), String> {
         let all_in_focus = if self.planes() > 1 { self.all_in_focus()? } else { Vec::new() };
-        let truth = self.truth();
-        Ok(Finished { scene: self.scene, truth, all_in_focus })
+        let mut ids = core::mem::take(&mut self.desk.ids);
+        let truth = self.truth(&mut ids);
+        Ok((Finished { scene: self.scene, truth, all_in_focus }, Desk { ids, ..self.desk }))
     }
 
     fn all_in_focus(&mut self) -> Result<Vec<f32>, String> {
-        let mut light = core::mem::take(&mut self.light);
-        self.path.absorb(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere, &mut light)?;
+        let light = &mut self.desk.light;
+        self.path.absorb(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere, light)?;
         let (width, feathered) = (self.scene.view.width, self.path.feathered.as_ref());
         let mut all_in_focus = Vec::with_capacity(width * self.scene.view.height);
-        self.path.spread(&mut light, |Band { first, sharp, spread }| {
+        self.path.spread(light, |Band { first, sharp, spread }| {
             restore_light(feathered, first * width, sharp, spread);
             self.detector.electrons(spread);
             all_in_focus.resize(first * width + spread.len(), 0.0);
@@ -105,8 +117,10 @@ impl Rendering {
         Ok(all_in_focus)
     }
 
-    fn truth(&self) -> Truth {
+    /// `ids` is memory for an image.
+    fn truth(&self, ids: &mut Vec<u32>) -> Truth {
         let (width, height) = (self.scene.view.width, self.scene.view.height);
+        ids.resize(width * height, 0);
         let mut objects = Vec::new();
         let mut number = 0;
         for ((object, phantom), masks) in self.scene.objects.iter().zip(&self.phantoms).zip(&self.masks) {
@@ -117,19 +131,16 @@ impl Rendering {
                 number += 1;
             }
         }
-        let labels = Group::ALL.map(|group| {
+        for group in Group::ALL {
             let chosen: Vec<usize> = (0..objects.len()).filter(|&i| objects[i].group() == group).collect();
             let painted: Vec<(u32, f64, &Mask)> =
                 chosen.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
-            let (labels, fronts): (LabelMap, Vec<Mask>) = front_masks(&painted, width, height);
+            let fronts = fronts(&painted, width, ids);
             for (i, front) in chosen.into_iter().zip(fronts) {
                 objects[i].front = front;
             }
-            labels
-        });
-        let cytoplasms = objects.iter().filter(|o| o.part == Part::Cytoplasm).map(|o| &o.amodal);
-        let layers = layers(cytoplasms, width, height);
-        Truth { objects, labels, layers }
+        }
+        Truth { width, height, objects }
     }
 
     fn row(
@@ -173,27 +184,27 @@ impl Rendering {
     }
 }
 
+impl Plane {
+    /// Makes this the plane of that index, its pixels to be written.
+    fn start(&mut self, index: usize, depth_um: f64, pixels: usize) {
+        (self.index, self.depth_um, self.saturated) = (index, depth_um, 0);
+        self.grey.resize(pixels, 0);
+        self.noise_free.resize(pixels, 0.0);
+    }
+}
+
 /// One plane on its way through the camera.
 struct Exposure<'a> {
     rendering: &'a Rendering,
     key: u64,
-    grey: Vec<u16>,
-    noise_free: Vec<f32>,
-    saturated: usize,
+    plane: &'a mut Plane,
     electrons: MaskSums<'a>,
 }
 
 impl<'a> Exposure<'a> {
-    fn new(rendering: &'a Rendering, key: u64) -> Self {
-        let pixels = rendering.scene.view.width * rendering.scene.view.height;
-        Self {
-            rendering,
-            key,
-            grey: Vec::with_capacity(pixels),
-            noise_free: Vec::with_capacity(pixels),
-            saturated: 0,
-            electrons: MaskSums::new(&rendering.masks),
-        }
+    fn new(rendering: &'a Rendering, plane: &'a mut Plane) -> Self {
+        let key = rendering.scene.key.stream("plane", plane.index as u64, "camera").next_u64();
+        Self { rendering, key, plane, electrons: MaskSums::new(&rendering.masks) }
     }
 
     /// Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g, and Eq. 15 before or after it.
@@ -207,11 +218,9 @@ impl<'a> Exposure<'a> {
         restore_light(early, first * width, sharp, spread);
         detector.electrons(spread);
         let pixels = first * width..first * width + spread.len();
-        self.grey.resize(pixels.end, 0);
-        self.noise_free.resize(pixels.end, 0.0);
-        let (grey, noise_free) = (&mut self.grey[pixels.clone()], &mut self.noise_free[pixels]);
+        let (grey, noise_free) = (&mut self.plane.grey[pixels.clone()], &mut self.plane.noise_free[pixels]);
         let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
-        self.saturated += detector.camera.expose_window(spread, width, origin, self.key, grey);
+        self.plane.saturated += detector.camera.expose_window(spread, width, origin, self.key, grey);
         detector.camera.mean_dn_into(spread, noise_free);
         self.electrons.add(spread, width, first);
         if let Some(feathered) = late {
@@ -251,7 +260,7 @@ impl<'a> MaskSums<'a> {
 fn restore_light(feathered: Option<&Feathered>, first: usize, sharp: &[f32], spread: &mut [f32]) {
     let Some(feathered) = feathered else { return };
     for (span, shares) in feathered.within(first, spread.len()) {
-        transmit::restore(&mut spread[span.clone()], &sharp[span], shares);
+        restore(&mut spread[span.clone()], &sharp[span], shares);
     }
 }
 
@@ -271,7 +280,7 @@ fn restore_finished(
         detector.electrons(&mut electrons);
         clean.resize(electrons.len(), 0.0);
         detector.camera.mean_dn_into(&electrons, &mut clean);
-        transmit::restore(&mut noise_free[span.clone()], &clean, shares);
+        restore(&mut noise_free[span.clone()], &clean, shares);
         for ((grey, clean), share) in grey[span].iter_mut().zip(&clean).zip(shares) {
             let seen = f32::from(*grey);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{PhotonNoise, Recipe, Restore};
 use papsynth::scene::{Kind, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View};
-use papsynth::truth::{Mask, ObjectTruth, Part, Truth, front_masks, layers};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Truth, front_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
@@ -150,17 +150,16 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
     let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
         (0..objects.len()).filter(|&i| objects[i].part == part).collect()
     };
-    let labels = [Part::Cytoplasm, Part::Nucleus, Part::Whole].map(|part| {
+    for part in [Part::Cytoplasm, Part::Nucleus, Part::Whole] {
         let members = of_part(&objects, part);
         let stack: Vec<_> = members.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
-        let (labels, fronts) = front_masks(&stack, WIDTH, HEIGHT);
+        let fronts = front_masks(&stack, WIDTH, HEIGHT);
         for (i, front) in members.into_iter().zip(fronts) {
             objects[i].front = front;
         }
-        labels
-    });
-    let cytoplasms = objects.iter().filter(|o| o.part == Part::Cytoplasm);
-    let layers = layers(cytoplasms.map(|o| &o.amodal), WIDTH, HEIGHT);
+    }
+    let truth = Truth { width: WIDTH, height: HEIGHT, objects };
+    let labels = Group::ALL.map(|group| truth.labels(group));
     let white = u16::try_from((1_u32 << bits) - 1).unwrap();
     let all_in_focus: Vec<f32> = (0..WIDTH * HEIGHT)
         .map(|i| {
@@ -180,5 +179,5 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
             Plane { index: z, depth_um: scene.planes_um[z], grey: grey.collect(), noise_free, saturated: z }
         })
         .collect();
-    Frame { planes, finished: Finished { scene, truth: Truth { objects, labels, layers }, all_in_focus } }
+    Frame { planes, finished: Finished { scene, truth, all_in_focus } }
 }

@@ -30,7 +30,7 @@ const SKEW: f64 = 0.45;
 pub(super) fn make(
     studio: &Studio,
     scene: &Scene,
-    pools: &Pools,
+    pools: &Pools<'_>,
     cells: &[(&Object, &CellBody)],
 ) -> Result<Vec<Phantom>, String> {
     let plans =
@@ -137,7 +137,7 @@ fn crumple(
 fn finish(
     studio: &Studio,
     scene: &Scene,
-    pools: &Pools,
+    pools: &Pools<'_>,
     object: &Object,
     body: &CellBody,
     plan: Plan,
@@ -238,13 +238,20 @@ fn roughened(outline: &[Point], depth_px: f64, rng: &mut Stream) -> Vec<Point> {
 }
 
 /// The first two levels of detail, and the grain: factors on the thickness.
-fn add_detail(absorbance: &mut Tile, coverage: &Tile, body: &CellBody, pools: &Pools, pixel_um: f64, rng: &mut Stream) {
+fn add_detail(
+    absorbance: &mut Tile,
+    coverage: &Tile,
+    body: &CellBody,
+    pools: &Pools<'_>,
+    pixel_um: f64,
+    rng: &mut Stream,
+) {
     let detail = &body.detail;
     let clouds = Look::clouds(detail.clouds_um / pixel_um, rng);
     let flecks = Look::fine(pixel_um, rng);
     let grain = Look::fine(pixel_um, rng);
-    let threshold = pools.flecks.quantile(detail.flecks_threshold);
     let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
+    let threshold = if fleck > 0.0 { pools.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
     let mut buffers = vec![0.0_f32; 2 * width];
     let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
@@ -255,16 +262,16 @@ fn add_detail(absorbance: &mut Tile, coverage: &Tile, body: &CellBody, pools: &P
         let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
         factor.fill(1.0);
         if cloud > 0.0 {
-            pools.clouds.row_into(field, &clouds, at);
+            pools.clouds().row_into(field, &clouds, at);
             add_above(factor, field, cloud, f32::NEG_INFINITY);
         }
         if fleck > 0.0 {
-            pools.flecks.row_into(field, &flecks, at);
+            pools.flecks().row_into(field, &flecks, at);
             field.iter_mut().for_each(|value| *value -= threshold);
             add_above(factor, field, fleck, 0.0);
         }
         if grainy > 0.0 {
-            pools.grain.row_into(field, &grain, at);
+            pools.grain().row_into(field, &grain, at);
             add_above(factor, field, grainy, f32::NEG_INFINITY);
         }
         for (value, factor) in row.iter_mut().zip(factor) {

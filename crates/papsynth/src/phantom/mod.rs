@@ -49,7 +49,12 @@ pub(crate) struct Phantom {
 ///
 /// Objects are handed over in batches because sheets are pressed side by side in SIMD lanes; the result is the same
 /// for any grouping.
-pub(crate) fn make(studio: &Studio, scene: &Scene, pools: &Pools, objects: &[&Object]) -> Result<Vec<Phantom>, String> {
+pub(crate) fn make(
+    studio: &Studio,
+    scene: &Scene,
+    pools: &Pools<'_>,
+    objects: &[&Object],
+) -> Result<Vec<Phantom>, String> {
     let cells: Vec<(&Object, &crate::scene::CellBody)> = objects
         .iter()
         .filter_map(|object| match &object.body {

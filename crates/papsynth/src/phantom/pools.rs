@@ -1,5 +1,7 @@
 //! Random fields that the cells of one image share, each cell looking at another place of them, mirrored or not.
 
+use std::sync::OnceLock;
+
 use rand_core::Rng;
 use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
 
@@ -27,12 +29,15 @@ pub(crate) struct PoolMaker {
     grain: SpectralField,
 }
 
-/// The fields of one image. All have mean 0, variance 1 and repeat after [`SIDE`] texels.
+/// The fields of one image. All have mean 0, variance 1 and repeat after [`SIDE`] texels. Each is made when a cell
+/// first asks for it.
 #[derive(Debug)]
-pub(crate) struct Pools {
-    pub(crate) clouds: Pool,
-    pub(crate) flecks: Pool,
-    pub(crate) grain: Pool,
+pub(crate) struct Pools<'a> {
+    maker: &'a PoolMaker,
+    key: Key,
+    clouds: OnceLock<Pool>,
+    flecks: OnceLock<Pool>,
+    grain: OnceLock<Pool>,
 }
 
 /// A field that repeats.
@@ -72,13 +77,27 @@ impl PoolMaker {
     }
 
     /// The pools of an image.
-    pub(crate) fn make(&self, key: Key) -> Pools {
-        let draw = |field: &SpectralField, purpose: &str| Pool::new(field.draw(&mut key.stream("field", 0, purpose)));
-        Pools {
-            clouds: draw(&self.clouds, "pool.clouds"),
-            flecks: draw(&self.flecks, "pool.flecks"),
-            grain: draw(&self.grain, "pool.grain"),
-        }
+    pub(crate) fn make(&self, key: Key) -> Pools<'_> {
+        let (clouds, flecks, grain) = Default::default();
+        Pools { maker: self, key, clouds, flecks, grain }
+    }
+}
+
+impl Pools<'_> {
+    pub(crate) fn clouds(&self) -> &Pool {
+        self.clouds.get_or_init(|| self.draw(&self.maker.clouds, "pool.clouds"))
+    }
+
+    pub(crate) fn flecks(&self) -> &Pool {
+        self.flecks.get_or_init(|| self.draw(&self.maker.flecks, "pool.flecks"))
+    }
+
+    pub(crate) fn grain(&self) -> &Pool {
+        self.grain.get_or_init(|| self.draw(&self.maker.grain, "pool.grain"))
+    }
+
+    fn draw(&self, field: &SpectralField, purpose: &str) -> Pool {
+        Pool::new(field.draw(&mut self.key.stream("field", 0, purpose)))
     }
 }
 

@@ -13,7 +13,19 @@ pub(crate) struct Tile {
     pub(crate) values: Vec<f32>,
 }
 
+/// A tile whose pixels belong to someone else.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileRef<'a> {
+    pub(crate) origin: [i64; 2],
+    pub(crate) width: usize,
+    pub(crate) values: &'a [f32],
+}
+
 impl Tile {
+    pub(crate) fn as_ref(&self) -> TileRef<'_> {
+        TileRef { origin: self.origin, width: self.width, values: &self.values }
+    }
+
     /// A tile of zeros that holds all these points and `margin` pixels round them.
     pub(crate) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
@@ -71,33 +83,28 @@ impl Tile {
     }
 }
 
-/// Adds a tile to an image of `width` x `height` whose upper left pixel is pixel `origin` of the large image.
-pub(crate) fn add_tile(image: &mut [f32], width: usize, height: usize, origin: [i64; 2], tile: &Tile) {
-    let Some((columns, rows)) = overlap(width, height, origin, tile) else { return };
-    for row in rows {
-        let y = usize::try_from(tile.origin[1] + row as i64 - origin[1]).unwrap_or(0);
-        let x = usize::try_from(tile.origin[0] + columns.start as i64 - origin[0]).unwrap_or(0);
-        let source = &tile.values[row * tile.width + columns.start..row * tile.width + columns.end];
-        let target = &mut image[y * width + x..][..source.len()];
-        for (target, source) in target.iter_mut().zip(source) {
-            *target += source;
-        }
-    }
-}
-
-/// The columns and rows of a tile that lie within an image.
-fn overlap(
+/// Lays the rows of a tile over rows of an image that is `width` wide, as far as they meet. `image` starts at row `first`;
+/// `blend` gets a stretch of the image and what of the tile lies over it.
+#[inline(always)]
+pub(crate) fn lay(
+    image: &mut [f32],
     width: usize,
-    height: usize,
-    origin: [i64; 2],
-    tile: &Tile,
-) -> Option<(core::ops::Range<usize>, core::ops::Range<usize>)> {
-    let span = |axis: usize, length: usize, whole: usize| {
-        let first = (origin[axis] - tile.origin[axis]).max(0);
-        let last = (origin[axis] + whole as i64 - tile.origin[axis]).min(length as i64);
-        (first < last).then(|| usize::try_from(first).unwrap_or(0)..usize::try_from(last).unwrap_or(0))
-    };
-    Some((span(0, tile.width, width)?, span(1, tile.height(), height)?))
+    first: usize,
+    tile: TileRef<'_>,
+    mut blend: impl FnMut(&mut [f32], &[f32]),
+) {
+    let [left, top] = [tile.origin[0], tile.origin[1] - first as i64];
+    let column = |x: i64| usize::try_from(x).unwrap_or(0).min(tile.width);
+    let (from, to) = (column(-left), column(width as i64 - left));
+    if from >= to {
+        return;
+    }
+    let x = usize::try_from(left).unwrap_or(0);
+    let hidden = usize::try_from(-top).unwrap_or(0);
+    let rows = image.chunks_exact_mut(width).skip(usize::try_from(top).unwrap_or(0));
+    for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(hidden)) {
+        blend(&mut row[x..x + to - from], &values[from..to]);
+    }
 }
 
 /// Area of a simple polygon, pixels².
@@ -145,15 +152,23 @@ mod tests {
     }
 
     #[test]
-    fn adding_clips_at_every_side() {
-        let mut image = vec![0.0; 12];
-        let tile = Tile { origin: [-1, -1], width: 6, values: vec![1.0; 36] };
-        add_tile(&mut image, 4, 3, [0, 0], &tile);
-        assert_eq!(image, vec![1.0; 12]);
-        add_tile(&mut image, 4, 3, [0, 0], &Tile { origin: [3, 2], ..tile.clone() });
-        assert_eq!(image[11], 2.0);
-        assert_eq!(image.iter().sum::<f32>(), 13.0);
-        add_tile(&mut image, 4, 3, [0, 0], &Tile { origin: [4, 0], ..tile });
-        assert_eq!(image.iter().sum::<f32>(), 13.0);
+    fn laying_clips_at_every_side() {
+        for (x, y, width, height) in
+            [(-2, -3, 9, 8), (3, 2, 2, 2), (5, 4, 9, 9), (-4, 1, 4, 2), (0, 6, 3, 3), (8, 0, 2, 2), (-9, -9, 40, 40)]
+        {
+            let values: Vec<f32> = (1..=width * height).map(|i| i as f32).collect();
+            let tile = Tile { origin: [x, y], width, values };
+            // Rows 2 to 7 of an image of eight columns.
+            let mut image = vec![0.5; 48];
+            lay(&mut image, 8, 2, tile.as_ref(), |row, values| {
+                row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value);
+            });
+            for (index, pixel) in image.iter().enumerate() {
+                let [column, row] = [index as i64 % 8 - x, index as i64 / 8 + 2 - y];
+                let inside = (0..width as i64).contains(&column) && (0..height as i64).contains(&row);
+                let over = if inside { (row * width as i64 + column + 1) as f32 } else { 0.0 };
+                assert_eq!(*pixel, 0.5 + over, "{x} {y} {index}");
+            }
+        }
     }
 }

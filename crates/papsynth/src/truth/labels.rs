@@ -1,6 +1,7 @@
-//! Views of the masks: label maps, front-most masks, layers.
+//! What follows from the masks: front-most masks, label maps, layers.
 
 use super::mask::{Mask, Run, next};
+use super::{Group, Truth};
 
 /// The id of an object at each pixel, 0 where there is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,24 +20,86 @@ impl LabelMap {
     }
 }
 
-/// Paints masks from the deepest to the nearest, and cuts from each what stays visible of it.
+/// Cuts from each mask what is visible of it.
 ///
 /// `objects` are `(id, depth, mask)`; the nearer to the objective, the larger the depth. Of two at the same depth the
 /// one with the larger id lies in front.
+///
+/// # Panics
+/// If a mask leaves the image.
 #[must_use]
-pub fn front_masks(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> (LabelMap, Vec<Mask>) {
+pub fn front_masks(objects: &[(u32, f64, &Mask)], width: usize, height: usize) -> Vec<Mask> {
+    fronts(objects, width, &mut vec![0; width * height])
+}
+
+/// [`front_masks`] on an image of zeros, which is one again afterwards.
+pub(crate) fn fronts(objects: &[(u32, f64, &Mask)], width: usize, ids: &mut [u32]) -> Vec<Mask> {
     let mut order: Vec<usize> = (0..objects.len()).collect();
     order.sort_by(|&a, &b| objects[a].1.total_cmp(&objects[b].1).then(objects[a].0.cmp(&objects[b].0)));
-    let mut ids = vec![0_u32; width * height];
-    for &index in &order {
-        let (id, _, mask) = objects[index];
-        for run in mask.runs() {
-            let row = run.y as usize * width;
-            ids[row + run.x0 as usize..row + run.x1 as usize].fill(id);
+    for (id, _, mask) in order.into_iter().map(|index| objects[index]) {
+        paint(mask, width, ids, |pixel| *pixel = id);
+    }
+    let fronts = objects.iter().map(|(id, _, mask)| visible(*id, mask, ids, width)).collect();
+    for (_, _, mask) in objects {
+        paint(mask, width, ids, |pixel| *pixel = 0);
+    }
+    fronts
+}
+
+/// Visits every pixel of a mask.
+fn paint<T>(mask: &Mask, width: usize, image: &mut [T], visit: impl Fn(&mut T)) {
+    for run in mask.runs() {
+        let row = run.y as usize * width;
+        image[row + run.x0 as usize..row + run.x1 as usize].iter_mut().for_each(&visit);
+    }
+}
+
+impl Truth {
+    /// The label map of a group: the id of its front-most object at each pixel.
+    ///
+    /// # Panics
+    /// If a mask leaves the image.
+    #[must_use]
+    pub fn labels(&self, group: Group) -> LabelMap {
+        let mut ids = Vec::new();
+        self.labels_into(group, &mut ids);
+        LabelMap { width: self.width, ids }
+    }
+
+    /// The same into memory of yours, whatever it held.
+    ///
+    /// # Panics
+    /// If a mask leaves the image.
+    pub fn labels_into(&self, group: Group, ids: &mut Vec<u32>) {
+        ids.clear();
+        ids.resize(self.width * self.height, 0);
+        for object in self.objects.iter().filter(|object| object.group() == group) {
+            paint(&object.front, self.width, ids, |pixel| *pixel = object.id);
         }
     }
-    let masks = objects.iter().map(|(id, _, mask)| visible(*id, mask, &ids, width)).collect();
-    (LabelMap { width, ids }, masks)
+
+    /// Number of cytoplasms that lie over each other at each pixel, row by row.
+    ///
+    /// # Panics
+    /// If a mask leaves the image.
+    #[must_use]
+    pub fn layers(&self) -> Vec<u16> {
+        let mut layers = Vec::new();
+        self.layers_into(&mut layers);
+        layers
+    }
+
+    /// The same into memory of yours, whatever it held.
+    ///
+    /// # Panics
+    /// If a mask leaves the image.
+    pub fn layers_into(&self, layers: &mut Vec<u16>) {
+        layers.clear();
+        layers.resize(self.width * self.height, 0);
+        for object in self.objects.iter().filter(|object| object.group() == Group::Cytoplasm) {
+            paint(&object.amodal, self.width, layers, |layer| *layer = layer.saturating_add(1));
+        }
+    }
 }
 
 /// The pixels of a mask that show its own id.
@@ -58,21 +121,6 @@ fn visible(id: u32, mask: &Mask, ids: &[u32], width: usize) -> Mask {
 /// A column of an image, all of which fit.
 fn column(x: usize) -> u32 {
     u32::try_from(x).unwrap_or(u32::MAX)
-}
-
-/// How many of the masks cover each pixel.
-#[must_use]
-pub fn layers<'a>(masks: impl Iterator<Item = &'a Mask>, width: usize, height: usize) -> Vec<u16> {
-    let mut layers = vec![0_u16; width * height];
-    for mask in masks {
-        for run in mask.runs() {
-            let row = run.y as usize * width;
-            for layer in &mut layers[row + run.x0 as usize..row + run.x1 as usize] {
-                *layer = layer.saturating_add(1);
-            }
-        }
-    }
-    layers
 }
 
 #[cfg(test)]
@@ -108,12 +156,13 @@ mod tests {
             .collect();
         let objects: Vec<(u32, f64, &Mask)> =
             masks.iter().enumerate().map(|(i, m)| (i as u32 + 1, f64::from(i as u32 % 3), m)).collect();
-        let (labels, fronts) = front_masks(&objects, width, height);
-        assert_eq!(labels.ids, slow(&objects, width, height));
-        let covered = labels.ids.iter().filter(|&&id| id > 0).count() as u64;
+        let fronts = front_masks(&objects, width, height);
+        let mut ids = vec![0; width * height];
+        for ((id, _, _), front) in objects.iter().zip(&fronts) {
+            front.pixels(width).for_each(|pixel| ids[pixel] = *id);
+        }
+        assert_eq!(ids, slow(&objects, width, height));
+        let covered = ids.iter().filter(|&&id| id > 0).count() as u64;
         assert_eq!(fronts.iter().map(Mask::area).sum::<u64>(), covered);
-        let counts = layers(masks.iter(), width, height);
-        assert_eq!(counts.iter().map(|&c| u64::from(c)).sum::<u64>(), masks.iter().map(Mask::area).sum::<u64>());
-        assert_eq!(counts.iter().filter(|&&c| c > 0).count() as u64, covered);
     }
 }

@@ -7,7 +7,8 @@ mod mask;
 
 use crate::scene::Kind;
 
-pub use labels::{LabelMap, front_masks, layers};
+pub(crate) use labels::fronts;
+pub use labels::{LabelMap, front_masks};
 pub use mask::{Bounds, Mask, Run};
 
 /// Coverage from which on a pixel belongs to a mask.
@@ -104,25 +105,14 @@ impl ObjectTruth {
 }
 
 /// What is known of one image.
-#[derive(Debug, Clone)]
+///
+/// [Label maps](Self::labels) and [layers](Self::layers) follow from the masks and are made when asked for.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
+    /// Columns of the image.
+    pub width: usize,
+    /// Rows of the image.
+    pub height: usize,
     /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out.
     pub objects: Vec<ObjectTruth>,
-    /// The id of the front-most object of each group at each pixel, in the order of [`Group::ALL`].
-    pub labels: [LabelMap; 3],
-    /// Number of cytoplasms that lie over each other at each pixel.
-    pub layers: Vec<u16>,
-}
-
-impl Truth {
-    /// The label map of a group.
-    #[must_use]
-    pub fn labels_of(&self, group: Group) -> &LabelMap {
-        let [cytoplasm, nucleus, debris] = &self.labels;
-        match group {
-            Group::Cytoplasm => cytoplasm,
-            Group::Nucleus => nucleus,
-            Group::Debris => debris,
-        }
-    }
 }
