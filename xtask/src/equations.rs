@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -69,11 +70,12 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
             }
         }
     }
+    let mut out = io::stdout().lock();
     for equation in EQUATIONS {
         let mut label = format!("Eq. {equation}");
         for ((file, line, item), row) in table.get(&equation).into_iter().flatten() {
             let inside: String = row.inside.iter().map(|line| format!(" · {line}")).collect();
-            println!("{label:<8} {item:<44} {file}:{line}{inside}");
+            writeln!(out, "{label:<8} {item:<44} {file}:{line}{inside}")?;
             label.clear();
         }
     }
@@ -83,7 +85,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     };
     let (nowhere, not_computed) = (without(|row| row.documented), without(|row| !row.inside.is_empty()));
     if !not_computed.is_empty() {
-        println!("No line says that it computes Eq. {}.", not_computed.join(", "));
+        writeln!(out, "No line says that it computes Eq. {}.", not_computed.join(", "))?;
     }
     if !nowhere.is_empty() {
         bail!("no item cites Eq. {}", nowhere.join(", "));

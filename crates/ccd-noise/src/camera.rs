@@ -1,8 +1,7 @@
 use rand_core::Rng;
 
 use crate::field::{NoiseField, blocks, padded, rows, whole_rows};
-use crate::hash::{BLOCK, Block, RowWords, Stream};
-use crate::normal::normals;
+use crate::hash::{BLOCK, Block, RowWords};
 use crate::poisson::{at_least_nothing, poisson};
 use crate::{CameraParams, Error, PhotonNoise};
 
@@ -150,7 +149,7 @@ impl Chain {
     #[inline(always)]
     fn charges(&self, electrons: &[f32; BLOCK], row: &RowWords, x: u32) -> ([f32; BLOCK], [f32; BLOCK]) {
         let block = row.block(x);
-        let read = normals(&block.words(Stream::Read));
+        let [shot, read] = block.normal_pairs();
         let mut means = *electrons;
         for mean in &mut means {
             *mean = at_least_nothing(*mean);
@@ -158,9 +157,9 @@ impl Chain {
         // g_po and the standard deviation of g_g of Eq. 13
         let mut noise = [self.read_noise; BLOCK];
         let mut charge = match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &block),
+            PhotonNoise::Exact => poisson(&means, &shot, &block),
             PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, &mut noise, &block),
+            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, &mut noise, &shot, &block),
         };
         let mut after = [0.0; BLOCK];
         for i in 0..BLOCK {
@@ -172,12 +171,18 @@ impl Chain {
 
     /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
     #[inline(always)]
-    fn one_normal(&self, means: &[f32; BLOCK], noise: &mut [f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
+    fn one_normal(
+        &self,
+        means: &[f32; BLOCK],
+        noise: &mut [f32; BLOCK],
+        shot: &[f32; BLOCK],
+        block: &Block<'_>,
+    ) -> [f32; BLOCK] {
         let mut everywhere = true;
         for mean in means {
             everywhere &= *mean >= self.normal_from;
         }
-        let mut charge = if everywhere { *means } else { poisson(means, block) };
+        let mut charge = if everywhere { *means } else { poisson(means, shot, block) };
         for i in 0..BLOCK {
             let both = (means[i].min(self.full_well) + self.read_noise * self.read_noise).sqrt();
             let normal = means[i] >= self.normal_from;

@@ -1,5 +1,7 @@
 //! Random words as a pure function of key and position.
 
+use crate::normal::normal_pairs;
+
 /// Pixels that are worked on together: enough to fill the widest vector registers several times.
 pub(crate) const BLOCK: usize = BLOCK_STEP as usize;
 
@@ -12,16 +14,20 @@ const SPREAD: u32 = 0x9e37_79b9;
 /// What a word is for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Stream {
-    Shot,
+    /// Of the pair of normal deviates, one for the photons and one for reading.
+    Radius,
+    Angle,
+    /// What decides whether a proposed count is kept.
     Chance,
-    Read,
+    /// Further bits of the same, where counts are summed up to it.
+    Fine,
 }
 
 /// The words of one row of a field.
 #[derive(Debug, Clone)]
 pub(crate) struct RowWords {
     start: u32,
-    streams: [u32; 3],
+    streams: [u32; 4],
     rare: u64,
 }
 
@@ -29,8 +35,9 @@ impl RowWords {
     #[expect(clippy::cast_possible_truncation, reason = "upper and lower halves of words")]
     pub(crate) fn new(key: u64, y: u32) -> Self {
         let mut words = SplitMix(key ^ SplitMix(u64::from(y)).next());
-        let (a, b) = (words.next(), words.next());
-        Self { start: a as u32, streams: [(a >> 32) as u32, b as u32, (b >> 32) as u32], rare: words.next() }
+        let [a, b, c] = [words.next(), words.next(), words.next()];
+        let streams = [(a >> 32) as u32, b as u32, (b >> 32) as u32, (c >> 32) as u32];
+        Self { start: a as u32, streams, rare: words.next() }
     }
 
     /// The pixels from `x` on, hashed once for all streams.
@@ -54,7 +61,7 @@ pub(crate) struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// One word for each pixel, from one of three streams.
+    /// One word for each pixel, from one of the streams.
     #[inline(always)]
     pub(crate) fn words(&self, stream: Stream) -> [u32; BLOCK] {
         let salt = self.row.streams[stream as usize];
@@ -63,6 +70,12 @@ impl Block<'_> {
             *word = mix(word.wrapping_add(salt));
         }
         words
+    }
+
+    /// Two standard normal deviates for each pixel: one for the photons, one for reading.
+    #[inline(always)]
+    pub(crate) fn normal_pairs(&self) -> [[f32; BLOCK]; 2] {
+        normal_pairs(&self.words(Stream::Radius), &self.words(Stream::Angle))
     }
 
     /// As many further words as wanted for one pixel.
@@ -112,7 +125,7 @@ mod tests {
         let word = |key: u64, y: u32, x: u32, s: Stream| RowWords::new(key, y).block(x).words(s)[0];
         let small = |words: &mut SplitMix| u32::try_from(words.next() >> 48).unwrap();
         let samples = 4000;
-        for stream in [Stream::Shot, Stream::Chance, Stream::Read] {
+        for stream in [Stream::Radius, Stream::Angle, Stream::Chance, Stream::Fine] {
             for bit in [0, 1, 2, 5, 10, 17, 31] {
                 let mut flips = [[0_u32; 32]; 3];
                 let mut inputs = SplitMix(7);
@@ -131,7 +144,7 @@ mod tests {
                     }
                 }
                 for flips in flips.iter().flatten() {
-                    // 2016 counts are compared: five standard errors.
+                    // 2688 counts are compared: five standard errors.
                     let z = (f64::from(*flips) - f64::from(samples) / 2.0) / (f64::from(samples) / 4.0).sqrt();
                     assert!(z.abs() < 5.0, "{stream:?}, bit {bit}: {z}");
                 }
@@ -142,10 +155,10 @@ mod tests {
     #[test]
     fn words_do_not_depend_on_the_block_they_are_asked_in() {
         let row = RowWords::new(3, 4);
-        let whole = row.block(u32::MAX - 20).words(Stream::Shot);
+        let whole = row.block(u32::MAX - 20).words(Stream::Radius);
         for (i, word) in whole.into_iter().enumerate() {
             let alone = row.block((u32::MAX - 20).wrapping_add(u32::try_from(i).unwrap()));
-            assert_eq!(alone.words(Stream::Shot)[0], word);
+            assert_eq!(alone.words(Stream::Radius)[0], word);
             assert_eq!(alone.rare(0).next(), row.block(u32::MAX - 20).rare(i).next());
         }
     }

@@ -1,7 +1,6 @@
 //! Poisson deviates: whole blocks without a branch, and an exact finish for the few that need it.
 
 use crate::hash::{BLOCK, Block, SplitMix, Stream};
-use crate::normal::normals;
 
 /// Below this mean a deviate is found by summing probabilities, above it from a normal deviate.
 /// Both are exact; here they take about the same time.
@@ -14,25 +13,25 @@ const LARGEST_MEAN: f32 = 16_777_216.0;
 /// Counts of probability above 1e-24 at the means that are summed.
 const SUMMED_TERMS: usize = 96;
 
-/// One Poisson deviate for each mean. Negative means and those that are no number count as 0.
+/// One Poisson deviate for each mean, from a normal one. Negative means and those that are no number count as 0.
 #[inline(always)]
-pub(crate) fn poisson(means: &[f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
-    let (first, second) = (block.words(Stream::Shot), block.words(Stream::Chance));
+pub(crate) fn poisson(means: &[f32; BLOCK], normals: &[f32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
+    let chances = block.words(Stream::Chance);
     let mut means = *means;
     for mean in &mut means {
         *mean = at_least_nothing(*mean).min(LARGEST_MEAN);
     }
     let (least, most) = extremes(&means);
     if most < SUMMED_BELOW {
-        return summed(&means, &first, &second);
+        return summed(&means, &chances, &block.words(Stream::Fine));
     }
-    let mut counts = from_normals(&means, &first, &second, block);
+    let mut counts = from_normals(&means, normals, &chances, block);
     if least < SUMMED_BELOW {
         let mut small = means;
         for mean in &mut small {
             *mean = if *mean < SUMMED_BELOW { *mean } else { 0.0 };
         }
-        let summed = summed(&small, &first, &second);
+        let summed = summed(&small, &chances, &block.words(Stream::Fine));
         for i in 0..BLOCK {
             counts[i] = if means[i] < SUMMED_BELOW { summed[i] } else { counts[i] };
         }
@@ -119,8 +118,12 @@ fn exp(x: f64) -> f64 {
 /// the lack of skewness. Where K falls short of µ it is given up with a probability of nearly
 /// (µ - K)³/6µ², 0.13/√µ on the whole, for a deviate from what is missing above µ.
 #[inline(always)]
-fn from_normals(means: &[f32; BLOCK], words: &[u32; BLOCK], chances: &[u32; BLOCK], block: &Block<'_>) -> [f32; BLOCK] {
-    let normals = normals(words);
+fn from_normals(
+    means: &[f32; BLOCK],
+    normals: &[f32; BLOCK],
+    chances: &[u32; BLOCK],
+    block: &Block<'_>,
+) -> [f32; BLOCK] {
     let mut counts = [0.0; BLOCK];
     let mut open = [0_u32; BLOCK];
     for i in 0..BLOCK {

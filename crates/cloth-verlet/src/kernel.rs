@@ -66,6 +66,7 @@ impl Real for f64 {
 /// Eq. 4: xₜ₊Δₜ = 2xₜ − xₜ₋Δₜ + v̇ₜ Δt², with the step before it scaled by `keep` = 1 − damping.
 #[inline(always)]
 pub(crate) fn verlet<T: Real>(now: T, before: T, acceleration_dt2: T, keep: T) -> T {
+    // Eq. 4, as 2xₜ − xₜ₋Δₜ = xₜ + (xₜ − xₜ₋Δₜ).
     now + (now - before) * keep + acceleration_dt2
 }
 

@@ -146,6 +146,7 @@ impl Descriptors {
     #[must_use]
     pub fn normalised(&self) -> Self {
         let radius = self.radius();
+        // Eq. 3: 1 / |u₁|.
         let scale = if radius > 0.0 { 1.0 / radius } else { 1.0 };
         let centre = self.harmonics();
         let mut scaled = self.scaled(scale);

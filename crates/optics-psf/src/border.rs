@@ -27,21 +27,41 @@ impl Border {
         }
     }
 
-    /// Fills `line` with `row` from index `start` on, which may lie before or beyond it.
-    pub(crate) fn extend(self, row: &[f32], start: isize, line: &mut [f32]) {
+    /// Rows of `len` pixels from index `start` on, which may lie before or beyond them, as long as `line`, which holds them
+    /// one after the other.
+    pub(crate) fn extension(self, len: usize, start: isize, line: &mut [f32]) -> Extension<'_> {
         let before = usize::try_from(-start).unwrap_or(0).min(line.len());
-        let skipped = usize::try_from(start).unwrap_or(0).min(row.len());
-        let inside = (row.len() - skipped).min(line.len() - before);
-        line[before..before + inside].copy_from_slice(&row[skipped..skipped + inside]);
-        if self == Self::Zero {
-            line[..before].fill(0.0);
-            line[before + inside..].fill(0.0);
-            return;
+        let skipped = usize::try_from(start).unwrap_or(0).min(len);
+        let inside = (len - skipped).min(line.len() - before);
+        line[..before].fill(0.0);
+        line[before + inside..].fill(0.0);
+        Extension { border: self, start, line, before, skipped, inside }
+    }
+}
+
+/// Rows and what surrounds them.
+pub(crate) struct Extension<'a> {
+    border: Border,
+    start: isize,
+    line: &'a mut [f32],
+    /// Places before the row, pixels of it that are left out, and pixels that are not.
+    before: usize,
+    skipped: usize,
+    inside: usize,
+}
+
+impl Extension<'_> {
+    pub(crate) fn of(&mut self, row: &[f32]) -> &[f32] {
+        let inside = self.before..self.before + self.inside;
+        self.line[inside.clone()].copy_from_slice(&row[self.skipped..self.skipped + self.inside]);
+        // Where the border holds nothing, nothing was there before.
+        if self.border != Border::Zero {
+            for i in (0..inside.start).chain(inside.end..self.line.len()) {
+                let source = self.border.source(self.start + i.cast_signed(), row.len());
+                self.line[i] = source.map_or(0.0, |s| row[s]);
+            }
         }
-        for i in (0..before).chain(before + inside..line.len()) {
-            let source = self.source(start + i.cast_signed(), row.len());
-            line[i] = source.map_or(0.0, |s| row[s]);
-        }
+        self.line
     }
 }
 
@@ -51,8 +71,9 @@ mod tests {
 
     fn extended(border: Border, start: isize, len: usize) -> Vec<f32> {
         let mut line = vec![-1.0; len];
-        border.extend(&[1.0, 2.0, 3.0], start, &mut line);
-        line
+        let mut extension = border.extension(3, start, &mut line);
+        extension.of(&[7.0, 8.0, 9.0]);
+        extension.of(&[1.0, 2.0, 3.0]).to_vec()
     }
 
     #[test]

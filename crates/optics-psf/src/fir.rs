@@ -2,9 +2,14 @@
 
 use crate::{Border, Scratch};
 
-/// Columns of a strip. One strip of a camera frame (1038 rows) fits in the second-level cache and
-/// the rows that one output row needs in the first.
+/// The least columns of a strip. One such strip of a camera frame (1038 rows) fits in the second-level cache.
 const STRIP: usize = 256;
+
+/// Pixels of a strip that fit in the second-level cache.
+const SECOND_LEVEL: usize = 1 << 18;
+
+/// Pixels that fit in the first-level cache: those that one output row needs should.
+const FIRST_LEVEL: usize = 1 << 13;
 
 /// Pixels whose sums are held in registers while the taps go by.
 const BLOCK: usize = 64;
@@ -47,8 +52,10 @@ pub(crate) fn blur_rows(
     scratch: &mut Scratch,
 ) {
     let dst_width = source.width + 2 * margin;
-    for x in (0..dst_width).step_by(STRIP) {
-        let columns = STRIP.min(dst_width - x);
+    let rows = dst.len() / dst_width.max(1) + 2 * (half.len() - 1);
+    let wide = (SECOND_LEVEL / rows.max(1)).min(FIRST_LEVEL / (2 * half.len() - 1)).max(STRIP) / BLOCK * BLOCK;
+    for x in (0..dst_width).step_by(wide) {
+        let columns = wide.min(dst_width - x);
         blur_strip(source, half, margin, first, x, columns, dst, &mut scratch.strip, &mut scratch.line);
     }
 }
@@ -78,14 +85,14 @@ fn blur_strip(
     let start = x.cast_signed() - (margin + radius).cast_signed();
     let taps = useful(border, radius, start + radius.cast_signed(), columns, width);
     let interior = usize::try_from(start).ok().filter(|&s| s + line.len() <= width);
+    let mut extension = border.extension(width, start, line);
     let above = first - radius.cast_signed();
     for (out, y) in strip.chunks_exact_mut(pitch).zip(above..) {
         match (border.source(y, height), interior) {
             (None, _) => out.fill(0.0),
             (Some(y), Some(start)) => fir(&source.row(y)[start..], radius, 1, half, taps, out),
             (Some(y), None) => {
-                border.extend(source.row(y), start, line);
-                fir(line, radius, 1, half, taps, out);
+                fir(extension.of(source.row(y)), radius, 1, half, taps, out);
             }
         }
     }
@@ -132,7 +139,16 @@ fn fir(data: &[f32], centre: usize, stride: usize, half: &[f32], taps: (usize, u
         block.copy_from_slice(&sums::<BLOCK>(data, centre + at, stride, half, taps));
         at += BLOCK;
     }
-    for block in blocks.into_remainder().chunks_mut(LANES) {
+    let rest = blocks.into_remainder().len();
+    if rest == 0 {
+        return;
+    }
+    if let Some(at) = out.len().checked_sub(BLOCK) {
+        // The last block once more, from further left: the same sums, and no remainder.
+        out[at..].copy_from_slice(&sums::<BLOCK>(data, centre + at, stride, half, taps));
+        return;
+    }
+    for block in out.chunks_mut(LANES) {
         let sums = sums::<LANES>(data, centre + at, stride, half, taps);
         block.copy_from_slice(&sums[..block.len()]);
         at += LANES;

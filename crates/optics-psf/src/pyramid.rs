@@ -105,6 +105,7 @@ fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line:
     let (long_line, phases) = rest.split_at_mut(long);
     let (even, odd) = phases.split_at_mut(width + 2);
     let height = source.height();
+    let mut extension = source.border.extension(source_width, start, long_line);
     for (k, out) in out.chunks_exact_mut(width).enumerate() {
         let top = start + 2 * k.cast_signed();
         sum.fill(0.0);
@@ -125,8 +126,7 @@ fn halve(source: Source<'_>, before: usize, out: &mut [f32], width: usize, line:
                 (None, None) => {}
             }
         }
-        source.border.extend(sum, start, long_line);
-        for ((pair, e), o) in long_line.chunks_exact(2).zip(even.iter_mut()).zip(odd.iter_mut()) {
+        for ((pair, e), o) in extension.of(sum).chunks_exact(2).zip(even.iter_mut()).zip(odd.iter_mut()) {
             (*e, *o) = (pair[0], pair[1]);
         }
         let outer = even.iter().zip(&even[2..]);

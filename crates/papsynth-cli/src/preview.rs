@@ -25,7 +25,7 @@ pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
         .engine
         .image::<Error>(scene, setup.threads_of_a_frame(), |plane| {
             if plane.index == middle {
-                shown = Some(plane);
+                shown = Some(plane.clone());
             }
             Ok(())
         })

@@ -51,6 +51,7 @@ impl Feathered {
                 });
             }
             shares.resize((end - first) * view.width, 0.0);
+            // Eq. 16: C ∗ G_σ.
             feather.blur_rows_into(&slab, view.width, Border::Reflect, first - from, &mut shares, &mut scratch);
             for (y, row) in (first..).zip(shares.chunks_exact(view.width)) {
                 feathered.add_row(y * view.width, row);
@@ -87,6 +88,7 @@ impl Feathered {
 /// light 10^(I_b − I_p) before the spread in the image plane, in the same unit as what it replaces.
 pub(crate) fn restore(spread: &mut [f32], sharp: &[f32], feathered: &[f32]) {
     for ((spread, sharp), share) in spread.iter_mut().zip(sharp).zip(feathered) {
+        // Eq. 15: I C′ + I_f (1 − C′).
         *spread += share * (sharp - *spread);
     }
 }

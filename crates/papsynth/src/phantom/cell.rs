@@ -5,7 +5,7 @@ use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use super::chromatin::interpolate;
 use super::nucleus;
-use super::pools::{Look, Pools};
+use super::pools::{Look, Pools, SIDE, Texels};
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area};
 use super::{Phantom, Piece};
@@ -254,6 +254,7 @@ fn add_detail(
     let threshold = if fleck > 0.0 { pools.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
     let width = absorbance.width;
     let mut buffers = vec![0.0_f32; 2 * width];
+    let mut texels: Texels = [0.0; SIDE + 1];
     let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
     for (y, (row, cover)) in rows.enumerate() {
         let Some((first, end)) = covered(cover) else { continue };
@@ -262,16 +263,16 @@ fn add_detail(
         let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
         factor.fill(1.0);
         if cloud > 0.0 {
-            pools.clouds().row_into(field, &clouds, at);
+            pools.clouds().row_into(field, &clouds, at, &mut texels);
             add_above(factor, field, cloud, f32::NEG_INFINITY);
         }
         if fleck > 0.0 {
-            pools.flecks().row_into(field, &flecks, at);
+            pools.flecks().row_into(field, &flecks, at, &mut texels);
             field.iter_mut().for_each(|value| *value -= threshold);
             add_above(factor, field, fleck, 0.0);
         }
         if grainy > 0.0 {
-            pools.grain().row_into(field, &grain, at);
+            pools.grain().row_into(field, &grain, at, &mut texels);
             add_above(factor, field, grainy, f32::NEG_INFINITY);
         }
         for (value, factor) in row.iter_mut().zip(factor) {

@@ -10,7 +10,7 @@ use crate::key::Key;
 use crate::random;
 
 /// Side of a pool in texels: a power of two, so that positions wrap by masking.
-const SIDE: usize = 512;
+pub(crate) const SIDE: usize = 512;
 
 /// Size of a texel of the flecks' and the grain's pool, µm.
 const TEXEL_UM: f64 = 0.25;
@@ -47,6 +47,9 @@ pub(crate) struct Pool {
     /// Values in rising order, thinned out, for thresholds.
     ranked: Vec<f32>,
 }
+
+/// Memory for a row of texels; the first may stand once more behind the last.
+pub(crate) type Texels = [f32; SIDE + 1];
 
 /// Where one cell looks at a pool, and in which of its four mirror images.
 ///
@@ -139,14 +142,22 @@ impl Pool {
     }
 
     /// A row of a tile, the pixel at `first` and those right of it: the field at each, by linear interpolation.
-    pub(crate) fn row_into(&self, row: &mut [f32], look: &Look, first: Point) {
+    /// `texels` is memory.
+    pub(crate) fn row_into(&self, row: &mut [f32], look: &Look, first: Point, texels: &mut Texels) {
         let x = fixed(look.origin[0] + first[0] * look.step[0]);
         let y = fixed(look.origin[1] + first[1] * look.step[1]);
-        let upper = wrapped(y) * SIDE;
-        let lower = wrapped(y.wrapping_add(ONE)) * SIDE;
-        let mut texels = [0.0; SIDE + 1];
-        between(&mut texels, &self.values[upper..upper + SIDE], &self.values[lower..lower + SIDE], fraction(y));
-        sample(row, &texels, x, fixed(look.step[0]));
+        let line = |y: u32| &self.values[wrapped(y) * SIDE..][..SIDE];
+        let (upper, lower) = (line(y), line(y.wrapping_add(ONE)));
+        let step = fixed(look.step[0]);
+        // The texels that the row meets, from the leftmost on, or all of them.
+        let span = u64::from(step.cast_signed().unsigned_abs()) * row.len().saturating_sub(1) as u64;
+        let count = (span / u64::from(ONE) + 2).min(SIDE as u64) as usize;
+        let leftmost = if step.cast_signed() < 0 { x.wrapping_sub(span as u32) } else { x };
+        let start = wrapped(leftmost);
+        let (ahead, around) = texels[..=count].split_at_mut((count + 1).min(SIDE - start));
+        between(ahead, &upper[start..], &lower[start..], fraction(y));
+        between(around, upper, lower, fraction(y));
+        sample(row, texels, x.wrapping_sub(start as u32 * ONE), step);
     }
 }
 
@@ -170,18 +181,17 @@ fn fraction(position: u32) -> f32 {
     (position % ONE) as f32 * (1.0 / ONE as f32)
 }
 
-/// Blends two rows of texels; the first stands once more behind the last.
+/// Blends two rows of texels.
 #[multiversion::multiversion(targets = "simd")]
-fn between(texels: &mut [f32; SIDE + 1], upper: &[f32], lower: &[f32], share: f32) {
+fn between(texels: &mut [f32], upper: &[f32], lower: &[f32], share: f32) {
     for ((texel, upper), lower) in texels.iter_mut().zip(upper).zip(lower) {
         *texel = upper + share * (lower - upper);
     }
-    texels[SIDE] = texels[0];
 }
 
 /// Interpolates in a row of texels at even steps.
 #[multiversion::multiversion(targets = "simd")]
-fn sample(row: &mut [f32], texels: &[f32; SIDE + 1], first: u32, step: u32) {
+fn sample(row: &mut [f32], texels: &Texels, first: u32, step: u32) {
     let mut position = first;
     for value in row {
         let (texel, share) = (wrapped(position), fraction(position));
@@ -201,7 +211,7 @@ mod tests {
         let pool = Pool::new(values);
         let look = Look { origin: [510.25, 3.0], step: [1.0, 1.0] };
         let mut seen = [0.0; 4];
-        pool.row_into(&mut seen, &look, [0.0, 0.0]);
+        pool.row_into(&mut seen, &look, [0.0, 0.0], &mut [0.0; SIDE + 1]);
         assert_eq!(seen[0], 510.25);
         assert_eq!(seen[1], 511.0 + 0.25 * (0.0 - 511.0), "between the last column and the first");
         assert_eq!(seen[2], 0.25);
@@ -214,7 +224,35 @@ mod tests {
         let pool = Pool::new(values);
         let look = Look { origin: [1.5, 2.0], step: [-0.5, 0.25] };
         let mut seen = [0.0; 3];
-        pool.row_into(&mut seen, &look, [1.0, 2.0]);
+        pool.row_into(&mut seen, &look, [1.0, 2.0], &mut [0.0; SIDE + 1]);
         assert_eq!(seen, [2501.0, 2500.5, 2500.0]);
+    }
+
+    #[test]
+    fn a_row_is_the_field_at_each_pixel_however_long_it_is() {
+        let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
+        let pool = Pool::new((0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect());
+        for texel_px in [0.3, 1.0, 1.17, 4.0] {
+            for length in [1, 2, 60, 511, 1400] {
+                let look = Look::new(texel_px, &mut rng);
+                let mut row = vec![0.0; length];
+                pool.row_into(&mut row, &look, [3.0, 5.0], &mut [0.0; SIDE + 1]);
+                for (i, value) in row.iter().enumerate() {
+                    let place = [3.0 + i as f64, 5.0];
+                    let [x, y] = [0, 1].map(|axis| look.origin[axis] + place[axis] * look.step[axis]);
+                    let texel = |x: f64, y: f64| {
+                        let [x, y] = [x, y].map(|c| c.rem_euclid(SIDE as f64) as usize);
+                        f64::from(pool.values[y * SIDE + x])
+                    };
+                    let [u, v] = [x - x.floor(), y - y.floor()];
+                    let upper = texel(x, y) * (1.0 - u) + texel(x + 1.0, y) * u;
+                    let lower = texel(x, y + 1.0) * (1.0 - u) + texel(x + 1.0, y + 1.0) * u;
+                    let slow = upper * (1.0 - v) + lower * v;
+                    // Steps are kept in 2⁻¹⁶ texels.
+                    let slack = 1e-4 + 2e-5 * i as f64;
+                    assert!((f64::from(*value) - slow).abs() < slack, "{texel_px} {length} {i}: {value} {slow}");
+                }
+            }
+        }
     }
 }
