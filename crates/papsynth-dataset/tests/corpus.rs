@@ -13,6 +13,10 @@ mod model;
 mod outlines;
 #[path = "parsers/recipe.rs"]
 mod recipe;
+#[path = "parsers/record.rs"]
+mod record;
+#[path = "parsers/rle.rs"]
+mod rle;
 
 /// Gives every input of a target to its check, and each cut off at three places.
 fn replay(target: &str, check: fn(&[u8])) {
@@ -57,4 +61,14 @@ fn label_maps() {
 #[test]
 fn tables_of_outlines() {
     replay("outlines", outlines::check);
+}
+
+#[test]
+fn records_and_manifests() {
+    replay("record", record::check);
+}
+
+#[test]
+fn counts_of_masks() {
+    replay("rle", rle::check);
 }
