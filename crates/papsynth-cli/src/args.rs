@@ -82,7 +82,7 @@ pub(crate) struct EngineArgs {
     /// Model that `papsynth learn` wrote [default: the one that ships]
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
-    /// Seed of the whole data set
+    /// Seed of the whole data set; recipes that differ share what they have in common under the same seed
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
     /// Threads to work with; the bytes are the same with any number [default: one a core]
@@ -124,6 +124,9 @@ pub(crate) struct Generate {
     /// Indices of the frames, from A up to but without B
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
     pub(crate) range: Option<Range<u64>>,
+    /// Read every file of the frames that are there and make those anew whose SHA-256 is wrong, instead of comparing sizes
+    #[arg(long)]
+    pub(crate) verify: bool,
     /// Say nothing but errors
     #[arg(long, short, conflicts_with = "json")]
     pub(crate) quiet: bool,
@@ -149,7 +152,7 @@ Examples:
 pub(crate) struct Preview {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Picture to write, replacing an older one
+    /// Picture to write; an older picture is replaced, no other file
     #[arg(long, value_name = "FILE", default_value = "preview.png")]
     pub(crate) out: PathBuf,
     /// Which frame of the data set
@@ -209,7 +212,7 @@ pub(crate) struct Learn {
     /// Keep means, covariances and spectra of this class alone, and no pixels
     #[arg(long)]
     pub(crate) numbers_only: bool,
-    /// Model file to write, replacing an older one
+    /// Model file to write; an older model is replaced, no other file
     #[arg(long, value_name = "MODEL.json")]
     pub(crate) out: PathBuf,
 }

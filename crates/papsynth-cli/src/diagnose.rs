@@ -342,7 +342,7 @@ mod tests {
         assert!(message.starts_with("layout.radius_um: "), "{message}");
         assert!(fault("[layout]\nkind = 7\n").0.starts_with("layout.kind: 7 is a whole number"));
         assert!(fault("[layout]\ncount = 7\n").0.contains("layout: "));
-        assert!(fault("[layout]\nkind = \"swath\"\nwidth_um = 7\n").0.contains("missing field `outside`"));
+        assert!(fault("[layout]\nkind = \"labels\"\nsmooth_um = 7\n").0.contains("missing field `path`"));
     }
 
     #[test]

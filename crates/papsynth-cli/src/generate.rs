@@ -2,7 +2,7 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::{Dataset, DatasetInfo, Error, Run};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Run};
 
 use crate::args::Generate;
 use crate::exit::{Complaint, Failure};
@@ -19,7 +19,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
 
     let interrupt = Interrupt::watch()?;
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed };
+    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map: setup.map.as_ref() };
     let dataset = Dataset::create_or_resume(&args.out, &info)?;
     // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
     let (at_once, threads) = match usize::try_from(count) {
@@ -27,7 +27,8 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
         _ => (setup.threads, Threads::One),
     };
     let progress = Progress::start(args, Start { dir: args.out.clone(), seed, frames: count, threads: setup.threads })?;
-    let run = Run { frames, at_once, threads, stop: interrupt.flag() };
+    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let run = Run { frames, at_once, threads, check, stop: interrupt.flag() };
     let outcome = dataset.generate(&setup.engine, &run, &|step| progress.step(step));
     progress.clear();
     let outcome = outcome.map_err(|error| match error {
@@ -39,6 +40,15 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
         let message = format!("stopped after {whole} of {count} frames; every file in {} is whole", args.out.display());
         return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
     }
-    dataset.finish()?;
+    // What is whole is left alone, which a disk that cannot be written allows too.
+    if outcome.made > 0 || !dataset.is_finished()? {
+        dataset.finish().map_err(|error| damaged(&error))?;
+    }
     progress.done(&outcome)
+}
+
+/// A frame of the right size that cannot be read.
+fn damaged(error: &Error) -> Failure {
+    let help = "a frame is damaged: the same command with --verify reads all files and makes such frames again";
+    Failure::dataset(error, Complaint::new(error.to_string()).help(help))
 }

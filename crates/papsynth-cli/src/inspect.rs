@@ -17,15 +17,18 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     } else {
         exit::print(&table(&args.dir.display().to_string(), &overview))?;
     }
-    match overview.defects.len() {
-        0 => Ok(()),
-        count => {
-            let frames = if count == 1 { "a frame is" } else { "frames are" };
-            let message = if count == 1 { frames.to_owned() } else { format!("{count} {frames}") };
-            let help = "the command that made the data set makes them again";
-            Err(Failure::input(Complaint::new(format!("{}: {message} damaged", args.dir.display())).help(help)))
-        }
+    let (frames, files) = (overview.defects.len(), overview.flaws.len());
+    if frames + files == 0 {
+        return Ok(());
     }
+    let counted = |count: usize, what: &str| match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    };
+    let message =
+        format!("{}: {} and {} are damaged", args.dir.display(), counted(frames, "frame"), counted(files, "file"));
+    let help = "the command that made the data set, with --verify, makes them again";
+    Err(Failure::input(Complaint::new(message).help(help)))
 }
 
 /// Lines of the lists that are printed in full; the rest is counted.
@@ -58,6 +61,9 @@ fn table(dir: &str, overview: &Overview) -> String {
     }
     for defect in overview.defects.iter().take(MOST) {
         row("damaged", &format!("frame {}: {}", defect.index, defect.message));
+    }
+    for flaw in &overview.flaws {
+        row("damaged", flaw);
     }
     if overview.frames > 0 {
         let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));

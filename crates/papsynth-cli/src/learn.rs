@@ -12,6 +12,7 @@ use crate::exit::{self, Complaint, Failure};
 use crate::nearest::nearest;
 use crate::schema::quoted;
 use crate::setup::read_model;
+use crate::text_file;
 
 /// Points of an outline that is traced from a label image: ten for each of the 40 harmonics that are fitted.
 const TRACED_POINTS: usize = 400;
@@ -20,6 +21,8 @@ const TRACED_POINTS: usize = 400;
 const SMALLEST_CELL_UM2: f64 = 20.0;
 
 pub(crate) fn run(args: &Learn) -> Result<(), Failure> {
+    // The beginning of every model that was written.
+    text_file::may_replace(&args.out, b"{\"version\":", "an older model")?;
     let limits = Limits::default();
     let base = read_model(args.base.as_deref())?;
     let like = class_to_take_after(args, &base)?;

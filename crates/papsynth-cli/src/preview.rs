@@ -7,6 +7,7 @@ use papsynth_dataset::{Picture, write_file};
 use crate::args::Preview;
 use crate::exit::{self, Failure};
 use crate::setup::Setup;
+use crate::text_file;
 
 /// Pixels between the two halves.
 const GAP: usize = 8;
@@ -15,6 +16,7 @@ const GAP: usize = 8;
 const GAP_GREY: u8 = 255;
 
 pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
+    text_file::may_replace(&args.out, b"\x89PNG", "an older picture")?;
     let setup = Setup::load(&args.engine)?;
     let key = Key { seed: args.engine.seed, index: args.index };
     let refuse = |error: Error| setup.recipe.refuse(&error);

@@ -42,6 +42,8 @@ struct Sources {
 struct Set {
     /// As it was given.
     argument: Arc<String>,
+    /// The key before its `=`.
+    key: String,
     /// Where its value begins in that.
     value_at: usize,
     /// What it sets, as a table of tables.
@@ -133,6 +135,10 @@ impl Sources {
         let fault = |message: String| vec![Fault { path: Vec::new(), span: None, message, help: None }];
         let mut table: Table = toml::from_str(&base.to_toml()).map_err(|e| fault(e.to_string()))?;
         for set in &self.sets {
+            // Which cells there are is one answer; a field of one class is another.
+            if set.key == "cells" {
+                table.remove("cells");
+            }
             merge(&mut table, &set.table);
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
@@ -196,7 +202,7 @@ impl Set {
             wrong(error.message(), at.min(argument.len())..argument.len())
         })?;
         let path = leaf(&table);
-        Ok(Self { argument: text, value_at, table, path })
+        Ok(Self { argument: text.clone(), key: key.trim().to_owned(), value_at, table, path })
     }
 
     /// Whether the path it sets and another lead through one another.
@@ -288,7 +294,8 @@ mod tests {
             ("=3", "--set"),
             ("field.width_px=[1,", "--set"),
             ("field=3", "field: 3 is a whole number"),
-            ("layout.kind=swath", "missing field"),
+            ("layout.kind=map", "missing field"),
+            ("camera.bits=8.5", "not a whole number"),
             ("layout.kind=lumps", "layout.kind: `lumps` is not known"),
             ("version=2", "version 2"),
             ("cytoplasm.sheet=xpdb", "did you mean `xpbd`"),

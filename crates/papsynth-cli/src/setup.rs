@@ -4,7 +4,7 @@ use std::path::Path;
 
 use papsynth::model::Model;
 use papsynth::{Engine, Threads};
-use papsynth_dataset::read::{Limits, read_inputs};
+use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 
 use crate::args::EngineArgs;
 use crate::exit::{Complaint, Failure};
@@ -21,6 +21,8 @@ pub(crate) struct Setup {
     pub(crate) recipe: RecipeFile,
     /// What cells are like.
     pub(crate) model: Model,
+    /// The map that the recipe names.
+    pub(crate) map: Option<InputFile>,
     /// Makes the frames.
     pub(crate) engine: Engine,
     /// Threads to work with.
@@ -29,13 +31,14 @@ pub(crate) struct Setup {
 
 impl Setup {
     pub(crate) fn load(args: &EngineArgs) -> Result<Self, Failure> {
-        let recipe = RecipeFile::load(&args.recipe)?;
+        let mut recipe = RecipeFile::load(&args.recipe)?;
         let model = read_model(args.model.as_deref())?;
         recipe.check_classes(&model)?;
-        let inputs = read_inputs(&recipe.recipe, &recipe.folder, &Limits::default())
+        let folder = recipe.folder.clone();
+        let (inputs, map) = read_inputs(&mut recipe.recipe, &folder, &Limits::default())
             .map_err(|error| Failure::dataset(&error, recipe.complaint("layout.path", error.to_string())))?;
         let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
-        Ok(Self { recipe, model, engine, threads: args.threads() })
+        Ok(Self { recipe, model, map, engine, threads: args.threads() })
     }
 
     /// All threads for one frame.

@@ -6,6 +6,20 @@ use std::path::Path;
 
 use crate::exit::{Complaint, Failure};
 
+/// Makes sure that writing to `out` costs the user nothing but an older output of the same kind: a file that is there must
+/// begin as one does.
+pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), Failure> {
+    let Ok(file) = File::open(out) else { return Ok(()) };
+    let mut found = Vec::new();
+    let read = file.take(begins.len() as u64).read_to_end(&mut found);
+    // What cannot be read, such as a folder, is told of when it is written.
+    if read.is_err() || found == begins || found.is_empty() {
+        return Ok(());
+    }
+    let message = format!("{}: there is another kind of file of this name; expected {what} or none", out.display());
+    Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
+}
+
 /// A text and the name it goes by; `-` is standard input.
 pub(crate) fn read(path: &Path, largest: u64, what: &str) -> Result<(String, String), Failure> {
     let is_stdin = path == Path::new("-");

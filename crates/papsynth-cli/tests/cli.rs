@@ -58,7 +58,7 @@ const HOSTILE: [(&str, &str); 62] = [
     ("[background]\nlevel = 0.02\nscatter = 0.4", "background.scatter"),
     ("[background.illumination]\nkind = \"bowl\"\nexponent = 1", "background.illumination.exponent"),
     ("[layout]\nkind = \"cluster\"", "did you mean `clusters`?"),
-    ("[layout]\nkind = \"clusters\"", "missing field `count`"),
+    ("[layout]\nkind = \"map\"", "missing field `path`"),
     ("[layout]\ncount = 3", "layout"),
     ("[layout]\nkind = \"map\"\npath = \"no-such-file.png\"", "no-such-file.png"),
     ("[layout]\nkind = \"map\"\npath = \"/\"", "recipe.toml:3"),
@@ -334,7 +334,7 @@ fn inspect_shows_what_is_there_and_what_is_damaged() {
     let run = bench.run("inspect out --verify");
     assert_eq!(run.code, 2);
     assert!(
-        run.out.contains("damaged     frame 2") && run.err.contains("a frame is damaged"),
+        run.out.contains("damaged     frame 2") && run.err.contains("1 frame and 0 files are damaged"),
         "{}{}",
         run.out,
         run.err
@@ -350,6 +350,56 @@ fn preview_writes_one_picture() {
     let info = reader.read_info().unwrap();
     assert_eq!(info.info().size(), (96 * 2 + 8, 80));
     assert_eq!(bench.files(".").keys().collect::<Vec<_>>(), ["look.png"]);
+    bench.good(&format!("preview --out look.png {TINY}"));
+}
+
+#[test]
+fn no_file_of_another_kind_is_replaced() {
+    let bench = Bench::new("replace");
+    fs::write(bench.path("mine.toml"), bench.good("init").out).unwrap();
+    let before = bench.files(".");
+    for command in [
+        format!("preview mine.toml --out mine.toml {TINY}"),
+        "learn --class intermediate --pixel-um 0.25 --outlines mine.toml --out mine.toml".to_owned(),
+    ] {
+        let run = bench.run(&command);
+        assert!(run.code == 2 && run.err.contains("mine.toml: there is another kind of file"), "{}", run.err);
+        assert_eq!(bench.files("."), before);
+    }
+}
+
+#[test]
+fn a_map_is_kept_in_the_data_set_and_another_map_is_another_recipe() {
+    let bench = Bench::new("map");
+    let map = |side: usize| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+        encoder.set_color(png::ColorType::Grayscale);
+        let pixels = if side == 0 { [255, 0] } else { [0, 255] };
+        encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+        fs::write(bench.path("map.png"), bytes).unwrap();
+    };
+    map(0);
+    let command = format!("generate --out out --frames 1 {TINY} --set layout.kind=map --set layout.path=map.png");
+    bench.good(&command);
+    let made = bench.files("out");
+    let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is kept");
+    assert!(kept.ends_with(".png"));
+    fs::remove_file(bench.path("map.png")).unwrap();
+    bench.good("generate out/recipe.toml --out again --frames 1");
+    assert_eq!(bench.files("again"), made, "the folder holds all it takes");
+    map(1);
+    let run = bench.run(&command);
+    assert!(run.code == 2 && run.err.contains("another recipe"), "{}", run.err);
+    assert_eq!(bench.files("out"), made);
+}
+
+#[test]
+fn all_cells_can_be_set_at_once() {
+    let bench = Bench::new("no-cells");
+    bench.good(&format!("generate --out out --frames 1 {TINY} --set cells={{}} --set debris.speckles.count=3"));
+    let table = fs::read_to_string(bench.path("out/objects.csv")).unwrap();
+    assert!(!table.contains("nucleus") && table.contains("speckle"), "{table}");
 }
 
 #[cfg(unix)]

@@ -37,7 +37,7 @@ fn bench(criterion: &mut Criterion) {
         let frame = engine.frame(Key { seed: SEED, index: 0 }).unwrap();
         let pixels = frame.finished.scene.view.width * frame.finished.scene.view.height;
         let scratch = Scratch(std::env::temp_dir().join(format!("papsynth-bench-{}-{planes}", std::process::id())));
-        let info = DatasetInfo { recipe: &recipe, model: &model, seed: SEED };
+        let info = DatasetInfo { recipe: &recipe, model: &model, seed: SEED, map: None };
         let dataset = Dataset::create_or_resume(&scratch.0, &info).unwrap();
         group.throughput(Throughput::Elements((pixels * frame.planes.len()) as u64));
         group.bench_function(format!("{planes} planes"), |b| b.iter(|| write(&dataset, &frame)));

@@ -15,7 +15,7 @@ use crate::files::{Folder, is_temporary, sha256};
 use crate::frame_writer::FrameWriter;
 use crate::layout;
 use crate::merge;
-use crate::read;
+use crate::read::{self, InputFile};
 use crate::record::{Check, FrameRecord, Identity, Manifest};
 
 pub use crate::merge::Summary;
@@ -32,6 +32,8 @@ pub struct DatasetInfo<'a> {
     pub model: &'a Model,
     /// The seed.
     pub seed: u64,
+    /// The map that the recipe names, if it names one: kept in the data set, so that it can be made again from there.
+    pub map: Option<&'a InputFile>,
 }
 
 /// A data set in a folder.
@@ -43,6 +45,8 @@ pub struct Dataset {
     pub(crate) folder: Folder,
     pub(crate) identity: Identity,
     pub(crate) categories: Vec<Category>,
+    /// Name of the map that it keeps.
+    pub(crate) map: Option<String>,
 }
 
 impl Dataset {
@@ -62,7 +66,8 @@ impl Dataset {
             model_sha256: sha256(model.as_bytes()),
         };
         let folder = Folder::new(path);
-        let dataset = Self { folder, identity, categories: categories(info.recipe) };
+        let map = info.map.map(|file| file.name.clone());
+        let dataset = Self { folder, identity, categories: categories(info.recipe), map };
         match stranger(path)? {
             None => merge::write_manifest(&dataset, &[], &[]).map(|_| ())?,
             Some(_) if dataset.folder.path(layout::MANIFEST).exists() => dataset.compare(&recipe)?,
@@ -78,8 +83,11 @@ impl Dataset {
         for name in layout::FOLDERS.into_iter().chain([""]) {
             dataset.folder.sweep(name)?;
         }
-        for (name, text) in [(layout::RECIPE, &recipe), (layout::MODEL, &model)] {
-            dataset.folder.write_if_new(name, |out| out.bytes(text.as_bytes()))?;
+        let kept = info.map.map(|file| (file.name.as_str(), &file.bytes[..]));
+        for (name, bytes) in
+            [(layout::RECIPE, recipe.as_bytes()), (layout::MODEL, model.as_bytes())].into_iter().chain(kept)
+        {
+            dataset.folder.keep(name, bytes)?;
         }
         Ok(dataset)
     }
@@ -102,6 +110,23 @@ impl Dataset {
     /// If the system refuses to tell.
     pub fn is_whole(&self, index: u64, check: Check) -> Result<bool, Error> {
         Ok(whole_record(&self.folder, &self.identity, index, check)?.is_ok())
+    }
+
+    /// Whether [`finish`](Self::finish) has merged all frames that are recorded, and its files are still there.
+    ///
+    /// # Errors
+    /// If the system refuses to tell.
+    pub fn is_finished(&self) -> Result<bool, Error> {
+        let manifest = read_manifest(&self.folder)?;
+        if manifest.frames == 0 || manifest.frames != recorded_frames(&self.folder)?.len() as u64 {
+            return Ok(false);
+        }
+        for file in &manifest.files {
+            if self.folder.flaw(file, Check::Sizes)?.is_some() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Writes the frame of a scene, whose planes will follow one by one.

@@ -52,6 +52,12 @@ impl Folder {
         pending.commit()
     }
 
+    /// Writes a whole file, unless there is one of the same content.
+    pub(crate) fn keep(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
+        let record = FileRecord { path: name.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) };
+        if self.flaw(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
+    }
+
     /// Writes a file piece by piece, unless there is one of the same content.
     pub(crate) fn write_if_new(
         &self,
@@ -338,7 +344,7 @@ mod tests {
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {
-        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
+        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
         let dataset = Dataset::create_or_resume(path, &info)?;
         if !dataset.is_whole(0, Check::Sizes)? {
             let frame = frame(0, 2, 8, 1);

@@ -21,6 +21,8 @@ pub struct Run<'a> {
     pub at_once: usize,
     /// How many threads work on one frame. The bytes are the same.
     pub threads: Threads,
+    /// How carefully frames that are there are looked at, before they are kept.
+    pub check: Check,
     /// Set to end early: frames that are being made are completed, no other is begun.
     pub stop: &'a AtomicBool,
 }
@@ -67,7 +69,7 @@ impl Dataset {
                 if number >= count {
                     return;
                 }
-                match self.make(engine, run.frames.start + number, run.threads, report) {
+                match self.make(engine, run.frames.start + number, run, report) {
                     Ok(Made::Now) => made.fetch_add(1, Ordering::Relaxed),
                     Ok(Made::Before) => kept.fetch_add(1, Ordering::Relaxed),
                     Err(error) => {
@@ -91,15 +93,15 @@ impl Dataset {
         Ok(Outcome { kept, made, stopped: kept + made < count })
     }
 
-    fn make(&self, engine: &Engine, index: u64, threads: Threads, report: &dyn Fn(Progress)) -> Result<Made, Error> {
-        if self.is_whole(index, Check::Sizes)? {
+    fn make(&self, engine: &Engine, index: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Made, Error> {
+        if self.is_whole(index, run.check)? {
             report(Progress::Kept(index));
             return Ok(Made::Before);
         }
         let key = Key { seed: self.identity.seed, index };
         let scene = engine.scene(key)?;
         let mut writer = self.frame_writer(&scene)?;
-        let finished = engine.image::<Error>(scene, threads, |plane| writer.write_plane(plane))?;
+        let finished = engine.image::<Error>(scene, run.threads, |plane| writer.write_plane(plane))?;
         report(Progress::Made(&writer.finish(&finished)?));
         Ok(Made::Now)
     }

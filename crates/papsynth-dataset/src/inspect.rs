@@ -23,6 +23,8 @@ pub struct Overview {
     pub missing: Vec<Range<u64>>,
     /// Frames of which something is wrong; they are among the missing.
     pub defects: Vec<Defect>,
+    /// What is wrong with the files of the whole data set, such as `coco.json`.
+    pub flaws: Vec<String>,
     /// Number of objects and parts of cells by category.
     pub objects: BTreeMap<String, u64>,
     /// How many of them lie partly outside their image.
@@ -61,6 +63,7 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         frames: 0,
         missing: Vec::new(),
         defects: Vec::new(),
+        flaws: Vec::new(),
         objects: BTreeMap::new(),
         truncated: 0,
         sizes: BTreeSet::new(),
@@ -69,6 +72,9 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         bits: BTreeSet::new(),
         bytes: 0,
     };
+    for file in &overview.manifest.files {
+        overview.flaws.extend(folder.flaw(file, check)?);
+    }
     let mut next = 0;
     for index in recorded_frames(&folder)? {
         let record = match whole_record(&folder, &identity, index, check)? {

@@ -43,7 +43,8 @@ pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
         }
     }
     summary.frames = frames.len() as u64;
-    let mut merged = vec![folder.record(layout::MODEL)?, folder.record(layout::RECIPE)?];
+    let given = [layout::MODEL, layout::RECIPE].into_iter().chain(dataset.map.as_deref());
+    let mut merged = given.map(|name| folder.record(name)).collect::<Result<Vec<_>, _>>()?;
     if !frames.is_empty() {
         merged.push(folder.write_if_new(layout::TABLE, |out| tables(folder, &frames, out))?);
         merged.push(folder.write_if_new(layout::COCO, |out| documents(dataset, &frames, out))?);

@@ -1,12 +1,13 @@
 //! What is recorded of a data set and of each frame in it.
 
 use std::collections::BTreeMap;
+use std::fmt::{self, Formatter};
 use std::path::{Component, Path};
 
 use papsynth::key::Key;
 use papsynth::scene::{Scene, View};
-use serde::de::IgnoredAny;
-use serde::{Deserialize, Serialize};
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::error::Problem;
 
@@ -128,19 +129,22 @@ impl FrameRecord {
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let record: Self = serde_json::from_slice(bytes).map_err(broken)?;
         version(record.version)?;
-        if let Some(file) = record.files.iter().find(|f| !lies_inside(&f.path)) {
-            return Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default())));
-        }
+        inside(&record.files)?;
         Ok(record)
     }
 }
 
-/// Whether a path is relative and stays below where it starts.
-fn lies_inside(path: &str) -> bool {
-    !path.is_empty() && Path::new(path).components().all(|c| matches!(c, Component::Normal(_)))
+/// Paths must be relative and stay below where they start.
+fn inside(files: &[FileRecord]) -> Result<(), Problem> {
+    let lies_inside =
+        |path: &str| !path.is_empty() && Path::new(path).components().all(|c| matches!(c, Component::Normal(_)));
+    match files.iter().find(|file| !lies_inside(&file.path)) {
+        Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),
+        None => Ok(()),
+    }
 }
 
-/// The head of `manifest.json`; its list of files follows in the file but is not kept.
+/// The head of `manifest.json`, and of its list of files those of the whole data set; those of frames are in their records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Manifest {
     /// What wrote it.
@@ -149,6 +153,8 @@ pub struct Manifest {
     pub identity: Identity,
     /// Number of frames when it was written; the files of later ones are not in it.
     pub frames: u64,
+    /// The files that are no frame's.
+    pub files: Vec<FileRecord>,
 }
 
 /// As it stands in the file.
@@ -160,8 +166,33 @@ struct RawManifest {
     writer: String,
     identity: Identity,
     frames: u64,
-    #[serde(rename = "files")]
-    _files: IgnoredAny,
+    #[serde(deserialize_with = "at_the_top")]
+    files: Vec<FileRecord>,
+}
+
+/// Of a list of files, which may be longer than memory, those that lie in no folder.
+fn at_the_top<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRecord>, D::Error> {
+    struct Top;
+
+    impl<'de> Visitor<'de> for Top {
+        type Value = Vec<FileRecord>;
+
+        fn expecting(&self, f: &mut Formatter<'_>) -> fmt::Result {
+            f.write_str("a list of files")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let mut found = Vec::new();
+            while let Some(file) = list.next_element::<FileRecord>()? {
+                if !file.path.contains('/') {
+                    found.push(file);
+                }
+            }
+            Ok(found)
+        }
+    }
+
+    deserializer.deserialize_seq(Top)
 }
 
 /// The head of the file, as it is written.
@@ -189,7 +220,8 @@ impl Manifest {
             return Err(json(format!("format is `{}`; `{FORMAT}` is wanted", raw.format.escape_default())));
         }
         version(raw.version)?;
-        Ok(Self { writer: raw.writer, identity: raw.identity, frames: raw.frames })
+        inside(&raw.files)?;
+        Ok(Self { writer: raw.writer, identity: raw.identity, frames: raw.frames, files: raw.files })
     }
 }
 

@@ -15,7 +15,7 @@ use support::{SEED, Scratch, contents, frame, recipe};
 /// A data set of one small stack and one small image, as good seeds of bad files.
 static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
     let scratch = Scratch::new("hostile");
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     for frame in [frame(0, 1, 8, 1), frame(1, 2, 12, 70_000)] {
         let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
@@ -84,7 +84,7 @@ fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     assert_eq!(inspect(scratch.path(), Check::Hashes).unwrap().frames, 2);
     // A change of content that leaves the size alone is found by its hash; merging says which file is wrong.

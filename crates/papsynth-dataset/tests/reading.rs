@@ -8,12 +8,13 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
+use papsynth::recipe::{Layout, Recipe};
 use papsynth::truth::LabelMap;
-use papsynth_dataset::Problem;
 use papsynth_dataset::read::{
     GreyImage, Limits, NucleusSample, components, image_files, label_map, label_weights, outlines, read_inputs,
     read_label_map, read_nuclei, read_outlines, weights,
 };
+use papsynth_dataset::{Error, Problem};
 use png::{BitDepth, ColorType};
 use proptest::prelude::*;
 use support::Scratch;
@@ -231,14 +232,24 @@ fn weight_maps_need_a_place() {
 
     let scratch = Scratch::new("weights");
     let mut recipe = support::recipe();
-    let read = |recipe: &papsynth::recipe::Recipe| read_inputs(recipe, scratch.path(), &Limits::default());
-    assert!(read(&recipe).unwrap().weight_map.is_none());
-    recipe.layout = papsynth::recipe::Layout::Map { path: "map.png".to_owned() };
+    let read = |recipe: &Recipe| {
+        let mut named = recipe.clone();
+        let (inputs, file) = read_inputs(&mut named, scratch.path(), &Limits::default())?;
+        Ok::<_, Error>((inputs.weight_map, file, named.layout))
+    };
+    assert_eq!(read(&recipe).unwrap(), (None, None, recipe.layout.clone()));
+    recipe.layout = Layout::Map { path: "map.png".to_owned() };
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: there is no such file"));
     fs::write(scratch.join("map.png"), grey_png(&[0, 51, 255, 0], 2)).unwrap();
-    assert_eq!(read(&recipe).unwrap().weight_map, Some(weights(&image).unwrap()));
-    recipe.layout = papsynth::recipe::Layout::Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() };
-    assert_eq!(read(&recipe).unwrap().weight_map.unwrap().weights, [0.0, 1.0, 1.0, 0.0]);
+    let (found, file, layout) = read(&recipe).unwrap();
+    assert_eq!(found, Some(weights(&image).unwrap()));
+    let file = file.unwrap();
+    assert_eq!(file.bytes, grey_png(&[0, 51, 255, 0], 2));
+    assert_eq!(layout, Layout::Map { path: file.name.clone() });
+    fs::write(scratch.join("map.png"), grey_png(&[0, 52, 255, 0], 2)).unwrap();
+    assert_ne!(read(&recipe).unwrap().1.unwrap().name, file.name, "another content has another name");
+    recipe.layout = Layout::Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() };
+    assert_eq!(read(&recipe).unwrap().0.unwrap().weights, [0.0, 1.0, 1.0, 0.0]);
     fs::write(scratch.join("map.png"), grey_png(&[0; 4], 2)).unwrap();
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: every pixel is 0"));
 }

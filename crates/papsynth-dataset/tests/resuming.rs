@@ -16,7 +16,7 @@ use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Outcome, Progress, Ru
 use support::{SEED, Scratch, contents, frame, recipe};
 
 fn open_with(path: &Path, recipe: &Recipe, model: &Model, seed: u64) -> Result<Dataset, Error> {
-    Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed })
+    Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed, map: None })
 }
 
 fn open(path: &Path) -> Result<Dataset, Error> {
@@ -176,7 +176,7 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     let stop = AtomicBool::new(false);
     let run = |dataset: &Dataset, frames, at_once| {
         let seen = Mutex::new(Vec::new());
-        let run = Run { frames, at_once, threads: Threads::One, stop: &stop };
+        let run = Run { frames, at_once, threads: Threads::One, check: Check::Sizes, stop: &stop };
         let outcome = dataset.generate(&engine, &run, &|progress| {
             seen.lock().unwrap().push(match progress {
                 Progress::Kept(index) => (index, false),
@@ -205,6 +205,43 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     assert_eq!((outcome, seen), (Outcome { kept: 0, made: 0, stopped: true }, vec![]));
     let other = Scratch::new("split-3");
     let stranger = open(other.path()).unwrap();
-    let run = Run { frames: 0..1, at_once: 1, threads: Threads::One, stop: &AtomicBool::new(false) };
+    let run =
+        Run { frames: 0..1, at_once: 1, threads: Threads::One, check: Check::Sizes, stop: &AtomicBool::new(false) };
     assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("another recipe"));
+}
+
+#[test]
+fn damage_that_keeps_the_size_is_found_and_mended() {
+    let scratch = Scratch::new("mend");
+    let (recipe, engine) = small();
+    let dataset = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
+    let stop = AtomicBool::new(false);
+    let run = |check| Run { frames: 0..2, at_once: 1, threads: Threads::One, check, stop: &stop };
+    assert!(!dataset.is_finished().unwrap());
+    dataset.generate(&engine, &run(Check::Sizes), &|_| ()).unwrap();
+    assert!(!dataset.is_finished().unwrap());
+    dataset.finish().unwrap();
+    assert!(dataset.is_finished().unwrap());
+    let good = contents(scratch.path());
+    for (name, _) in good.iter().filter(|(name, _)| name != "manifest.json" && !name.starts_with("frames/")) {
+        let path = scratch.join(name);
+        let mut bytes = fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(&path, bytes).unwrap();
+        let overview = inspect(scratch.path(), Check::Hashes).unwrap();
+        assert_eq!(overview.flaws.len() + overview.defects.len(), 1, "{name}: {overview:?}");
+        let again = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
+        let made = again.generate(&engine, &run(Check::Hashes), &|_| ()).unwrap().made;
+        assert_eq!(made, u64::from(name.contains('/')), "{name}");
+        again.finish().unwrap();
+        assert!(contents(scratch.path()) == good, "{name} is mended, and nothing else is touched");
+    }
+    for name in ["coco.json", "recipe.toml"] {
+        fs::remove_file(scratch.join(name)).unwrap();
+        assert_eq!(inspect(scratch.path(), Check::Sizes).unwrap().flaws, [format!("{name} is missing")]);
+        assert!(!dataset.is_finished().unwrap());
+        open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap().finish().unwrap();
+    }
+    assert!(contents(scratch.path()) == good);
 }

@@ -19,7 +19,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
 fn open(scratch: &Scratch) -> Dataset {
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
     Dataset::create_or_resume(scratch.path(), &info).unwrap()
 }
 

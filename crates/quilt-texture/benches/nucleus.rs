@@ -36,6 +36,10 @@ fn nucleus(c: &mut Criterion) {
     let cases = [
         ("default", QuiltParams::default()),
         ("paper", QuiltParams::paper()),
+        (
+            "paper, four fifths of the distance",
+            QuiltParams { acceptance: Acceptance::Threshold { d_max: 12.0, max_tries: 1000 }, ..QuiltParams::paper() },
+        ),
         ("patch 7, overlap 2", seven_by_two.clone()),
         (
             "patch 7, overlap 2, no bias, sharp cut",

@@ -4,6 +4,7 @@
 mod candidates;
 mod canvas;
 mod distance;
+mod draw;
 mod error;
 mod params;
 mod quilter;

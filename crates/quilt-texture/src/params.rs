@@ -15,7 +15,7 @@ pub struct QuiltParams {
     /// with strength 0.5 (ours).
     pub centre_bias: CentreBias,
     /// How all candidates are compared. Default [`Search::Auto`] (ours). Has no effect on
-    /// [`Acceptance::Threshold`], which compares few.
+    /// [`Acceptance::Threshold`], which tries some and compares the rest directly.
     pub search: Search,
     /// Which FFT [`Search::Fft`] runs. Default [`Fft::Fastest`] (ours).
     pub fft: Fft,

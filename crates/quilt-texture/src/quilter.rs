@@ -3,6 +3,7 @@ use rand_core::Rng;
 use crate::candidates::Candidates;
 use crate::canvas::Canvas;
 use crate::distance::centrality;
+use crate::draw::{below, below_exp, exp_below, outcome_of_tries, slots_between, uniform};
 use crate::scan::{LANES, Laid, Template, Tolerance, scan};
 use crate::source::COVERED;
 use crate::spectral::Spectral;
@@ -22,6 +23,8 @@ pub struct Quilter<'a> {
     donors: Vec<Donor<'a>>,
     /// Number of places for a patch in all sources.
     places: usize,
+    /// Number of costs of all candidates.
+    slots: usize,
     /// Variance of the pixels about the mean of their source.
     variance: f64,
 }
@@ -69,6 +72,8 @@ struct Work {
     laid: Vec<Laid>,
     /// Costs of all candidates, source after source.
     costs: Vec<f32>,
+    /// How likely each is tried, relative to the likeliest.
+    weights: Vec<f32>,
     near: Vec<usize>,
 }
 
@@ -91,7 +96,7 @@ impl<'a> Quilter<'a> {
             let spectral = match params.search {
                 Search::Direct => false,
                 Search::Fft => true,
-                Search::Auto => spectral_is_faster(source, &candidates, params),
+                Search::Auto => Spectral::is_faster(source, &candidates, params),
             };
             Ok(Donor { source, candidates, spectral: spectral.then(|| Spectral::new(source, params.fft)) })
         };
@@ -103,6 +108,7 @@ impl<'a> Quilter<'a> {
         Ok(Self {
             params: params.clone(),
             places: donors.iter().map(|d| d.candidates.places.len()).sum(),
+            slots: donors.iter().map(|d| d.candidates.slots).sum(),
             donors,
             variance,
         })
@@ -167,29 +173,68 @@ impl<'a> Quilter<'a> {
     /// The paper's acceptance: the first random candidate with d(E_B(x,y), E_B0) < d_max, d the
     /// root of the mean squared error over the overlaps.
     fn first_below<R: Rng + ?Sized>(&self, d_max: f64, max_tries: usize, work: &mut Work, rng: &mut R) -> Candidate {
-        let template = &mut work.template;
+        let Work { template, laid, .. } = work;
         template.weight = 0.0;
-        self.lay(template, &mut work.laid);
+        self.lay(template, laid);
         #[expect(
             clippy::cast_precision_loss,
             clippy::cast_possible_truncation,
             reason = "at most 256 squared; costs are single precision"
         )]
         let enough = (d_max * d_max * template.pixels.len() as f64) as f32;
+        // A try takes about as long as a block of the scan. With as many tries as blocks before it,
+        // the choice never takes much more than twice as long as the better of the two would.
+        let tries = max_tries.min(self.slots / LANES);
         let mut best = (f32::INFINITY, None);
-        for _ in 0..max_tries {
+        for _ in 0..tries {
             let candidate = self.weighted(template.centrality, rng);
             let source = self.donors[candidate.donor].source;
-            let cost = work.laid[candidate.donor].cost(source, candidate.place);
+            let cost = laid[candidate.donor].cost(source, candidate.place);
+            if cost <= enough {
+                return candidate;
+            }
             if cost < best.0 {
                 best = (cost, Some(candidate));
             }
-            if cost <= enough {
-                break;
-            }
+        }
+        if tries < max_tries {
+            let slot = self.outcome_of_tries(enough, best.0, max_tries - tries, work, rng);
+            best.1 = slot.map(|slot| self.candidate_of_slot(slot)).or(best.1);
         }
         // Only an overflow of every cost leaves none.
-        best.1.unwrap_or_else(|| self.weighted(template.centrality, rng))
+        best.1.unwrap_or_else(|| self.weighted(work.template.centrality, rng))
+    }
+
+    /// What `tries` more tries of the template that is laid would choose, if better than `least`.
+    fn outcome_of_tries<R: Rng + ?Sized>(
+        &self,
+        enough: f32,
+        least: f32,
+        tries: usize,
+        work: &mut Work,
+        rng: &mut R,
+    ) -> Option<usize> {
+        let Work { laid, costs, weights, .. } = work;
+        self.scan(laid, Tolerance { factor: 0.0, floor: least }, 0.0, costs);
+        // Without pixels the cost is strength · Δ², and exp(-cost) the weight.
+        #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
+        let strength = self.params.centre_bias.strength() as f32;
+        laid.iter_mut().for_each(|laid| laid.forget_pixels(strength));
+        let nearest = self.scan(laid, Tolerance { factor: 1.0, floor: f32::INFINITY }, f32::INFINITY, weights);
+        exp_below(weights, nearest);
+        outcome_of_tries(costs, weights, enough, least, tries, rng)
+    }
+
+    /// Costs of all candidates, one by one, and the smallest.
+    fn scan(&self, laid: &[Laid], tolerance: Tolerance, mut least: f32, costs: &mut Vec<f32>) -> f32 {
+        costs.resize(self.slots, 0.0);
+        let mut rest = &mut costs[..];
+        for (Donor { source, candidates, .. }, laid) in self.donors.iter().zip(laid) {
+            let (costs, others) = rest.split_at_mut(candidates.slots);
+            rest = others;
+            scan(source, candidates, laid, tolerance, &mut least, costs);
+        }
+        least
     }
 
     /// Ours: one of the candidates whose cost is near the smallest.
@@ -219,7 +264,7 @@ impl<'a> Quilter<'a> {
                 least = least.min(work.laid[donor].cost(source, place));
             }
         }
-        work.costs.resize(self.donors.iter().map(|d| d.candidates.slots).sum(), 0.0);
+        work.costs.resize(self.slots, 0.0);
         let mut rest = &mut work.costs[..];
         for (donor, laid) in self.donors.iter().zip(&work.laid) {
             let (costs, others) = rest.split_at_mut(donor.candidates.slots);
@@ -232,15 +277,8 @@ impl<'a> Quilter<'a> {
                 }
             }
         }
-        let bound = tolerance.bound(least);
         work.near.clear();
-        for (block, costs) in work.costs.as_chunks::<LANES>().0.iter().enumerate() {
-            // Nearly all blocks are passed over, and this test is a few vector instructions.
-            if costs.iter().fold(false, |any, &cost| any | (cost <= bound)) {
-                let near = (0..LANES).filter(|&lane| costs[lane] <= bound);
-                work.near.extend(near.map(|lane| block * LANES + lane));
-            }
-        }
+        slots_between(&work.costs, f32::NEG_INFINITY, tolerance.bound(least)).for_each(|slot| work.near.push(slot));
         if work.near.is_empty() {
             // Only an overflow of every cost leaves none.
             return self.weighted(work.template.centrality, rng);
@@ -309,50 +347,13 @@ impl<'a> Quilter<'a> {
     }
 }
 
-/// Whether u < exp(-x), x ≥ 0, mostly without the exponential: 1 − x ≤ exp(-x) ≤ 1 / (1 + x + x²/2 + x³/6).
-fn below_exp(u: f64, x: f64) -> bool {
-    // Wider by more than what rounding can do, so that the answer never differs.
-    const SLACK: f64 = 1e-12;
-    let above = 1.0 + x * (1.0 + x * (0.5 + x / 6.0));
-    u < 1.0 - x - SLACK || (u * above < 1.0 + SLACK && u < libm::exp(-x))
-}
-
-/// Whether Fourier transforms beat the scan on one source: the scan takes one difference for each
-/// candidate and pixel of the overlaps, the transforms log N steps for each of N grid pixels.
-fn spectral_is_faster(source: &Source, candidates: &Candidates, params: &QuiltParams) -> bool {
-    /// Measured on one core of a Zen 4 machine; only their ratio matters.
-    const DIFFERENCE_NS: f64 = 0.035;
-    const STEP_NS: f64 = 1.0;
-    let overlaps = params.overlap_px * (2 * params.patch_px - params.overlap_px);
-    let pixels: usize = Spectral::grid(source).iter().product();
-    #[expect(clippy::cast_precision_loss, reason = "an estimate")]
-    {
-        let scan = DIFFERENCE_NS * (candidates.slots * overlaps) as f64;
-        scan > STEP_NS * pixels as f64 * f64::from(pixels.ilog2() + 1)
-    }
-}
-
-/// A uniform number in 0..1.
-fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    /// 2^-53.
-    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
-    {
-        (rng.next_u64() >> 11) as f64 * STEP
-    }
-}
-
-/// A uniform whole number below `n`, by multiplication: uneven by less than n / 2^64.
-fn below<R: Rng + ?Sized>(n: usize, rng: &mut R) -> usize {
-    #[expect(clippy::cast_possible_truncation, reason = "below n")]
-    {
-        ((u128::from(rng.next_u64()) * n as u128) >> 64) as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan::tests::{disc, template};
+    use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+
+    const SEED: u64 = 0xbe57;
 
     #[test]
     fn small_sources_are_scanned_and_large_ones_transformed() {
@@ -366,14 +367,53 @@ mod tests {
         assert!(chosen(256, 64));
     }
 
+    /// The first of `max_tries` with a cost of `enough` or less, else the first of the best.
+    fn tried(quilter: &Quilter<'_>, enough: f32, max_tries: usize, work: &mut Work, rng: &mut impl Rng) -> Candidate {
+        work.template.weight = 0.0;
+        quilter.lay(&work.template, &mut work.laid);
+        let mut best = (f32::INFINITY, None);
+        for _ in 0..max_tries {
+            let candidate = quilter.weighted(work.template.centrality, rng);
+            let cost = work.laid[candidate.donor].cost(quilter.donors[candidate.donor].source, candidate.place);
+            if cost <= enough {
+                return candidate;
+            }
+            if cost < best.0 {
+                best = (cost, Some(candidate));
+            }
+        }
+        best.1.unwrap()
+    }
+
     #[test]
-    fn whole_numbers_below_are_even() {
-        use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xbe10);
-        let mut counts = [0.0; 7];
-        (0..70_000).for_each(|_| counts[below(7, &mut rng)] += 1.0);
-        let chi_square: f64 = counts.map(|n| (n - 1e4) * (n - 1e4) / 1e4).iter().sum();
-        // 0.1 % of the distribution with 6 degrees of freedom.
-        assert!(chi_square < 22.5, "{chi_square}");
+    fn first_below_chooses_like_tries_one_by_one() {
+        const DRAWS: usize = 20_000;
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        let sources = [disc(14, 14, &mut rng), disc(11, 17, &mut rng)];
+        let mut work = Work { template: template(5, 1, &mut rng), ..Work::default() };
+        let n = work.template.pixels.len() as f64;
+        // Many, few, hardly any and no candidates are good enough.
+        for (d_max, strength) in [(0.42, 2.0), (0.33, 2.0), (0.3, 0.0), (0.0, 2.0), (0.0, 20.0)] {
+            #[expect(clippy::cast_possible_truncation, reason = "costs are single precision")]
+            let enough = (d_max * d_max * n) as f32;
+            let acceptance = Acceptance::Threshold { d_max, max_tries: 60 };
+            let centre_bias = CentreBias::Weighted { strength };
+            let params = QuiltParams { patch_px: 5, overlap_px: 1, acceptance, centre_bias, ..QuiltParams::default() };
+            let quilter = Quilter::new(&[&sources[0], &sources[1]], &params).unwrap();
+            assert!(quilter.slots / LANES < 60 / 2);
+            let mut counts = vec![[0.0; 2]; 2 * sources[0].pixels.len().max(sources[1].pixels.len())];
+            for _ in 0..DRAWS {
+                let fast = quilter.first_below(d_max, 60, &mut work, &mut rng);
+                let slow = tried(&quilter, enough, 60, &mut work, &mut rng);
+                counts[2 * fast.place + fast.donor][0] += 1.0;
+                counts[2 * slow.place + slow.donor][1] += 1.0;
+            }
+            let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
+            let (chi_square, cells) = (terms.clone().sum::<f64>(), terms.count() as f64);
+            let freedom = cells - 1.0;
+            assert!(freedom >= 2.0);
+            // The mean of the distribution and four standard deviations, a little more than 0.1 %.
+            assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{d_max} {strength}: {chi_square} of {cells}");
+        }
     }
 }

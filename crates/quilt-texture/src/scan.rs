@@ -60,6 +60,12 @@ impl Laid {
         self.weight = template.weight;
     }
 
+    /// Leaves only weight · Δ².
+    pub(crate) fn forget_pixels(&mut self, weight: f32) {
+        self.pixels.clear();
+        self.weight = weight;
+    }
+
     /// The cost of one candidate, with the same bits as [`scan`] gives it.
     pub(crate) fn cost(&self, source: &Source, place: usize) -> f32 {
         let mut cost = [0.0];

@@ -5,6 +5,7 @@ mod diagram;
 mod draw;
 mod error;
 mod geometry;
+mod lloyd;
 mod outline;
 mod river;
 mod skeleton;

@@ -2,6 +2,7 @@ use crate::build::build;
 use crate::diagram::Diagram;
 use crate::error::{Error, require};
 use crate::geometry::{Point, below, unit};
+use crate::lloyd::relaxed;
 use crate::outline::Outline;
 use crate::river::{Landscape, River};
 use crate::window::Window;
@@ -81,9 +82,15 @@ impl Skeleton {
     /// # Errors
     /// As [`Skeleton::grow_on`].
     pub fn diagram<R: Rng + ?Sized>(&self, window: &Window, rng: &mut R) -> Result<Diagram, Error> {
-        let sites = (0..self.params.sites).map(|_| window.draw(rng)).collect();
-        let mut diagram = build(sites, window.clone())?;
-        for _ in 0..self.params.lloyd_passes {
+        let passes = self.params.lloyd_passes;
+        let drawn: Vec<Point> = (0..self.params.sites).map(|_| window.draw(rng)).collect();
+        if let Some(sites) = relaxed(&drawn, window, passes)
+            && let Ok(diagram) = build(sites, window.clone())
+        {
+            return Ok(diagram);
+        }
+        let mut diagram = build(drawn, window.clone())?;
+        for _ in 0..passes {
             diagram.relax();
         }
         Ok(diagram)

@@ -163,8 +163,17 @@ impl Window {
         self.reach[self.corners.len()]
     }
 
+    /// The lowest and the highest coordinates.
+    pub(crate) fn bounds(&self) -> [Point; 2] {
+        let bound = |of: fn(f64, f64) -> f64| {
+            let first = self.corners[0];
+            self.corners.iter().fold(first, |bound, corner| [of(bound[0], corner[0]), of(bound[1], corner[1])])
+        };
+        [bound(f64::min), bound(f64::max)]
+    }
+
     /// Each side's first corner and its direction.
-    fn sides(&self) -> impl Iterator<Item = (Point, Point)> {
+    pub(crate) fn sides(&self) -> impl Iterator<Item = (Point, Point)> {
         self.corners.iter().copied().zip(self.sides.iter().copied())
     }
 }

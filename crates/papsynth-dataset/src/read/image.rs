@@ -9,7 +9,7 @@ use super::raster::{Raster, Samples};
 use super::{Limits, parse, tiff};
 use crate::error::{Error, Problem};
 
-const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+pub(crate) const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Little- and big-endian TIFF and BigTIFF.
 const TIFF_SIGNATURES: [&[u8]; 4] = [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"];

@@ -26,7 +26,7 @@ pub use components::{Component, components};
 pub use image::{GreyImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
-pub use weights::{label_weights, read_inputs, weights};
+pub use weights::{InputFile, label_weights, read_inputs, weights};
 
 use crate::error::{Error, Problem};
 

@@ -7,8 +7,10 @@ use papsynth::recipe::{Layout, Recipe};
 use papsynth::scene::WeightMap;
 use papsynth::truth::LabelMap;
 
-use super::{GreyImage, Limits, read_label_map};
+use super::image::PNG_SIGNATURE;
+use super::{GreyImage, Limits, bytes, label_map};
 use crate::error::{Error, Problem};
+use crate::files::sha256;
 
 /// Brightness as weight: 0 where black, 1 at the file's largest grey level.
 ///
@@ -33,21 +35,36 @@ fn possible(map: WeightMap) -> Result<WeightMap, Problem> {
     if map.weights.iter().any(|&w| w > 0.0) { Ok(map) } else { Err(Problem::NoWeight) }
 }
 
-/// Reads the files that a recipe names, relative to `folder` (where the recipe lies).
+/// A file that a recipe names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputFile {
+    /// Its name in the recipe and in the data set, which tells its content.
+    pub name: String,
+    /// What is in it.
+    pub bytes: Vec<u8>,
+}
+
+/// Reads the file that a recipe names, if it names one, relative to `folder` (where the recipe lies). In the recipe it then has a
+/// name that tells its content, so that recipes with different maps differ.
 ///
 /// # Errors
-/// If a file cannot be read, or allows no place.
-pub fn read_inputs(recipe: &Recipe, folder: &Path, limits: &Limits) -> Result<Inputs, Error> {
-    let weight_map = match &recipe.layout {
-        Layout::Map { path } => {
-            let path = folder.join(path);
-            Some(weights(&GreyImage::read(&path, limits)?).map_err(Error::input(&path))?)
-        }
-        Layout::Labels { path, .. } => {
-            let path = folder.join(path);
-            Some(label_weights(&read_label_map(&path, limits)?).map_err(Error::input(&path))?)
-        }
-        _ => None,
+/// If the file cannot be read, or allows no place.
+pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
+    let (path, parse): (_, fn(&[u8], &Limits) -> Result<WeightMap, Problem>) = match &mut recipe.layout {
+        Layout::Map { path } => (path, |bytes, limits| weights(&GreyImage::decode(bytes, limits)?)),
+        Layout::Labels { path, .. } => (path, |bytes, limits| label_weights(&label_map(bytes, limits)?)),
+        _ => return Ok((Inputs::default(), None)),
     };
-    Ok(Inputs { weight_map, ..Inputs::default() })
+    let found = folder.join(&path);
+    let bytes = bytes(&found, limits.max_file_bytes)?;
+    let map = parse(&bytes, limits).map_err(Error::input(&found))?;
+    *path = content_name(&bytes);
+    let file = InputFile { name: path.clone(), bytes };
+    Ok((Inputs { weight_map: Some(map), ..Inputs::default() }, Some(file)))
+}
+
+/// The name of a map in a data set: by the beginning of its SHA-256.
+fn content_name(bytes: &[u8]) -> String {
+    let ending = if bytes.starts_with(PNG_SIGNATURE) { "png" } else { "tif" };
+    format!("layout-{:.16}.{ending}", sha256(bytes))
 }

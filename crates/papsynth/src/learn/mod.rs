@@ -130,6 +130,9 @@ fn shapes(outlines: &[Vec<Point>], harmonics: usize, pixel_um: f64, what: &str) 
     if outlines.len() < FEWEST {
         return Err(format!("{} outlines of the {what} are too few; expected at least {FEWEST}", outlines.len()));
     }
+    if let Some(index) = outlines.iter().position(|outline| fsd_shape::self_intersects(outline)) {
+        return Err(format!("outline {index} of the {what} crosses itself; expected simple closed curves"));
+    }
     let fit = |spread: Spread| {
         let params = ShapeModelParams { harmonics, spread };
         let model = ShapeModel::fit(outlines, &params).map_err(|e| format!("outlines of the {what}: {e}"))?;

@@ -45,6 +45,8 @@ impl NucleusImage {
         const REACH: f64 = 9.0;
         /// Pixels of surroundings that a median can be trusted with.
         const FEWEST: usize = 12;
+        /// Mean absorbance below which nothing can be told from noise.
+        const FAINTEST: f64 = 0.01;
         let fail = |message: String| format!("{}: {message}", self.name);
         if self.width == 0 || self.light.len() != self.mask.len() || !self.light.len().is_multiple_of(self.width) {
             return Err(fail(format!(
@@ -85,6 +87,11 @@ impl NucleusImage {
             return Err(fail(format!("its mask has {} pixels; expected at least {FEWEST}", inside.len())));
         }
         let mean = inside.iter().sum::<f64>() / count;
+        if mean < FAINTEST {
+            return Err(fail(format!(
+                "its mean absorbance is {mean:.4}, at least {FAINTEST} is expected: a nucleus is darker than its surroundings"
+            )));
+        }
         let moment = |power: i32| inside.iter().map(|a| libm::pow(a - mean, f64::from(power))).sum::<f64>() / count;
         let sd = moment(2).sqrt();
         let skewness = if sd > 0.0 { moment(3) / (sd * sd * sd) } else { 0.0 };

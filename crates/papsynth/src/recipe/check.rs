@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Illumination, Layout, Number, RECIPE_VERSION, Recipe};
+use super::{Illumination, Law, Layout, Number, RECIPE_VERSION, Recipe};
 
 /// Something wrong with a recipe.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,6 +38,21 @@ impl Check {
             self.number(&format!("{section}.{name}"), number, *low, *high);
         }
     }
+
+    /// Where something is counted, what is written out must be whole; what is drawn from a range is rounded.
+    fn whole(&mut self, section: &str, fields: &[(&str, &Number)]) {
+        for (name, number) in fields {
+            let written: &[f64] = match number {
+                Number::Fixed(value) => &[*value],
+                Number::Drawn { law: Law::Choice(values), .. } => values,
+                Number::Drawn { .. } => &[],
+            };
+            if let Some(value) = written.iter().find(|value| value.is_finite() && value.floor() != **value) {
+                let message = format!("{value} is not a whole number");
+                self.problems.push(Problem { field: format!("{section}.{name}"), message });
+            }
+        }
+    }
 }
 
 pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
@@ -68,6 +83,9 @@ fn imaging(recipe: &Recipe, check: &mut Check) {
             ("pixel_um", &field.pixel_um, 0.05, 4.0),
         ],
     );
+    check.whole("field", &[("width_px", &field.width_px), ("height_px", &field.height_px)]);
+    check.whole("focus", &[("planes", &focus.planes)]);
+    check.whole("camera", &[("bits", &camera.bits)]);
     let [_, width] = field.width_px.bounds();
     let [_, height] = field.height_px.bounds();
     if width * height > MAX_PIXELS {
@@ -128,7 +146,11 @@ fn imaging(recipe: &Recipe, check: &mut Check) {
     if offset >= libm::exp2(bits) / 2.0 {
         check.problems.push(Problem {
             field: "camera.offset_dn".to_owned(),
-            message: format!("{} is more than half of the {bits}-bit range; expected less", camera.offset_dn),
+            message: format!(
+                "{} is half of the {bits}-bit range or more; expected less than {}",
+                camera.offset_dn,
+                libm::exp2(bits) / 2.0
+            ),
         });
     }
 }
@@ -147,10 +169,13 @@ fn layout(recipe: &Recipe, check: &mut Check) {
     );
     match &recipe.layout {
         Layout::Uniform {} | Layout::Map { .. } => {}
-        Layout::Clusters { count, radius_um, outside } => check.numbers(
-            "layout",
-            &[("count", count, 1.0, 1e4), ("radius_um", radius_um, 1.0, 1e4), ("outside", outside, 0.0, 1.0)],
-        ),
+        Layout::Clusters { count, radius_um, outside } => {
+            check.numbers(
+                "layout",
+                &[("count", count, 1.0, 1e4), ("radius_um", radius_um, 1.0, 1e4), ("outside", outside, 0.0, 1.0)],
+            );
+            check.whole("layout", &[("count", count)]);
+        }
         Layout::Swath { width_um, outside } => {
             check.numbers("layout", &[("width_um", width_um, 1.0, 1e4), ("outside", outside, 0.0, 1.0)]);
         }
@@ -169,6 +194,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
                 ("nucleus_stain", &mix.nucleus_stain, 0.0, 20.0),
             ],
         );
+        check.whole(&format!("cells.{class}"), &[("count", &mix.count)]);
     }
     let cytoplasm = &recipe.cytoplasm;
     check.numbers(
@@ -211,6 +237,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("rim", &nucleus.rim, 0.0, 2.0),
         ],
     );
+    check.whole("nucleus", &[("donors", &nucleus.donors)]);
     let ([patch, _], [_, overlap]) = (nucleus.patch_um.bounds(), nucleus.overlap_um.bounds());
     if overlap > patch / 2.0 {
         check.problems.push(Problem {
@@ -251,6 +278,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("halo", &leukocytes.halo, 0.0, 4.0),
         ],
     );
+    check.whole("debris.leukocytes", &[("clusters", &leukocytes.clusters), ("per_cluster", &leukocytes.per_cluster)]);
     let bacilli = &debris.bacilli;
     check.numbers(
         "debris.bacilli",
@@ -265,6 +293,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("absorbance", &bacilli.absorbance, 0.0, 4.0),
         ],
     );
+    check.whole("debris.bacilli", &[("clusters", &bacilli.clusters), ("per_cluster", &bacilli.per_cluster)]);
     let speckles = &debris.speckles;
     check.numbers(
         "debris.speckles",
@@ -274,6 +303,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("absorbance", &speckles.absorbance, 0.0, 4.0),
         ],
     );
+    check.whole("debris.speckles", &[("count", &speckles.count), ("dilations", &speckles.dilations)]);
     let blobs = &debris.out_of_focus;
     check.numbers(
         "debris.out_of_focus",
@@ -286,6 +316,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("absorbance", &blobs.absorbance, 0.0, 4.0),
         ],
     );
+    check.whole("debris.out_of_focus", &[("count", &blobs.count)]);
 }
 
 #[cfg(test)]
@@ -304,6 +335,17 @@ mod tests {
         assert!(text[0].starts_with("field.width_px: -3 is outside 16 to 32768"), "{text:?}");
         assert!(text.iter().any(|t| t.starts_with("optics.sigma_xy_um: NaN")), "{text:?}");
         assert!(text.iter().any(|t| t.contains("more than half of `nucleus.patch_um`")), "{text:?}");
+    }
+
+    #[test]
+    fn what_is_counted_must_be_whole() {
+        let mut recipe = Recipe::default();
+        recipe.camera.bits = Number::Fixed(8.5);
+        recipe.field.width_px =
+            Number::Drawn { law: Law::Choice(vec![100.0, 100.5]), min: f64::NEG_INFINITY, max: f64::INFINITY };
+        recipe.debris.speckles.count = Number::uniform(0.5, 2.5);
+        let text: Vec<String> = recipe.problems().iter().map(ToString::to_string).collect();
+        assert_eq!(text, ["field.width_px: 100.5 is not a whole number", "camera.bits: 8.5 is not a whole number"]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Number;
 
-/// The image: its size and the size of its pixels.
+/// The image: its size and the size of its pixels. Counts of cells and debris are those of a whole field, whatever its size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Field {
@@ -29,7 +29,7 @@ impl Default for Field {
 pub struct Focus {
     /// Number of focal planes, 1 to 1024: 1 is an image, more are a focus stack.
     pub planes: Number,
-    /// Distance between planes, µm, above 0 to 100.
+    /// Distance between planes, µm, 0.001 to 100.
     pub step_um: Number,
     /// Depth of the middle plane, µm, -1000 to 1000; 0 is the middle of the slide, positive towards the objective.
     pub centre_um: Number,
@@ -48,17 +48,42 @@ pub enum Illumination {
     /// The paper's: distance to the image's border to the power of an exponent (Eq. 8).
     Border {
         /// The exponent n, 0 (even) to 2; the released value is 0.02.
+        #[serde(default = "defaults::exponent")]
         exponent: Number,
     },
     /// A smooth bowl, 1 − x2·x² − y2·y² over −1..1, as measured on real fields.
     Bowl {
         /// Fall towards the left and right border, as a fraction of the centre, 0 to 0.45.
+        #[serde(default = "defaults::x2")]
         x2: Number,
         /// Fall towards the upper and lower border, as a fraction of the centre, 0 to 0.45.
+        #[serde(default = "defaults::y2")]
         y2: Number,
         /// Where the top of the bowl lies, as a fraction of half the field to either side, 0 to 0.9.
+        #[serde(default = "defaults::off_centre")]
         off_centre: Number,
     },
+}
+
+/// What the fields of an illumination are where a recipe names its kind alone.
+mod defaults {
+    use super::Number;
+
+    pub(super) fn exponent() -> Number {
+        0.02.into()
+    }
+
+    pub(super) fn x2() -> Number {
+        Number::uniform(0.01, 0.055)
+    }
+
+    pub(super) fn y2() -> Number {
+        Number::uniform(0.0, 0.025)
+    }
+
+    pub(super) fn off_centre() -> Number {
+        Number::uniform(0.0, 0.25)
+    }
 }
 
 /// The empty slide, as the lamp shows it (Eqs. 8–10).
@@ -80,9 +105,9 @@ impl Default for Background {
         Self {
             level: Number::normal(0.90, 0.015),
             illumination: Illumination::Bowl {
-                x2: Number::uniform(0.01, 0.055),
-                y2: Number::uniform(0.0, 0.025),
-                off_centre: Number::uniform(0.0, 0.25),
+                x2: defaults::x2(),
+                y2: defaults::y2(),
+                off_centre: defaults::off_centre(),
             },
             scatter: Number::uniform(0.004, 0.012),
             scatter_um: 60.0.into(),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::specimen::defaults;
 use super::{
     Acceptance, Background, Camera, CellMix, Chromatin, Cytoplasm, Debris, Field, Focus, Folds, Illumination, Layout,
     Nucleus, NucleusForm, Number, Optics, RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, Stain,
@@ -85,9 +86,9 @@ fn lbc() -> Recipe {
         focus: Focus::default(),
         slide: Slide::default(),
         layout: Layout::Clusters {
-            count: Number::uniform(5.0, 11.0),
-            radius_um: Number::uniform(18.0, 45.0),
-            outside: Number::uniform(0.03, 0.15),
+            count: defaults::clusters(),
+            radius_um: defaults::radius_um(),
+            outside: defaults::outside(),
         },
         cells: mix([("intermediate", Number::uniform(10.0, 26.0)), ("superficial", Number::uniform(2.0, 10.0))]),
         cytoplasm: Cytoplasm::default(),

@@ -42,17 +42,22 @@ pub enum Layout {
     /// Round clusters at random places, and some cells outside them.
     Clusters {
         /// Number of clusters, 1 to 10000; drawn once a field.
+        #[serde(default = "defaults::clusters")]
         count: Number,
         /// Radius (standard deviation) of a cluster, µm, 1 to 10000; drawn for each cluster.
+        #[serde(default = "defaults::radius_um")]
         radius_um: Number,
         /// Weight of the places outside all clusters, relative to a cluster's centre, 0 to 1.
+        #[serde(default = "defaults::outside")]
         outside: Number,
     },
     /// A band of material across the image.
     Swath {
         /// Width (standard deviation) of the band, µm, 1 to 10000.
+        #[serde(default = "defaults::width_um")]
         width_um: Number,
         /// Weight of the places outside the band, relative to its middle, 0 to 1.
+        #[serde(default = "defaults::outside")]
         outside: Number,
     },
     /// A grey image that is stretched over the field: white is likely, black never happens.
@@ -65,8 +70,34 @@ pub enum Layout {
         /// File of the label image, relative to the recipe.
         path: String,
         /// Standard deviation of the smoothing of its coverage, µm, 0 to 1000.
+        #[serde(default = "defaults::smooth_um")]
         smooth_um: Number,
     },
+}
+
+/// What the fields of a layout are where a recipe names its kind alone.
+pub(super) mod defaults {
+    use super::Number;
+
+    pub(crate) fn clusters() -> Number {
+        Number::uniform(5.0, 11.0)
+    }
+
+    pub(crate) fn radius_um() -> Number {
+        Number::uniform(18.0, 45.0)
+    }
+
+    pub(crate) fn width_um() -> Number {
+        40.0.into()
+    }
+
+    pub(crate) fn outside() -> Number {
+        Number::uniform(0.03, 0.15)
+    }
+
+    pub(crate) fn smooth_um() -> Number {
+        5.0.into()
+    }
 }
 
 /// How many cells of a class there are, and how they differ from the model's.

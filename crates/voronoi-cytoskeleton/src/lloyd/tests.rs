@@ -1,0 +1,83 @@
+use super::*;
+use crate::Diagram;
+use crate::geometry::length;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+
+fn windows() -> [Window; 5] {
+    [
+        Window::rectangle([0.0, 0.0], [150.0, 150.0]).unwrap(),
+        Window::rectangle([-1000.5, 3000.0], [-900.0, 3000.25]).unwrap(),
+        Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap(),
+        Window::convex(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap(),
+        // Narrow and askew.
+        Window::convex(&[[0.0, 0.0], [100.0, 100.0], [99.0, 101.0], [-1.0, 1.0]]).unwrap(),
+    ]
+}
+
+/// The fast pass is the slow one, within a share of the size of a cell.
+fn agree(sites: &[Point], window: &Window, tolerance: f64) {
+    let mut slow = Diagram::new(sites, window).unwrap();
+    slow.relax();
+    let fast = relaxed(sites, window, 1).unwrap();
+    let size = (window.area() / sites.len() as f64).sqrt();
+    for (found, &expected) in fast.iter().zip(slow.sites()) {
+        assert!(window.contains(*found));
+        let error = length(sub(*found, expected)) / size;
+        assert!(error < tolerance, "{found:?} {expected:?}: {error:e}, tolerance {tolerance:e}");
+    }
+}
+
+#[test]
+fn agrees_with_the_diagram() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0000_006c_6c6f_7964);
+    for window in windows() {
+        for count in [1, 2, 3, 7, 40, 300, 1000] {
+            for _ in 0..20 {
+                let sites: Vec<Point> = (0..count).map(|_| window.draw(&mut rng)).collect();
+                agree(&sites, &window, 1e-7);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lattice_stays() {
+    let window = Window::rectangle([0.0, 0.0], [20.0, 15.0]).unwrap();
+    let sites: Vec<Point> = (0..300).map(|i| [f64::from(i % 20) + 0.5, f64::from(i / 20) + 0.5]).collect();
+    for (before, after) in sites.iter().zip(relaxed(&sites, &window, 3).unwrap()) {
+        assert!(length(sub(after, *before)) < 1e-12);
+    }
+}
+
+#[test]
+fn sites_on_the_border_and_nearly_in_one_place() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0072_696d);
+    let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
+    let rim: Vec<Point> = (0..40).map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0]).collect();
+    agree(&rim, &window, 1e-7);
+    for apart in [1e-3, 1e-6, 1e-9] {
+        let mut sites: Vec<Point> = (0..60).map(|_| window.draw(&mut rng)).collect();
+        sites.extend((0..30).map(|i| [sites[i][0], (sites[i][1] - apart).abs()]).collect::<Vec<_>>());
+        agree(&sites, &window, 1e-5);
+    }
+    for apart in [0.0, 1e-15, 1e-13, 1e-11] {
+        for window in windows() {
+            let mut sites: Vec<Point> = (0..60).map(|_| window.draw(&mut rng)).collect();
+            sites.extend(sites.clone().iter().map(|site| [site[0] + apart, site[1]]));
+            sites.extend(window.corners());
+            sites.retain(|&site| window.contains(site));
+            let relaxed = relaxed(&sites, &window, 3).unwrap_or_default();
+            assert!(relaxed.iter().all(|&site| window.contains(site)));
+        }
+    }
+}
+
+#[test]
+fn a_cell_of_many_sides_is_left_to_the_triangulation() {
+    let corner = |k: u32| core::f64::consts::TAU * f64::from(k) / 100.0;
+    let corners: Vec<Point> = (0..100).map(|k| [libm::cos(corner(k)), libm::sin(corner(k))]).collect();
+    let window = Window::convex(&corners).unwrap();
+    assert_eq!(relaxed(&[[0.5, 0.25]], &window, 1), None);
+    agree(&[[0.5, 0.25], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5], [0.1, 0.1]], &window, 1e-7);
+}
