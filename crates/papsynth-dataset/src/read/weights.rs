@@ -50,14 +50,17 @@ pub struct InputFile {
 /// # Errors
 /// If the file cannot be read, or allows no place.
 pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
-    let (path, parse): (_, fn(&[u8], &Limits) -> Result<WeightMap, Problem>) = match &mut recipe.layout {
-        Layout::Map { path } => (path, |bytes, limits| weights(&GreyImage::decode(bytes, limits)?)),
-        Layout::Labels { path, .. } => (path, |bytes, limits| label_weights(&label_map(bytes, limits)?)),
-        _ => return Ok((Inputs::default(), None)),
+    let is_grey = matches!(recipe.layout, Layout::Map { .. });
+    let (Layout::Map { path } | Layout::Labels { path, .. }) = &mut recipe.layout else {
+        return Ok((Inputs::default(), None));
     };
     let found = folder.join(&path);
     let bytes = bytes(&found, limits.max_file_bytes)?;
-    let map = parse(&bytes, limits).map_err(Error::input(&found))?;
+    let map = match is_grey {
+        true => GreyImage::decode(&bytes, limits).and_then(|image| weights(&image)),
+        false => label_map(&bytes, limits).and_then(|labels| label_weights(&labels)),
+    };
+    let map = map.map_err(Error::input(&found))?;
     *path = content_name(&bytes);
     let file = InputFile { name: path.clone(), bytes };
     Ok((Inputs { weight_map: Some(map), ..Inputs::default() }, Some(file)))
