@@ -1,6 +1,7 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
 
 use cloth_verlet::{Crease, Sheet, Turn, View, crease_outline};
+use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
 use super::chromatin::interpolate;
@@ -264,27 +265,36 @@ fn add_detail(
         factor.fill(1.0);
         if cloud > 0.0 {
             pools.clouds().row_into(field, &clouds, at, &mut texels);
-            add_above(factor, field, cloud, f32::NEG_INFINITY);
+            add_above(factor, field, cloud, None);
         }
         if fleck > 0.0 {
             pools.flecks().row_into(field, &flecks, at, &mut texels);
-            field.iter_mut().for_each(|value| *value -= threshold);
-            add_above(factor, field, fleck, 0.0);
+            add_above(factor, field, fleck, Some(threshold));
         }
         if grainy > 0.0 {
             pools.grain().row_into(field, &grain, at, &mut texels);
-            add_above(factor, field, grainy, f32::NEG_INFINITY);
+            add_above(factor, field, grainy, None);
         }
-        for (value, factor) in row.iter_mut().zip(factor) {
-            *value *= factor.max(0.0);
-        }
+        multiply(row, factor);
     }
 }
 
-/// Adds what of a field lies above a value, that value elsewhere.
-fn add_above(factor: &mut [f32], field: &[f32], strength: f32, least: f32) {
-    for (factor, value) in factor.iter_mut().zip(field) {
-        *factor += strength * value.max(least);
+/// Adds a field, or what of it lies above a threshold.
+#[multiversion(targets = "simd")]
+fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option<f32>) {
+    let zero = threshold.unwrap_or(0.0);
+    let least = threshold.unwrap_or(f32::NEG_INFINITY);
+    for (factor, &value) in factor.iter_mut().zip(field) {
+        let above = if value > least { value } else { least };
+        *factor += strength * (above - zero);
+    }
+}
+
+/// Multiplies by factors, of which those below 0 count as 0.
+#[multiversion(targets = "simd")]
+fn multiply(row: &mut [f32], factors: &[f32]) {
+    for (value, &factor) in row.iter_mut().zip(factors) {
+        *value *= if factor > 0.0 { factor } else { 0.0 };
     }
 }
 
