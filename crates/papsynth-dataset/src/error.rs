@@ -67,12 +67,15 @@ impl Error {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file is not there, or is a folder.
+    /// The file is not there.
     #[error("there is no such {wanted}")]
     Missing {
         /// "file" or "folder".
         wanted: &'static str,
     },
+    /// There is a folder of that name.
+    #[error("is a folder; a file is expected")]
+    Folder,
     /// The file is of another format.
     #[error("is neither a PNG nor a TIFF file")]
     Format,

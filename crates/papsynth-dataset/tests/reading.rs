@@ -150,7 +150,7 @@ fn files_are_named_in_errors_and_kinds_of_errors_told_apart() {
     let small = Limits { max_file_bytes: 20, ..Limits::default() };
     let error = GreyImage::read(&path, &small).unwrap_err();
     assert!(error.to_string().contains("small.png: the file has") && !error.is_io(), "{error}");
-    for (path, what) in [(scratch.join("none.png"), "no such file"), (scratch.path().to_owned(), "no such file")] {
+    for (path, what) in [(scratch.join("none.png"), "no such file"), (scratch.path().to_owned(), "is a folder")] {
         let error = GreyImage::read(&path, &Limits::default()).unwrap_err();
         assert!(error.to_string().contains(what) && !error.is_io(), "{error}");
     }

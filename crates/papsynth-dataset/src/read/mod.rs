@@ -73,9 +73,10 @@ fn parse<T>(path: &Path, limits: &Limits, parse: impl FnOnce(&[u8]) -> Result<T,
 /// The bytes of a file of at most `limit` bytes.
 pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::IsADirectory | io::ErrorKind::NotADirectory => {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
             Error::input(path)(Problem::Missing { wanted: "file" })
         }
+        io::ErrorKind::IsADirectory => Error::input(path)(Problem::Folder),
         _ => Error::io("read", path)(e),
     };
     let file = File::open(path).map_err(failed)?;
