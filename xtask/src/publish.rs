@@ -1,6 +1,9 @@
 //! Whether every crate could be published.
 
-use anyhow::Result;
+use std::path::PathBuf;
+use std::{env, fs};
+
+use anyhow::{Context, Result};
 
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
@@ -17,6 +20,35 @@ pub(crate) const CHORE: Chore = Chore {
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
+    forget_unpacked(workspace)?;
     shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))?;
     Ok(Outcome::Done)
+}
+
+/// Removes what an earlier run has unpacked of our own crates. Cargo unpacks each into its home, under the name of the
+/// registry that the run makes up (which has no host, so that its name begins with a dash), and takes what is there for the same
+/// as long as the version is.
+fn forget_unpacked(workspace: &Workspace) -> Result<()> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let Some(home) = home.or_else(|| env::home_dir().map(|home| home.join(".cargo"))) else { return Ok(()) };
+    let Ok(registries) = fs::read_dir(home.join("registry/src")) else { return Ok(()) };
+    for registry in registries {
+        let registry = registry?;
+        if !registry.file_name().to_string_lossy().starts_with('-') {
+            continue;
+        }
+        for unpacked in fs::read_dir(registry.path())? {
+            let unpacked = unpacked?;
+            let name = unpacked.file_name().to_string_lossy().into_owned();
+            let ours = |package: &str| {
+                let version = name.strip_prefix(package).and_then(|rest| rest.strip_prefix('-'));
+                version.is_some_and(|version| version.starts_with(|c: char| c.is_ascii_digit()))
+            };
+            if workspace.packages.iter().any(|package| ours(&package.name)) {
+                let path = unpacked.path();
+                fs::remove_dir_all(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+            }
+        }
+    }
+    Ok(())
 }
