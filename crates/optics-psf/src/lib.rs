@@ -1,16 +1,42 @@
 #![doc = include_str!("../README.md")]
 
+mod abbe;
 mod border;
+mod bright_field;
+pub mod calibrate;
+mod complex_plane;
 mod error;
+mod exp;
+mod fft;
+mod filter;
 mod fir;
 mod focus;
 mod gaussian;
+mod gibson_lanni;
 mod kernel;
+mod layer;
+mod lens;
+mod microscope;
+mod pupil;
 mod pyramid;
+mod quadrature;
+mod real_plane;
 mod scratch;
+mod specimen;
+mod transfer;
+mod zernike;
 
+pub use abbe::{Abbe, AbbeParams, Source};
 pub use border::Border;
+pub use bright_field::{BrightField, BrightFieldParams, Defocused, Padding};
 pub use error::Error;
+pub use fft::{Fft, fast_length};
 pub use focus::{DepthOfFocus, FocusParams};
 pub use gaussian::{Gaussian, Method};
+pub use gibson_lanni::{GibsonLanni, GibsonLanniParams};
+pub use layer::Layer;
+pub use microscope::{Microscope, MicroscopeParams};
 pub use scratch::Scratch;
+pub use specimen::{LEAST_LIGHT, Specimen};
+pub use transfer::Transfer;
+pub use zernike::Zernike;

@@ -1,0 +1,237 @@
+use core::f64::consts::PI;
+
+use rustfft::num_complex::Complex64;
+
+use crate::complex_plane::ComplexPlane;
+use crate::error::{Error, require_count};
+use crate::fft::{Fft, LONGEST_SIDE, signed};
+use crate::microscope::distance;
+use crate::pupil::{Pupil, RIM, turn};
+use crate::{Layer, Microscope};
+
+/// Where the condenser's light comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// So many directions, 1 to 65 536, spread over the aperture like the seeds of a sunflower. The
+    /// number must grow with depth.
+    Vogel {
+        /// How many.
+        points: usize,
+    },
+    /// The directions on the lattice of the FFT, or every `stride`-th in x and y: with 1 all
+    /// that the grid can tell apart.
+    Lattice {
+        /// 1 to 32 768.
+        stride: usize,
+    },
+    /// One direction, along the axis: the coherent image.
+    Axis,
+}
+
+/// The grid of [`Abbe`], and its source.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AbbeParams {
+    /// Samples of the object from left to right, 1 to 32 768. Default 512, ours.
+    pub width: usize,
+    /// Samples from top to bottom, 1 to 32 768. Default 512, ours.
+    pub height: usize,
+    /// Directions of light. Default 64 Vogel points, ours.
+    pub source: Source,
+    /// Which FFT runs. Default [`Fft::Fastest`], ours.
+    pub fft: Fft,
+}
+
+impl Default for AbbeParams {
+    fn default() -> Self {
+        Self { width: 512, height: 512, source: Source::Vogel { points: 64 }, fft: Fft::Fastest }
+    }
+}
+
+/// Most directions of [`Source::Vogel`].
+const MOST_POINTS: usize = 65_536;
+
+/// Image formation from first principles: Abbe's integration over the source, light carried from
+/// layer to layer (multislice).
+///
+/// Each direction s of the condenser gives a coherent image, and their intensities add:
+/// I(x) = ∑ₛ |IFFT[T(f) P(f + s)]|² / ∑ₛ |P(s)|², with T the spectrum of the amplitude that leaves
+/// the uppermost layer; from a layer to the next it is carried by exp 2πi Δz γ_n(f + s). That is an
+/// FFT a direction and two more for each further layer; [`BrightField`](crate::BrightField) is
+/// measured against it. The grid is periodic: what leaves on one side comes back on the other.
+///
+/// # Differences from the paper
+///
+/// The paper blurs absorbance with Gaussians.
+#[derive(Debug, Clone)]
+pub struct Abbe {
+    microscope: Microscope,
+    params: AbbeParams,
+}
+
+/// Directions of one colour of the band, cycles/µm, and the weight of all together.
+struct Light {
+    wavelength_um: f64,
+    weight: f64,
+    directions: Vec<[f64; 2]>,
+}
+
+impl Abbe {
+    /// Checks the grid, whose samples lie [`Microscope::pitch_um`] apart.
+    ///
+    /// # Errors
+    ///
+    /// If a side, the stride or the number of directions is 0 or too large.
+    pub fn new(microscope: &Microscope, params: &AbbeParams) -> Result<Self, Error> {
+        let side = |field, value| {
+            require_count(field, value, (1..=LONGEST_SIDE).contains(&value), "a whole number from 1 to 32768")
+        };
+        side("width", params.width)?;
+        side("height", params.height)?;
+        match params.source {
+            Source::Vogel { points } => {
+                let holds = (1..=MOST_POINTS).contains(&points);
+                require_count("source.points", points, holds, "a whole number from 1 to 65536")?;
+            }
+            Source::Lattice { stride } => {
+                side("source.stride", stride)?;
+            }
+            Source::Axis => {}
+        }
+        Ok(Self { microscope: microscope.clone(), params: params.clone() })
+    }
+
+    /// How many coherent images make one image.
+    #[must_use]
+    pub fn directions(&self) -> usize {
+        self.lights().map(|light| light.directions.len()).sum()
+    }
+
+    /// The intensity of `layers` relative to that of empty slide, after a travel of the stage (see
+    /// [`Microscope::transfer`]); in double precision, as it serves as a reference, and without
+    /// stray light. Layers may come in any order: light meets the deepest first.
+    ///
+    /// # Errors
+    ///
+    /// If `stage_um` is not a number from −1000 to 1000.
+    ///
+    /// # Panics
+    ///
+    /// If a layer has not as many samples as the grid.
+    pub fn image(&self, layers: &[Layer], stage_um: f64) -> Result<Vec<f64>, Error> {
+        distance("stage_um", stage_um)?;
+        let samples = self.params.width * self.params.height;
+        for layer in layers {
+            assert_eq!(layer.amplitude().len(), samples, "a layer has other samples than the grid");
+        }
+        let mut layers: Vec<&Layer> = layers.iter().collect();
+        layers.sort_by(|a, b| b.depth_um().total_cmp(&a.depth_um()));
+        let mut image = vec![0.0; samples];
+        let Some(first) = layers.first() else {
+            image.fill(1.0);
+            return Ok(image);
+        };
+        let mut plane = ComplexPlane::new(self.params.width, self.params.height, self.params.fft);
+        for (value, &[re, im]) in plane.field.iter_mut().zip(first.amplitude()) {
+            *value = Complex64::new(re, im);
+        }
+        plane.forward();
+        let entering = plane.spectrum.clone();
+        for light in self.lights() {
+            self.add(&light, &layers, stage_um, &entering, &mut plane, &mut image);
+        }
+        Ok(image)
+    }
+
+    /// Adds the images of one colour.
+    fn add(
+        &self,
+        light: &Light,
+        layers: &[&Layer],
+        stage_um: f64,
+        entering: &[Complex64],
+        plane: &mut ComplexPlane,
+        image: &mut [f64],
+    ) {
+        let params = self.microscope.params();
+        let pupil = |depth, stage| Pupil::new(params, light.wavelength_um, depth, stage);
+        let lens = pupil(layers.last().map_or(0.0, |layer| layer.depth_um()), stage_um);
+        let steps: Vec<(Pupil, &Layer)> =
+            layers.windows(2).map(|pair| (pupil(pair[0].depth_um() - pair[1].depth_um(), 0.0), pair[1])).collect();
+        let square = |f: [f64; 2]| f[0] * f[0] + f[1] * f[1];
+        let passing = light.directions.iter().filter(|&&s| lens.passes(square(s))).count();
+        let share = light.weight / passing as f64;
+        let travelling = params.mount_index / light.wavelength_um;
+        let samples = image.len() as f64;
+        for &s in &light.directions {
+            plane.spectrum.copy_from_slice(entering);
+            for (step, layer) in &steps {
+                let wave = |f| (square(f) < travelling * travelling).then(|| step.medium_waves(square(f)));
+                self.filter(plane, s, travelling, wave);
+                for (value, &[re, im]) in plane.field.iter_mut().zip(layer.amplitude()) {
+                    *value *= Complex64::new(re, im) / samples;
+                }
+                plane.forward();
+            }
+            self.filter(plane, s, lens.objective + RIM, |f| lens.passes(square(f)).then(|| lens.waves(f)));
+            let share = share / (samples * samples);
+            for (sum, value) in image.iter_mut().zip(&plane.field) {
+                *sum += share * value.norm_sqr();
+            }
+        }
+    }
+
+    /// From the spectrum of an envelope, light from direction `s`, to the field after it passed
+    /// through exp 2πi of `waves` at f + s; what has none does not pass, nor what is beyond `reach`.
+    fn filter(&self, plane: &mut ComplexPlane, s: [f64; 2], reach: f64, waves: impl Fn([f64; 2]) -> Option<f64>) {
+        let (width, height) = (self.params.width, self.params.height);
+        let pitch = self.microscope.pitch_um();
+        let frequency = |i, side: usize, s| signed(i, side) / (side as f64 * pitch) + s;
+        let is_dark = |x| frequency(x, width, s[0]).abs() > reach;
+        for (x, column) in plane.spectrum.chunks_exact_mut(height).enumerate() {
+            if is_dark(x) {
+                continue;
+            }
+            let fx = frequency(x, width, s[0]);
+            for (y, value) in column.iter_mut().enumerate() {
+                *value = waves([fx, frequency(y, height, s[1])]).map_or(Complex64::ZERO, |waves| {
+                    let (re, im) = turn(waves);
+                    *value * Complex64::new(re, im)
+                });
+            }
+        }
+        plane.inverse(is_dark);
+    }
+
+    fn lights(&self) -> impl Iterator<Item = Light> {
+        let pitch = self.microscope.pitch_um();
+        let steps = [self.params.width, self.params.height].map(|side| 1.0 / (side as f64 * pitch));
+        self.microscope.bands().into_iter().map(move |(wavelength_um, weight)| {
+            let radius = self.microscope.params().condenser_na / wavelength_um;
+            let directions = match self.params.source {
+                Source::Vogel { points } => sunflower(points, radius),
+                Source::Lattice { stride } => lattice(steps.map(|step| step * stride as f64), radius),
+                Source::Axis => vec![[0.0; 2]],
+            };
+            Light { wavelength_um, weight, directions }
+        })
+    }
+}
+
+/// Vogel's spiral, DOI 10.1016/0025-5564(79)90080-4: equal areas, golden angle.
+fn sunflower(points: usize, radius: f64) -> Vec<[f64; 2]> {
+    let golden = PI * (3.0 - 5_f64.sqrt());
+    let seed = |i: usize| {
+        let i = i as f64 + 0.5;
+        let (r, angle) = (radius * (i / points as f64).sqrt(), golden * i);
+        [r * libm::cos(angle), r * libm::sin(angle)]
+    };
+    (0..points).map(seed).collect()
+}
+
+/// Points of a lattice in a disc around one of them.
+fn lattice([dx, dy]: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
+    #[expect(clippy::cast_possible_truncation, reason = "at most half the lattice of a grid")]
+    let [nx, ny] = [dx, dy].map(|step| (radius / step) as i32 + 1);
+    let points = (-ny..=ny).flat_map(|j| (-nx..=nx).map(move |i| [f64::from(i) * dx, f64::from(j) * dy]));
+    points.filter(|[x, y]| x * x + y * y <= radius * radius * (1.0 + RIM)).collect()
+}

@@ -1,0 +1,109 @@
+use super::{Window, lowest, mean_difference, sharpest, stack_height};
+use crate::error::require;
+use crate::fft::{Fft, fast_length};
+use crate::real_plane::{PlaneScratch, RealPlane, Support};
+use crate::{Border, Error, Microscope, MicroscopeParams};
+
+/// Pixels around the window that the transfer functions see.
+const MARGIN_PX: usize = 32;
+
+/// Apertures that are tried, as parts of the objective's: from a tenth on, in steps of a twentieth.
+const FIRST: f64 = 0.1;
+const STEP: f64 = 0.05;
+const TRIED: u32 = 19;
+
+/// What of the focused plane's own transfer counts as noise where it is to be undone.
+const NOISE: f64 = 0.1;
+
+/// The condenser's aperture that explains a stack best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CondenserFit {
+    /// The plane in focus.
+    pub focused: usize,
+    /// The numerical aperture.
+    pub condenser_na: f64,
+    /// Apertures that were tried, and the mean difference each leaves.
+    pub tried: Vec<[f64; 2]>,
+}
+
+/// The condenser's aperture, from a stack of an object taken by moving the stage by `step_um` for each plane through the
+/// immersion medium.
+///
+/// The other planes are computed from the focused one by the ratio of the transfer functions H_A,
+/// and the aperture is sought, from a tenth of the objective's to all of it, for which ∑ |difference| over
+/// the window and all planes is least. All else, the pixel too, is as `microscope` says; absorption alone
+/// counts, so an object that refracts much is no good one.
+///
+/// # Errors
+///
+/// As [`focus`](super::focus()); if `step_um` is not above 0 and at most 100, or `microscope` not in order.
+///
+/// # Panics
+///
+/// If the images are not whole rows of `width` or differ in size.
+pub fn condenser(
+    stack: &[&[f32]],
+    width: usize,
+    window: Window,
+    step_um: f64,
+    microscope: &MicroscopeParams,
+) -> Result<CondenserFit, Error> {
+    let height = stack_height(stack, width)?;
+    window.check(width, height)?;
+    require("step_um", step_um, step_um > 0.0 && step_um <= 100.0, "above 0 and at most 100")?;
+    Microscope::new(microscope)?;
+    let focused = sharpest(stack, width, window)?;
+    let outer = window.grown(MARGIN_PX, width, height);
+    let inner = window.inside(outer);
+    let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width)).collect();
+    let source = outer.crop(stack[focused], width);
+
+    // Reflected, so that the seam of the periodic grid has no step.
+    let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
+    let plane = RealPlane::new(wide, high, Fft::Portable);
+    let support = Support::new(wide, high, 1.0);
+    let (mut line, mut scratch, mut spectrum) = (Vec::new(), PlaneScratch::default(), Vec::new());
+    let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
+    let fill = |y: usize, row: &mut [f32]| {
+        let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
+        for (x, value) in row.iter_mut().enumerate() {
+            *value = from[reflected(x, outer.width)];
+        }
+        true
+    };
+    plane.forward(&support, fill, &mut spectrum, &mut line, &mut scratch);
+    let frequencies: Vec<[f64; 2]> =
+        support.frequencies(wide, high).map(|f| f.map(|f| f / microscope.pixel_um)).collect();
+
+    let mut tried = Vec::new();
+    for i in 0..TRIED {
+        let condenser_na = microscope.na * (FIRST + STEP * f64::from(i));
+        let candidate = Microscope::new(&MicroscopeParams { condenser_na, ..microscope.clone() })?;
+        let rest = candidate.transfer(0.0, 0.0)?;
+        let mut sum = 0.0;
+        for (k, target) in targets.iter().enumerate().filter(|(k, _)| *k != focused) {
+            let transfer = candidate.transfer(0.0, step_um * (k as f64 - focused as f64))?;
+            let filtered: Vec<_> = spectrum
+                .iter()
+                .zip(&frequencies)
+                .map(|(value, &f)| {
+                    let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));
+                    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+                    let ratio = (now * then * (1.0 + NOISE * NOISE) / (then * then + NOISE * NOISE)) as f32;
+                    value * (ratio * plane.norm())
+                })
+                .collect();
+            let mut image = vec![0.0; outer.width * outer.height];
+            let keep = |y: usize, row: &[f32]| {
+                if let Some(image) = image.get_mut(y * outer.width..(y + 1) * outer.width) {
+                    image.copy_from_slice(&row[..outer.width]);
+                }
+            };
+            plane.inverse(&support, &filtered, keep, &mut line, &mut scratch);
+            sum += mean_difference(&inner.crop(&image, outer.width), target);
+        }
+        tried.push([condenser_na, sum / (stack.len() - 1) as f64]);
+    }
+    let (steps, _) = lowest(&tried.iter().map(|t| t[1]).collect::<Vec<_>>());
+    Ok(CondenserFit { focused, condenser_na: microscope.na * (FIRST + STEP * steps), tried })
+}

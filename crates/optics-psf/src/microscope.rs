@@ -1,0 +1,193 @@
+use crate::error::{Error, require};
+use crate::pupil::Pupil;
+use crate::quadrature::Rules;
+use crate::transfer::Transfer;
+use crate::zernike::Zernike;
+
+/// What a microscopist knows about a bright-field microscope.
+///
+/// Light is scalar and comes from the condenser with the same radiance in every direction up to its
+/// aperture (Köhler).
+#[derive(Debug, Clone, PartialEq)]
+pub struct MicroscopeParams {
+    /// Numerical aperture of the objective, above 0, at most the immersion index and below the
+    /// mount's. Default 0.95, the paper's.
+    pub na: f64,
+    /// Numerical aperture to which the condenser is opened, above 0, below the index of the mount.
+    /// One above `na` is legitimate; the light outside the objective's aperture is lost. Default
+    /// 0.41, ours: the aperture with which [`calibrate::focus`](crate::calibrate::focus), applied
+    /// to a stage that travels in air, gives the paper's 0.25 µm of blur for each µm (Fig. 10) on
+    /// average over the first four µm either side.
+    pub condenser_na: f64,
+    /// Wavelength in the vacuum, 0.1 to 10 µm. Default 0.57, the paper's filter.
+    pub wavelength_um: f64,
+    /// Width of the band of wavelengths, 0 to a half of the wavelength, µm. Default 0.01, ours: an
+    /// interference filter.
+    pub bandwidth_um: f64,
+    /// Refractive index of the mountant, in which the object lies, 1 to 3. Default 1.515, ours.
+    pub mount_index: f64,
+    /// Refractive index between cover glass and objective, 1 to 3. Default 1, ours: a dry lens.
+    pub immersion_index: f64,
+    /// How much thicker the cover glass is than the lens was made for, −100 to 100 µm, with the
+    /// lens refocused as paraxial rays need it. Default 0, ours.
+    pub cover_error_um: f64,
+    /// Aberrations of the objective. Default none, ours.
+    pub zernike: Zernike,
+    /// Side of a pixel of the camera in the plane of the object, 0.001 to 100 µm. Default 0.25,
+    /// the paper's.
+    pub pixel_um: f64,
+    /// Samples of the rendered object along the side of a pixel, 1 to 16. Default 2, ours.
+    pub oversampling: usize,
+    /// Glare: the share of the light of an empty field that has lost its way and lies evenly over
+    /// the picture, 0 to below 1. Default 0, ours.
+    pub stray_light: f64,
+}
+
+impl Default for MicroscopeParams {
+    fn default() -> Self {
+        Self {
+            na: 0.95,
+            condenser_na: 0.41,
+            wavelength_um: 0.57,
+            bandwidth_um: 0.01,
+            mount_index: 1.515,
+            immersion_index: 1.0,
+            cover_error_um: 0.0,
+            zernike: Zernike::default(),
+            pixel_um: 0.25,
+            oversampling: 2,
+            stray_light: 0.0,
+        }
+    }
+}
+
+/// Samples along a pixel's side, at most.
+const MOST_OVERSAMPLING: usize = 16;
+
+/// A bright-field microscope whose parameters are in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Microscope {
+    params: MicroscopeParams,
+}
+
+impl Microscope {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    ///
+    /// If a number is not finite or outside the range its field states.
+    pub fn new(params: &MicroscopeParams) -> Result<Self, Error> {
+        let p = params;
+        let within = |field, value: f64, range: core::ops::RangeInclusive<f64>, accepted| {
+            require(field, value, range.contains(&value), accepted)
+        };
+        within("mount_index", p.mount_index, 1.0..=3.0, "a number from 1 to 3")?;
+        within("immersion_index", p.immersion_index, 1.0..=3.0, "a number from 1 to 3")?;
+        let below = p.na > 0.0 && p.na <= p.immersion_index && p.na < p.mount_index;
+        require("na", p.na, below, "above 0, at most immersion_index and below mount_index")?;
+        let below = p.condenser_na > 0.0 && p.condenser_na < p.mount_index;
+        require("condenser_na", p.condenser_na, below, "above 0 and below mount_index")?;
+        within("wavelength_um", p.wavelength_um, 0.1..=10.0, "a number from 0.1 to 10")?;
+        let half = 0.5 * p.wavelength_um;
+        within("bandwidth_um", p.bandwidth_um, 0.0..=half, "a number from 0 to half of wavelength_um")?;
+        within("cover_error_um", p.cover_error_um, -100.0..=100.0, "a number from -100 to 100")?;
+        for (field, value) in p.zernike.terms() {
+            within(field, value, -5.0..=5.0, "a number from -5 to 5")?;
+        }
+        within("pixel_um", p.pixel_um, 0.001..=100.0, "a number from 0.001 to 100")?;
+        if !(1..=MOST_OVERSAMPLING).contains(&p.oversampling) {
+            let accepted = "a whole number from 1 to 16";
+            return Err(Error::Count { field: "oversampling", value: p.oversampling, accepted });
+        }
+        let glare = (0.0..1.0).contains(&p.stray_light);
+        require("stray_light", p.stray_light, glare, "0 or more and below 1")?;
+        Ok(Self { params: params.clone() })
+    }
+
+    /// What it was made from.
+    #[must_use]
+    pub fn params(&self) -> &MicroscopeParams {
+        &self.params
+    }
+
+    /// The distance between two samples of the rendered object, µm.
+    #[must_use]
+    pub fn pitch_um(&self) -> f64 {
+        self.params.pixel_um / self.params.oversampling as f64
+    }
+
+    /// The share of the condenser's light that passes outside the objective's aperture and is
+    /// lost: 1 − (NA/NAc)², or 0.
+    #[must_use]
+    pub fn lost_light(&self) -> f64 {
+        let ratio = (self.params.na / self.params.condenser_na).min(1.0);
+        1.0 - ratio * ratio
+    }
+
+    /// The finest detail that reaches the image to first order, cycles per µm: (NA + NAc)/λ at the
+    /// blue end of the band.
+    #[must_use]
+    pub fn cutoff(&self) -> f64 {
+        self.bands()
+            .iter()
+            .map(|&(wavelength, _)| Pupil::new(&self.params, wavelength, 0.0, 0.0).cutoff())
+            .fold(0.0, f64::max)
+    }
+
+    /// How the microscope transfers detail: see [`Transfer`].
+    ///
+    /// `depth_um` is how far the detail lies below the focal plane of the stage at rest, in the
+    /// mountant, away from the objective; `stage_um` how far the stage was then lowered from the objective,
+    /// in the immersion medium. Both blur, and they are not the same: to focus on what lies d
+    /// deeper, the stage is raised by about d / `mount_index` if the lens is dry.
+    ///
+    /// # Errors
+    ///
+    /// If a number is not finite or beyond ±1000 µm.
+    pub fn transfer(&self, depth_um: f64, stage_um: f64) -> Result<Transfer, Error> {
+        Ok(Transfer::new(self, distance("depth_um", depth_um)?, distance("stage_um", stage_um)?))
+    }
+
+    /// The error of the wavefront at a point of the pupil, in waves, for the middle of the band.
+    /// The point is a direction: its numerical apertures along x and y, together at most `na`.
+    ///
+    /// W = depth·γ_n + stage·γ_1 + Gibson and Lanni's cover glass + Zernike, with
+    /// γ_n(f) = √((n/λ)² − f²), each zero in the centre; `depth_um` and `stage_um` as for
+    /// [`Microscope::transfer`].
+    #[must_use]
+    pub fn waves(&self, direction: [f64; 2], depth_um: f64, stage_um: f64) -> f64 {
+        let wavelength = self.params.wavelength_um;
+        Pupil::new(&self.params, wavelength, depth_um, stage_um).waves(direction.map(|d| d / wavelength))
+    }
+
+    /// The radius of the geometric blur of a point at that depth, µm: where the rim of the
+    /// condenser's cone meets the plane in focus.
+    #[must_use]
+    pub fn cone_radius_um(&self, depth_um: f64, stage_um: f64) -> f64 {
+        Pupil::new(&self.params, self.params.wavelength_um, depth_um, stage_um).cone_radius()
+    }
+
+    /// Wavelengths of the band, µm, and their weights, which sum to 1.
+    pub(crate) fn bands(&self) -> Vec<(f64, f64)> {
+        let (middle, width) = (self.params.wavelength_um, self.params.bandwidth_um);
+        if width == 0.0 {
+            return vec![(middle, 1.0)];
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most 26")]
+        let nodes = 2 * (width / middle / BAND_OF_TWO).ceil() as usize;
+        let mut rules = Rules::default();
+        let rule = rules.get(nodes).iter();
+        rule.map(|&[x, weight]| (middle + width * (x - 0.5), weight)).collect()
+    }
+}
+
+/// The part of the wavelength for which two Gauss–Legendre nodes will do: over it the fringes of an
+/// object ten fringes out of focus move by less than half a fringe.
+const BAND_OF_TWO: f64 = 0.04;
+
+/// Farthest from the focal plane, µm: beyond it nothing of an object is left.
+const FARTHEST_UM: f64 = 1000.0;
+
+pub(crate) fn distance(field: &'static str, value: f64) -> Result<f64, Error> {
+    require(field, value, value.abs() <= FARTHEST_UM, "a number from -1000 to 1000")
+}
