@@ -1,12 +1,10 @@
 use core::fmt;
 
-use rustfft::num_complex::Complex32;
-
+use crate::canvas::Canvas;
 use crate::error::{Error, require_count};
-use crate::fft::{Fft, LONGEST_SIDE, fast_length};
-use crate::filter::{Filter, Grid, Position};
+use crate::fft::{Fft, LONGEST_SIDE, Plans, fast_length};
+use crate::filter::Filter;
 use crate::microscope::distance;
-use crate::real_plane::{RealPlane, Support};
 use crate::{Microscope, Specimen, Transfer};
 
 /// Which object, cut into slabs, [`BrightField`] images, and at which planes.
@@ -71,13 +69,6 @@ pub enum Defocused {
     OnCamera,
 }
 
-/// Least defocus for the camera's lattice, µm of mountant: where the correction of the in-focus form
-/// has ended.
-const SMOOTH_UM: f64 = 2.0;
-
-/// The transfer that may be left of detail finer than pixels, on the camera's lattice.
-const SMOOTH_TRANSFER: f64 = 0.05;
-
 /// Widest padding.
 const MOST_PADDING: usize = 16_384;
 
@@ -104,18 +95,7 @@ const MOST_PADDING: usize = 16_384;
 pub struct BrightField {
     pub(crate) microscope: Microscope,
     pub(crate) size: [usize; 2],
-    pub(crate) object: RealPlane,
-    pub(crate) camera: RealPlane,
-    /// Frequencies that the microscope transfers, and which of them the camera resolves.
-    pub(crate) support: Support,
-    pub(crate) coarse: Support,
-    /// The lattice of the in-focus form's correction, and its frequencies.
-    pub(crate) correction: RealPlane,
-    pub(crate) corrected: Support,
-    /// Places of the frequencies in the filters' tables.
-    pub(crate) positions: Vec<Position>,
-    /// What the mean over a pixel multiplies each frequency with.
-    pub(crate) pixel: Vec<Complex32>,
+    pub(crate) canvas: Canvas,
     pub(crate) in_focus: Filter,
     /// For each plane, the filters of the slabs.
     pub(crate) planes: Vec<Vec<Filter>>,
@@ -126,7 +106,7 @@ impl fmt::Debug for BrightField {
         f.debug_struct("BrightField")
             .field("microscope", &self.microscope)
             .field("size", &self.size)
-            .field("grid", &[self.object.width, self.object.height])
+            .field("grid", &[self.canvas.width(), self.canvas.height()])
             .finish_non_exhaustive()
     }
 }
@@ -158,39 +138,21 @@ impl BrightField {
         for &stage in &params.stages_um {
             distance("stages_um", stage)?;
         }
-        let [width, height] = grid;
-        let pitch = microscope.pitch_um();
-        let support = Support::new(width, height, microscope.cutoff() * pitch);
-        let frequencies: Vec<[f64; 2]> = support.frequencies(width, height).collect();
-        let pixel = frequencies.iter().map(|f| mean_over_pixel(*f, oversampling)).collect();
-        let frequencies: Vec<[f64; 2]> = frequencies.iter().map(|f| f.map(|f| f / pitch)).collect();
-        let camera = grid.map(|side| side / oversampling);
-        let coarse = Support::new(camera[0], camera[1], microscope.cutoff() * microscope.params().pixel_um);
-        let is_smooth = |transfer: &Transfer, defocus: f64| {
-            let nyquist = 0.5 / microscope.params().pixel_um;
-            let allowed = oversampling > 1 && params.defocused == Defocused::OnCamera;
-            allowed && defocus >= SMOOTH_UM && transfer.extent(SMOOTH_TRANSFER) <= nyquist
-        };
         let plane = |&stage: &f64| {
-            let filter = |&depth: &f64| Filter::new(microscope, depth, stage, &frequencies, is_smooth);
+            let filter = |&depth: &f64| {
+                let filter = Filter::new(microscope, depth, stage, &Transfer::new(microscope, depth, stage));
+                match params.defocused {
+                    Defocused::OnCamera => filter,
+                    Defocused::OnObject => filter.on_object(),
+                }
+            };
             params.depths_um.iter().map(filter).collect()
         };
-        let step = Transfer::step_of(microscope);
-        let position = |f: &[f64; 2]| Position::new((f[0] * f[0] + f[1] * f[1]).sqrt() / step);
-        let stride = correction_stride(microscope);
-        let correction = grid.map(|side| side / stride);
         Ok(Self {
             microscope: microscope.clone(),
             size,
-            object: RealPlane::new(width, height, params.fft),
-            camera: RealPlane::new(camera[0], camera[1], params.fft),
-            support,
-            coarse,
-            correction: RealPlane::new(correction[0], correction[1], params.fft),
-            corrected: Support::new(correction[0], correction[1], microscope.cutoff() * pitch * stride as f64),
-            positions: frequencies.iter().map(position).collect(),
-            pixel,
-            in_focus: Filter::in_focus(microscope, &frequencies),
+            canvas: Canvas::new(microscope, grid, &Plans::new(params.fft)),
+            in_focus: Filter::in_focus(microscope),
             planes: params.stages_um.iter().map(plane).collect(),
         })
     }
@@ -217,40 +179,4 @@ impl BrightField {
     pub(crate) fn is_corrected(&self, slab: usize) -> bool {
         self.planes.iter().any(|plane| plane[slab].is_corrected)
     }
-
-    /// A lattice and its frequencies.
-    pub(crate) fn lattice(&self, grid: Grid) -> (&RealPlane, &Support) {
-        match grid {
-            Grid::Object => (&self.object, &self.support),
-            Grid::Camera => (&self.camera, &self.coarse),
-        }
-    }
-}
-
-/// The part of the cutoff that the lattice of the correction has to resolve. What the pupil lets through
-/// of the rest is little, and the correction itself is at most 3 % of the light.
-const CORRECTED_PART: f64 = 0.8;
-
-/// Every how many samples of the object the correction is computed: a divisor of the oversampling.
-fn correction_stride(microscope: &Microscope) -> usize {
-    let params = microscope.params();
-    let resolves = |n: usize| 0.5 / (microscope.pitch_um() * n as f64) >= CORRECTED_PART * microscope.cutoff();
-    (1..=params.oversampling).rev().find(|&n| params.oversampling.is_multiple_of(n) && resolves(n)).unwrap_or(1)
-}
-
-/// ∏ (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, k = 0 … n − 1, along x and y; f in cycles
-/// per sample.
-fn mean_over_pixel(f: [f64; 2], n: usize) -> Complex32 {
-    let mean = |f: f64| {
-        let mut sum = [0.0; 2];
-        for k in 0..n {
-            let (c, s) = crate::pupil::turn(f * k as f64);
-            sum[0] += c / n as f64;
-            sum[1] += s / n as f64;
-        }
-        sum
-    };
-    let ([a, b], [c, d]) = (mean(f[0]), mean(f[1]));
-    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
-    Complex32::new((a * c - b * d) as f32, (a * d + b * c) as f32)
 }

@@ -1,4 +1,5 @@
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rustfft::{Fft as Transform, FftDirection, FftNum, FftPlanner, FftPlannerScalar};
 
@@ -17,6 +18,28 @@ impl Fft {
             Self::Fastest => FftPlanner::new().plan_fft(len, direction),
             Self::Portable => FftPlannerScalar::new().plan_fft(len, direction),
         }
+    }
+}
+
+/// A forward and an inverse transform of one length.
+pub(crate) type Pair = [Arc<dyn Transform<f32>>; 2];
+
+/// Transforms of all lengths that were asked for: each is planned once.
+pub(crate) struct Plans {
+    fft: Fft,
+    made: Mutex<BTreeMap<usize, Pair>>,
+}
+
+impl Plans {
+    pub(crate) fn new(fft: Fft) -> Self {
+        Self { fft, made: Mutex::default() }
+    }
+
+    pub(crate) fn pair(&self, len: usize) -> Pair {
+        // A plan is whole or absent, even if a thread has panicked.
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let plan = || [FftDirection::Forward, FftDirection::Inverse].map(|direction| self.fft.plan(len, direction));
+        made.entry(len).or_insert_with(plan).clone()
     }
 }
 

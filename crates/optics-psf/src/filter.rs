@@ -1,97 +1,64 @@
 use core::f64::consts::TAU;
 
+use multiversion::multiversion;
 use rustfft::num_complex::Complex32;
 
 use crate::Microscope;
-use crate::real_plane::Support;
-use crate::transfer::{Shape, Transfer};
+use crate::transfer::{SIDED_SAMPLES, Shape, Transfer, corners};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the
 /// in-focus form is whole, and gone. It gains little at 1 µm and nothing from 2 µm on.
 const CORRECTED_UM: [f64; 2] = [1.0, 2.0];
 
-/// What one slab's spectra are multiplied with for one plane.
-#[derive(Debug, Clone)]
-pub(crate) struct Filter {
-    /// Where the slab's factor of the light is computed.
-    pub(crate) grid: Grid,
-    /// Whether the correction of the in-focus form takes part.
-    pub(crate) is_corrected: bool,
-    response: Response,
-}
+/// The part of the correction that is lost under a full aperture. It says how light that is scattered twice interferes,
+/// and there much of it does not; fitted to Abbe's images of discs, specks and nuclei.
+const SCATTERED_APART: f64 = 0.4;
 
-/// Which lattice a slab's factor of the light is sampled on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Grid {
-    /// That of the object.
+/// Where the spectrum of the correction begins to fade, as a part of the cutoff.
+const TAPER_FROM: f64 = 0.75;
+
+/// Least defocus for the camera's lattice, µm of mountant: where the correction of the in-focus form
+/// has ended.
+const SMOOTH_UM: f64 = 2.0;
+
+/// The transfer that may be left of detail finer than pixels, on the camera's lattice.
+const SMOOTH_TRANSFER: f64 = 0.05;
+
+/// Least transfer that a restoring filter divides by: what an image has less of than that is more noise than detail.
+const LEAST_TRANSFER: f32 = 0.1;
+
+/// Which lattice a factor of the light is sampled on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Lattice {
+    /// That of the object, [`oversampling`](crate::MicroscopeParams::oversampling) samples along the side of a pixel.
     Object,
     /// That of the camera, each value the mean over its pixel.
     Camera,
 }
 
+/// What the spectra of something at one depth are multiplied with for one plane.
+#[derive(Debug, Clone)]
+pub(crate) struct Filter {
+    /// Where the factor of the light is computed.
+    pub(crate) lattice: Lattice,
+    /// Whether the correction of the in-focus form takes part.
+    pub(crate) is_corrected: bool,
+    response: Response,
+    restores: bool,
+}
+
+/// (H_A, H_P, G), or of a restoring filter (H_A, –, H_A in focus).
 #[derive(Debug, Clone)]
 enum Response {
-    /// (H_A, H_P, G) at multiples of a step, and two entries of zeros.
-    Round(Vec<[f32; 3]>),
-    /// The same for each place of the support.
+    Round(Box<[Table; 3]>),
     Sided(Vec<[Complex32; 3]>),
 }
 
-impl Filter {
-    /// `frequencies` in cycles/µm, in the order of their places; `is_smooth` says whether the
-    /// transfer function allows the camera's lattice.
-    pub(crate) fn new(
-        microscope: &Microscope,
-        depth_um: f64,
-        stage_um: f64,
-        frequencies: &[[f64; 2]],
-        is_smooth: impl FnOnce(&Transfer, f64) -> bool,
-    ) -> Self {
-        let transfer = Transfer::new(microscope, depth_um, stage_um);
-        let params = microscope.params();
-        let defocus = (depth_um + stage_um * params.mount_index / params.immersion_index).abs();
-        let share = fade(defocus);
-        let radius = microscope.cone_radius_um(depth_um, stage_um);
-        let grid = if is_smooth(&transfer, defocus) { Grid::Camera } else { Grid::Object };
-        let response = Response::new(&transfer, |f| share * pillbox(TAU * f * radius), frequencies);
-        Self { grid, is_corrected: share > 0.0, response }
-    }
+/// Entries of a table, a power of two: places in it then need no check.
+const ENTRIES: usize = 512;
 
-    /// The in-focus transfer function alone.
-    pub(crate) fn in_focus(microscope: &Microscope, frequencies: &[[f64; 2]]) -> Self {
-        let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), |_| 0.0, frequencies);
-        Self { grid: Grid::Object, is_corrected: false, response }
-    }
-
-    /// Adds `spectrum` times one of the three responses to `sum`, at the places of `support`,
-    /// which is part of `whole`, those of the spectrum. `positions` are those in the table.
-    pub(crate) fn add(
-        &self,
-        part: Part,
-        spectrum: &[Complex32],
-        (support, whole): (&Support, &Support),
-        positions: &[Position],
-        sum: &mut [Complex32],
-    ) {
-        for (to, from) in support.runs(whole) {
-            let sum = &mut sum[to];
-            let values = &spectrum[from.clone()];
-            let sign = part.sign();
-            match &self.response {
-                Response::Round(table) => {
-                    for ((sum, &value), &position) in sum.iter_mut().zip(values).zip(&positions[from]) {
-                        *sum += value * (sign * position.of(table, part as usize));
-                    }
-                }
-                Response::Sided(table) => {
-                    for ((sum, &value), response) in sum.iter_mut().zip(values).zip(&table[from]) {
-                        *sum += value * (response[part as usize] * sign);
-                    }
-                }
-            }
-        }
-    }
-}
+/// Values at multiples of a frequency, each with the difference to the next, and zeros after the last.
+type Table = [[f32; 2]; ENTRIES];
 
 /// The three responses of a filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,71 +67,238 @@ pub(crate) enum Part {
     Absorption,
     /// H_P, of the phase.
     Phase,
-    /// G, of the correction of the in-focus form, which is light and not its lack.
+    /// −G, of the correction of the in-focus form, which is light and not its lack.
     Correction,
 }
 
-impl Part {
-    fn sign(self) -> f32 {
-        if self == Self::Correction { -1.0 } else { 1.0 }
-    }
+/// Frequencies fx, and fy = 0, ±step, ±2 step …, in steps of the filter's table, and what the mean over a pixel leaves
+/// of them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Column<'a> {
+    pub(crate) x: f32,
+    pub(crate) step: f32,
+    pub(crate) pixel_x: f32,
+    pub(crate) pixel_y: &'a [f32],
 }
 
-impl Response {
-    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
-    fn new(transfer: &Transfer, cone: impl Fn(f64) -> f64, frequencies: &[[f64; 2]]) -> Self {
-        match transfer.shape() {
-            Shape::Round(table) => {
-                let entry = |(i, pair): (usize, &[f64; 2])| {
-                    [pair[0] as f32, pair[1] as f32, cone(transfer.step() * i as f64) as f32]
-                };
-                let rows = table.iter().enumerate().map(entry).chain([[0.0; 3]; 2]);
-                Self::Round(rows.collect())
+impl Filter {
+    /// `transfer` is that depth's.
+    pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64, transfer: &Transfer) -> Self {
+        let params = microscope.params();
+        let defocus = microscope.defocus_um(depth_um, stage_um).abs();
+        let [whole, gone] = CORRECTED_UM;
+        let coherent = 1.0 - SCATTERED_APART * incoherence(params.condenser_na / params.na);
+        let share = coherent * fade((defocus - whole) / (gone - whole));
+        let radius = microscope.cone_radius_um(depth_um, stage_um);
+        let nyquist = 0.5 / params.pixel_um;
+        let is_smooth = params.oversampling > 1 && defocus >= SMOOTH_UM && transfer.extent(SMOOTH_TRANSFER) <= nyquist;
+        let lattice = if is_smooth { Lattice::Camera } else { Lattice::Object };
+        let correction = |f: f64| -share * pillbox(TAU * f * radius) * taper(f / microscope.cutoff());
+        let response = if share > 0.0 { Response::new(transfer, correction) } else { Response::new(transfer, |_| 0.0) };
+        Self { lattice, is_corrected: share > 0.0, response, restores: false }
+    }
+
+    /// The same filter on the object's lattice.
+    pub(crate) fn on_object(self) -> Self {
+        Self { lattice: Lattice::Object, ..self }
+    }
+
+    /// The in-focus transfer function alone.
+    pub(crate) fn in_focus(microscope: &Microscope) -> Self {
+        let response = Response::new(&Transfer::new(microscope, 0.0, 0.0), |_| 0.0);
+        Self { lattice: Lattice::Object, is_corrected: false, response, restores: false }
+    }
+
+    /// The same filter for what was seen in focus, through `in_focus` and the camera's pixels, already.
+    pub(crate) fn restoring(mut self, in_focus: &Self) -> Self {
+        match (&mut self.response, &in_focus.response) {
+            (Response::Round(tables), Response::Round(focused)) => tables[2] = focused[0],
+            (Response::Sided(table), Response::Sided(focused)) => {
+                for (entry, focused) in table.iter_mut().zip(focused) {
+                    entry[2] = focused[0];
+                }
             }
-            Shape::Sided(_) => {
-                let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
-                let at = |&f: &[f64; 2]| {
-                    let [absorption, phase] = transfer.at(f).map(complex);
-                    let cone = cone((f[0] * f[0] + f[1] * f[1]).sqrt());
-                    [absorption, phase, Complex32::new(cone as f32, 0.0)]
+            _ => unreachable!("filters of one microscope have one shape"),
+        }
+        Self { is_corrected: false, restores: true, ..self }
+    }
+
+    /// Adds part of a spectrum, times a response, to `sum`: both frequencies 0 … and … −1 along y, of which the
+    /// spectrum may have fewer.
+    pub(crate) fn add(
+        &self,
+        part: Part,
+        at: Column<'_>,
+        [above, below]: [&[Complex32]; 2],
+        [sum_above, sum_below]: [&mut [Complex32]; 2],
+        weights: &mut Vec<f32>,
+    ) {
+        let skipped = sum_below.len() - below.len();
+        let sum_below = &mut sum_below[skipped..];
+        match &self.response {
+            Response::Round(tables) => {
+                weights.resize(above.len().max(weights.len()), 0.0);
+                let weights = &mut weights[..above.len()];
+                weigh(&tables[part as usize], at, weights);
+                if self.restores {
+                    divide(&tables[2], at, weights);
+                }
+                accumulate(sum_above, above, weights.iter());
+                accumulate(sum_below, below, weights.iter().skip(1).rev());
+            }
+            Response::Sided(table) => {
+                let one = |sum: &mut Complex32, value: Complex32, y: f32, pixel_y: f32| {
+                    let entry = sided(table, at.x, y);
+                    let mut weight = entry[part as usize];
+                    if self.restores {
+                        let seen = entry[2] * (at.pixel_x * pixel_y);
+                        let size = seen.norm_sqr().sqrt();
+                        weight = weight * seen.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
+                    }
+                    *sum += value * weight;
                 };
-                Self::Sided(frequencies.iter().map(at).collect())
+                for (k, (sum, &value)) in sum_above.iter_mut().zip(above).enumerate() {
+                    one(sum, value, k as f32 * at.step, at.pixel_y[k]);
+                }
+                for (k, (sum, &value)) in (1..).zip(sum_below.iter_mut().zip(below).rev()) {
+                    one(sum, value, -(k as f32) * at.step, at.pixel_y[k]);
+                }
             }
         }
     }
 }
 
-/// Where a frequency lies in a table.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Position {
-    entry: u32,
-    /// The way from that entry to the next, 0 to 1.
-    rest: f32,
-}
-
-impl Position {
-    /// `steps` is the frequency in steps of the table.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positions lie in the table")]
-    pub(crate) fn new(steps: f64) -> Self {
-        let entry = steps as u32;
-        Self { entry, rest: (steps - f64::from(entry)) as f32 }
-    }
-
-    #[inline(always)]
-    fn of(self, table: &[[f32; 3]], part: usize) -> f32 {
-        let (a, b) = (table[self.entry as usize][part], table[self.entry as usize + 1][part]);
-        a + self.rest * (b - a)
+fn accumulate<'a>(sum: &mut [Complex32], values: &[Complex32], weights: impl Iterator<Item = &'a f32>) {
+    for ((sum, value), weight) in sum.iter_mut().zip(values).zip(weights) {
+        *sum += value * weight;
     }
 }
 
-/// 1 near focus and 0 far from it.
-fn fade(defocus_um: f64) -> f64 {
-    let [whole, gone] = CORRECTED_UM;
-    let t = ((defocus_um - whole) / (gone - whole)).clamp(0.0, 1.0);
+/// Values of a table along a column, linear between its entries.
+#[multiversion(targets = "simd")]
+fn weigh(table: &Table, at: Column<'_>, weights: &mut [f32]) {
+    let x2 = at.x * at.x;
+    for (k, weight) in weights.iter_mut().enumerate() {
+        *weight = entry(table, x2, k, at.step);
+    }
+}
+
+/// Divides by what the lens and the pixels left in focus.
+#[multiversion(targets = "simd")]
+fn divide(focused: &Table, at: Column<'_>, weights: &mut [f32]) {
+    let x2 = at.x * at.x;
+    for ((k, weight), pixel_y) in weights.iter_mut().enumerate().zip(at.pixel_y) {
+        *weight /= (entry(focused, x2, k, at.step) * at.pixel_x * pixel_y).max(LEAST_TRANSFER);
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the table")]
+fn entry(table: &Table, x2: f32, k: usize, step: f32) -> f32 {
+    let y = k as u32 as f32 * step;
+    let position = (x2 + y * y).sqrt();
+    let place = position as u32;
+    let [value, rise] = table[place as usize % ENTRIES];
+    value + (position - place as f32) * rise
+}
+
+/// The responses at a frequency.
+#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
+    let mut mixed = [Complex32::ZERO; 3];
+    for (place, weight) in corners([x, y].map(f64::from)).into_iter().flatten() {
+        for (sum, value) in mixed.iter_mut().zip(&table[place]) {
+            *sum += value * weight as f32;
+        }
+    }
+    mixed
+}
+
+impl Response {
+    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+    fn new(transfer: &Transfer, correction: impl Fn(f64) -> f64) -> Self {
+        match transfer.shape() {
+            Shape::Round(list) => {
+                let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
+                let mut before = [0.0; 3];
+                for (i, &[absorption, phase]) in list.iter().enumerate() {
+                    let values = [absorption, phase, correction(transfer.step() * i as f64)];
+                    for ((table, before), value) in tables.iter_mut().zip(&mut before).zip(values) {
+                        let value = value as f32;
+                        table[i][0] = value;
+                        if let Some(last) = i.checked_sub(1) {
+                            table[last][1] = value - *before;
+                        }
+                        *before = value;
+                    }
+                }
+                for (table, before) in tables.iter_mut().zip(before) {
+                    table[list.len() - 1][1] = -before;
+                }
+                Self::Round(tables)
+            }
+            Shape::Sided(list) => {
+                let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
+                let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
+                    let correction = correction(transfer.step() * (i % SIDED_SAMPLES) as f64);
+                    [complex(absorption), complex(phase), complex([correction, 0.0])]
+                };
+                Self::Sided(list.iter().enumerate().map(entry).collect())
+            }
+        }
+    }
+}
+
+/// From 0 for a narrow condenser to 1 for one opened to the whole of the objective's aperture: 0.04 at 0.6 of it, 0.2
+/// at 0.8.
+pub(crate) fn incoherence(ratio: f64) -> f64 {
+    let r = ratio.min(1.0);
+    let cube = r * r * r;
+    cube * cube * r
+}
+
+/// Ends the spectrum of the correction without a step, which would ring around sharp things.
+fn taper(part_of_cutoff: f64) -> f64 {
+    fade((part_of_cutoff - TAPER_FROM) / (1.0 - TAPER_FROM))
+}
+
+/// From 1 where t is 0 to 0 where it is 1.
+fn fade(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
 }
 
 /// The spectrum of a disc, 2 J₁(q)/q.
 pub(crate) fn pillbox(q: f64) -> f64 {
-    if q < 1e-6 { 1.0 } else { 2.0 * libm::j1(q) / q }
+    /// Up to here the power series ∑ (−q²/4)ᵏ / k! (k + 1)! loses fewer than half of the digits, and its terms are
+    /// enough.
+    const SERIES_TO: f64 = 8.0;
+    const SERIES: [f64; 20] = {
+        let mut terms = [1.0; 20];
+        let mut k = 1;
+        while k < terms.len() {
+            terms[k] = -terms[k - 1] / (k * (k + 1)) as f64;
+            k += 1;
+        }
+        terms
+    };
+    if q > SERIES_TO {
+        return 2.0 * libm::j1(q) / q;
+    }
+    let t = 0.25 * q * q;
+    SERIES.iter().rev().fold(0.0, |sum, term| sum * t + term)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_disc_is_bessels_function() {
+        assert_eq!(pillbox(0.0), 1.0);
+        for i in 1..2000 {
+            let q = 0.01 * f64::from(i);
+            assert!((pillbox(q) - 2.0 * libm::j1(q) / q).abs() < 1e-11, "{q}");
+        }
+    }
 }

@@ -89,11 +89,31 @@ impl Pupil {
         if self.is_round() { round } else { round + self.zernike.sided_waves([x / self.objective, y / self.objective]) }
     }
 
+    /// About the steepest slope |dW/df| up to a frequency, in µm.
+    pub(crate) fn steepest(&self, radius: f64) -> f64 {
+        /// Points along a radius.
+        const POINTS: usize = 33;
+        let step = radius / (POINTS - 1) as f64;
+        let directions = if self.is_round() { &DIRECTIONS[..1] } else { &DIRECTIONS[..] };
+        let slope = |[c, s]: [f64; 2], i: usize| {
+            let at = |i: usize| self.waves([c * step * i as f64, s * step * i as f64]);
+            (at(i + 1) - at(i)).abs() / step
+        };
+        let slopes = directions.iter().flat_map(|&direction| (0..POINTS - 1).map(move |i| slope(direction, i)));
+        slopes.fold(0.0, f64::max)
+    }
+
     /// The slope |dW/df| of the media at the rim of the condenser: how far in µm its rays miss.
     pub(crate) fn cone_radius(&self) -> f64 {
         (self.media[0].slope(self.condenser) + self.media[1].slope(self.condenser)).abs()
     }
 }
+
+/// Directions in which an aberration may be steepest.
+const DIRECTIONS: [[f64; 2]; 8] = {
+    const D: f64 = core::f64::consts::FRAC_1_SQRT_2;
+    [[1.0, 0.0], [D, D], [0.0, 1.0], [-D, D], [-1.0, 0.0], [-D, -D], [0.0, -1.0], [D, -D]]
+};
 
 /// A way through a medium: its length in µm and n/λ, with its square.
 #[derive(Debug, Clone, Copy)]

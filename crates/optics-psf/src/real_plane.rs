@@ -1,10 +1,8 @@
 use core::ops::Range;
-use std::sync::Arc;
 
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft as Transform, FftDirection};
 
-use crate::fft::{Fft, signed};
+use crate::fft::{Pair, Plans, signed};
 
 /// Pairs of rows that are transformed together: what they have of a column fills two cache lines.
 const PAIRS: usize = 8;
@@ -21,7 +19,6 @@ pub(crate) struct Support {
     /// r of each column, and where it begins.
     reach: Vec<usize>,
     start: Vec<usize>,
-    len: usize,
 }
 
 impl Support {
@@ -41,11 +38,7 @@ impl Support {
             start.push(len);
             len += 2 * r + 1;
         }
-        Self { reach, start, len }
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.len
+        Self { reach, start }
     }
 
     pub(crate) fn columns(&self) -> usize {
@@ -66,14 +59,25 @@ impl Support {
         })
     }
 
-    /// For each run of places in `self`, the run of the same frequencies in `larger`.
-    pub(crate) fn runs<'a>(&'a self, larger: &'a Self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
-        (0..self.columns()).flat_map(move |x| {
-            let ([up, down], [above, below]) = (self.places(x), larger.places(x));
-            let above = above.start..above.start + up.len();
-            let below = below.end - down.len()..below.end;
-            [(up, above), (down, below)]
-        })
+    /// How far a column reaches; none beyond the last.
+    pub(crate) fn reach(&self, column: usize) -> Option<usize> {
+        self.reach.get(column).copied()
+    }
+
+    /// Of a spectrum at these places, a column's part with |ky| up to `reach` or as far as there is
+    /// one: ky = 0 …, and … −1.
+    pub(crate) fn column<'a>(&self, spectrum: &'a [Complex32], column: usize, reach: usize) -> [&'a [Complex32]; 2] {
+        let Some(own) = self.reach(column) else { return [&[], &[]] };
+        let [up, down] = self.places(column);
+        let reach = reach.min(own);
+        [&spectrum[up.start..=up.start + reach], &spectrum[down.end - reach..down.end]]
+    }
+
+    /// All of a column, likewise.
+    pub(crate) fn column_mut<'a>(&self, spectrum: &'a mut [Complex32], column: usize) -> [&'a mut [Complex32]; 2] {
+        let [up, down] = self.places(column);
+        let (above, below) = spectrum[up.start..down.end].split_at_mut(up.len());
+        [above, below]
     }
 }
 
@@ -84,8 +88,8 @@ pub(crate) struct RealPlane {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// Forward and inverse.
-    rows: [Arc<dyn Transform<f32>>; 2],
-    columns: [Arc<dyn Transform<f32>>; 2],
+    rows: Pair,
+    columns: Pair,
 }
 
 /// Working memory of [`RealPlane`].
@@ -94,12 +98,12 @@ pub(crate) struct PlaneScratch {
     rows: Vec<Complex32>,
     columns: Vec<Complex32>,
     fft: Vec<Complex32>,
+    line: Vec<f32>,
 }
 
 impl RealPlane {
-    pub(crate) fn new(width: usize, height: usize, fft: Fft) -> Self {
-        let plan = |len| [FftDirection::Forward, FftDirection::Inverse].map(|direction| fft.plan(len, direction));
-        Self { width, height, rows: plan(width), columns: plan(height) }
+    pub(crate) fn new(width: usize, height: usize, plans: &Plans) -> Self {
+        Self { width, height, rows: plans.pair(width), columns: plans.pair(height) }
     }
 
     /// 1 / samples.
@@ -112,43 +116,52 @@ impl RealPlane {
         self.rows.iter().chain(&self.columns).map(|t| t.get_inplace_scratch_len()).max().unwrap_or(0)
     }
 
-    /// The spectrum of an image at the places of `support`. `row` fills row after row, or says that
-    /// it is empty.
+    /// The spectrum of an image at the places of `support`, or an empty one if the image is empty. `row` fills each
+    /// of `rows`, or says that it is empty, as all other rows are.
     pub(crate) fn forward(
         &self,
         support: &Support,
+        rows: Range<usize>,
         mut row: impl FnMut(usize, &mut [f32]) -> bool,
         spectrum: &mut Vec<Complex32>,
-        line: &mut Vec<f32>,
         scratch: &mut PlaneScratch,
     ) {
         let (width, height, columns) = (self.width, self.height, support.columns());
+        let stride = height + SKEW;
         scratch.rows.clear();
         scratch.rows.resize(PAIRS * width, Complex32::ZERO);
-        let stride = height + SKEW;
         scratch.columns.resize(columns * stride, Complex32::ZERO);
         scratch.fft.resize(self.scratch_len(), Complex32::ZERO);
-        line.resize(width, 0.0);
+        scratch.line.resize(width, 0.0);
+        let PlaneScratch { rows: pairs, columns: turned, fft, line } = scratch;
+        let mut lit_so_far = false;
         for top in (0..height).step_by(ROWS) {
             let here = ROWS.min(height - top);
             let mut any = false;
-            for (pair, buffer) in scratch.rows.chunks_exact_mut(width).take(here.div_ceil(2)).enumerate() {
-                let lit = row(top + 2 * pair, line);
-                for (z, &v) in buffer.iter_mut().zip(&*line) {
-                    *z = Complex32::new(if lit { v } else { 0.0 }, 0.0);
+            let mut fill = |y: usize, line: &mut [f32]| y < top + here && rows.contains(&y) && row(y, line);
+            for (pair, buffer) in pairs.chunks_exact_mut(width).take(here.div_ceil(2)).enumerate() {
+                let y = top + 2 * pair;
+                let lit = fill(y, line);
+                if lit {
+                    for (z, &v) in buffer.iter_mut().zip(&*line) {
+                        *z = Complex32::new(v, 0.0);
+                    }
+                } else {
+                    buffer.fill(Complex32::ZERO);
                 }
-                let lit_below = 2 * pair + 1 < here && row(top + 2 * pair + 1, line);
+                let lit_below = fill(y + 1, line);
                 if lit_below {
                     for (z, &v) in buffer.iter_mut().zip(&*line) {
                         z.im = v;
                     }
                 }
                 if lit || lit_below {
-                    self.rows[0].process_with_scratch(buffer, &mut scratch.fft);
+                    self.rows[0].process_with_scratch(buffer, fft);
                     any = true;
                 }
             }
-            for (x, column) in scratch.columns.chunks_exact_mut(stride).enumerate() {
+            lit_so_far |= any;
+            for (x, column) in turned.chunks_exact_mut(stride).take(columns).enumerate() {
                 let column = &mut column[top..top + here];
                 if !any {
                     column.fill(Complex32::ZERO);
@@ -157,7 +170,7 @@ impl RealPlane {
                 let mirror = if x == 0 { 0 } else { width - x };
                 for (pair, rows) in column.chunks_mut(2).enumerate() {
                     // Z = A + iB, so A = (Z(k) + Z*(−k))/2 and B = (Z(k) − Z*(−k))/2i.
-                    let (z, m) = (scratch.rows[pair * width + x], scratch.rows[pair * width + mirror]);
+                    let (z, m) = (pairs[pair * width + x], pairs[pair * width + mirror]);
                     rows[0] = Complex32::new(0.5 * (z.re + m.re), 0.5 * (z.im - m.im));
                     if let Some(below) = rows.get_mut(1) {
                         *below = Complex32::new(0.5 * (z.im + m.im), 0.5 * (m.re - z.re));
@@ -166,48 +179,52 @@ impl RealPlane {
             }
         }
         spectrum.clear();
-        for (column, reach) in scratch.columns.chunks_exact_mut(stride).zip(&support.reach) {
+        if !lit_so_far {
+            return;
+        }
+        for (column, reach) in turned.chunks_exact_mut(stride).zip(&support.reach) {
             let column = &mut column[..height];
-            self.columns[0].process_with_scratch(column, &mut scratch.fft);
+            self.columns[0].process_with_scratch(column, fft);
             spectrum.extend_from_slice(&column[..=*reach]);
             spectrum.extend_from_slice(&column[height - reach..]);
         }
     }
 
-    /// The image of a spectrum at the places of `support`, times the number of samples: `row` gets
-    /// row after row.
+    /// The image of a spectrum at the places of `support`, times the number of samples. `fill` adds column after
+    /// column, ky = 0 … r and −r … −1, to zeros; `row` gets the first `rows` rows, one after the other.
     pub(crate) fn inverse(
         &self,
         support: &Support,
-        spectrum: &[Complex32],
+        mut fill: impl FnMut(usize, [&mut [Complex32]; 2]),
+        rows: usize,
         mut row: impl FnMut(usize, &[f32]),
-        line: &mut Vec<f32>,
         scratch: &mut PlaneScratch,
     ) {
         let (width, height, columns) = (self.width, self.height, support.columns());
+        let stride = height + SKEW;
         scratch.rows.clear();
         scratch.rows.resize(PAIRS * width, Complex32::ZERO);
-        let stride = height + SKEW;
         scratch.columns.resize(columns * stride, Complex32::ZERO);
         scratch.fft.resize(self.scratch_len(), Complex32::ZERO);
-        line.resize(width, 0.0);
-        for (x, column) in scratch.columns.chunks_exact_mut(stride).enumerate() {
-            let reach = support.reach[x];
-            let [up, down] = support.places(x);
-            column[..=reach].copy_from_slice(&spectrum[up]);
-            column[reach + 1..height - reach].fill(Complex32::ZERO);
-            column[height - reach..height].copy_from_slice(&spectrum[down]);
-            self.columns[1].process_with_scratch(&mut column[..height], &mut scratch.fft);
+        scratch.line.resize(width, 0.0);
+        let PlaneScratch { rows: pairs, columns: turned, fft, line } = scratch;
+        for (x, (column, reach)) in turned.chunks_exact_mut(stride).zip(&support.reach).enumerate() {
+            let column = &mut column[..height];
+            column.fill(Complex32::ZERO);
+            let (up, rest) = column.split_at_mut(reach + 1);
+            let below = rest.len() - reach;
+            fill(x, [up, &mut rest[below..]]);
+            self.columns[1].process_with_scratch(column, fft);
         }
-        for top in (0..height).step_by(ROWS) {
+        for top in (0..rows.min(height)).step_by(ROWS) {
             let here = ROWS.min(height - top);
-            for buffer in scratch.rows.chunks_exact_mut(width) {
+            for buffer in pairs.chunks_exact_mut(width) {
                 buffer[columns..=width - columns].fill(Complex32::ZERO);
             }
-            for (x, column) in scratch.columns.chunks_exact(stride).enumerate() {
+            for (x, column) in turned.chunks_exact(stride).take(columns).enumerate() {
                 for (pair, rows) in column[top..top + here].chunks(2).enumerate() {
                     let (a, b) = (rows[0], rows.get(1).copied().unwrap_or(Complex32::ZERO));
-                    let buffer = &mut scratch.rows[pair * width..(pair + 1) * width];
+                    let buffer = &mut pairs[pair * width..(pair + 1) * width];
                     // A + iB at k, A* + iB* at −k: a real row in each part.
                     if x > 0 {
                         buffer[width - x] = Complex32::new(a.re + b.im, b.re - a.im);
@@ -215,8 +232,9 @@ impl RealPlane {
                     buffer[x] = Complex32::new(a.re - b.im, a.im + b.re);
                 }
             }
-            for (pair, buffer) in scratch.rows.chunks_exact_mut(width).take(here.div_ceil(2)).enumerate() {
-                self.rows[1].process_with_scratch(buffer, &mut scratch.fft);
+            let here = ROWS.min(rows - top);
+            for (pair, buffer) in pairs.chunks_exact_mut(width).take(here.div_ceil(2)).enumerate() {
+                self.rows[1].process_with_scratch(buffer, fft);
                 for (v, z) in line.iter_mut().zip(&*buffer) {
                     *v = z.re;
                 }
@@ -236,6 +254,7 @@ impl RealPlane {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Fft;
     use rand_xoshiro::Xoshiro256PlusPlus;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -257,15 +276,15 @@ mod tests {
         let mut image: Vec<f32> = (0..width * height).map(|_| (rng.next_u32() >> 8) as f32 / 16_777_216.0).collect();
         image[width * 16..width * 33].fill(0.0);
         for (fft, radius) in [(Fft::Fastest, 0.3), (Fft::Portable, 0.3), (Fft::Portable, 9.0)] {
-            let plane = RealPlane::new(width, height, fft);
+            let plane = RealPlane::new(width, height, &Plans::new(fft));
             let support = Support::new(width, height, radius);
-            let (mut spectrum, mut line, mut scratch) = (Vec::new(), Vec::new(), PlaneScratch::default());
+            let (mut spectrum, mut scratch) = (Vec::new(), PlaneScratch::default());
             let row = |y: usize, row: &mut [f32]| {
                 row.copy_from_slice(&image[y * width..(y + 1) * width]);
                 row.iter().any(|v| *v != 0.0)
             };
-            plane.forward(&support, row, &mut spectrum, &mut line, &mut scratch);
-            assert_eq!(spectrum.len(), support.len());
+            plane.forward(&support, 0..height, row, &mut spectrum, &mut scratch);
+            assert_eq!(spectrum.len(), support.frequencies(width, height).count());
             let frequencies: Vec<[f64; 2]> = support.frequencies(width, height).collect();
             for (value, &f) in spectrum.iter().zip(&frequencies) {
                 let [re, im] = oracle(&image, width, f);
@@ -276,7 +295,13 @@ mod tests {
             // The image of what was kept has the same spectrum there.
             let mut back = vec![0.0; image.len()];
             let keep = |y: usize, row: &[f32]| back[y * width..(y + 1) * width].copy_from_slice(row);
-            plane.inverse(&support, &spectrum, keep, &mut line, &mut scratch);
+            let fill = |x: usize, to: [&mut [Complex32]; 2]| {
+                let reach = support.reach(x).unwrap();
+                for (to, from) in to.into_iter().zip(support.column(&spectrum, x, reach)) {
+                    to.copy_from_slice(from);
+                }
+            };
+            plane.inverse(&support, fill, height, keep, &mut scratch);
             for (value, &f) in spectrum.iter().zip(&frequencies).step_by(7) {
                 let [re, im] = oracle(&back, width, f).map(|v| v / (width * height) as f64);
                 assert!((f64::from(value.re) - re).abs() + (f64::from(value.im) - im).abs() < 2e-4);
@@ -284,16 +309,29 @@ mod tests {
         }
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "small whole numbers")]
     #[test]
-    fn runs_match_frequencies() {
+    fn columns_are_found_in_a_larger_support() {
         let (large, small) = (Support::new(32, 24, 0.4), Support::new(32, 24, 0.17));
-        let all: Vec<[f64; 2]> = large.frequencies(32, 24).collect();
-        let few: Vec<[f64; 2]> = small.frequencies(32, 24).collect();
-        let mut seen = 0;
-        for (from, to) in small.runs(&large) {
-            seen += from.len();
-            assert!(from.zip(to).all(|(i, j)| few[i] == all[j]));
+        let mark = |[x, y]: [f64; 2]| Complex32::new((32.0 * x) as f32, (24.0 * y) as f32);
+        let [all, few] = [&large, &small].map(|s| s.frequencies(32, 24).map(mark).collect::<Vec<_>>());
+        for x in 0..large.columns() {
+            let reach = small.reach(x).unwrap_or(0);
+            let [up, down] = small.column(&few, x, usize::MAX);
+            if up.is_empty() {
+                assert!(x >= small.columns() && down.is_empty());
+            } else {
+                assert_eq!(large.column(&all, x, reach), [up, down]);
+                assert_eq!((up.len(), down.len()), (reach + 1, reach));
+            }
         }
-        assert_eq!(seen, small.len());
+    }
+
+    #[test]
+    fn empty_images_have_empty_spectra() {
+        let plane = RealPlane::new(12, 10, &Plans::new(Fft::Portable));
+        let (mut spectrum, mut scratch) = (vec![Complex32::ONE; 3], PlaneScratch::default());
+        plane.forward(&Support::new(12, 10, 0.4), 2..7, |_, _| false, &mut spectrum, &mut scratch);
+        assert!(spectrum.is_empty());
     }
 }

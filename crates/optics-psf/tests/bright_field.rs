@@ -69,19 +69,31 @@ fn one_slab_is_within_1_2_percent_of_abbe_and_the_papers_model_is_not() {
             let Some(reference) = array(&format!("ref_abbe_{object}_nac{name}_z{z:+}")) else { return };
             let found = image(&field(&sampled(condenser_na), &[z.into()], &[0.0]), &[&absorbance]);
             let error = relative(&found, &reference);
-            let bound = if z != 0 {
-                0.012
-            } else if condenser_na < 0.9 {
-                0.002
-            } else {
-                0.005
-            };
+            let bound = if z == 0 { 0.002 } else { 0.012 };
             assert!(error < bound, "{object} {name} {z}: {error}");
             if z == 2 {
                 let in_pixels = relative(&papers(&FocusParams::paper(), 2.0, &absorbance), &reference);
                 let in_um = relative(&papers(&FocusParams::paper_in_micrometres(), 2.0, &absorbance), &reference);
                 assert!(in_pixels > 0.05 && in_um > 0.35, "{object} {name}: {in_pixels} {in_um}");
             }
+        }
+    }
+}
+
+#[test]
+fn in_focus_every_aperture_is_within_0_2_percent_of_many_directions() {
+    // The stored arrays have 900 directions; 1024 on a spiral differ from them by 0.1 % at most, so what (1 − W₀ ⊗ a)²
+    // lacked under an open condenser, 0.4 % at 0.9, was not theirs: light scattered twice interferes less there.
+    let objects = [array("ref_disk_absorbance"), array("ref_asym_absorbance")];
+    for object in objects.into_iter().flatten() {
+        for condenser_na in [0.41, 0.75, 0.9, 0.95] {
+            let params = sampled(condenser_na);
+            let source = optics_psf::Source::Vogel { points: 1024 };
+            let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+            let abbe = Abbe::new(&Microscope::new(&params).unwrap(), &abbe).unwrap();
+            let reference = abbe.image(&[support::absorbing(0.0, &object)], 0.0).unwrap();
+            let error = relative(&image(&field(&params, &[0.0], &[0.0]), &[&object]), &reference);
+            assert!(error < 0.0022, "{condenser_na}: {error}");
         }
     }
 }
@@ -289,9 +301,7 @@ fn pixels_are_means_over_samples() {
         0.25 * (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1))
     };
     let means: Vec<f64> = (0..64 * 64).map(mean).collect();
-    // The correction of the in-focus form is computed on every other sample.
-    let error = relative(&coarse, &means);
-    assert!(error < 5e-4, "{error}");
+    assert!(relative(&coarse, &means) < 1e-5);
 }
 
 #[test]

@@ -1,6 +1,8 @@
+use rustfft::num_complex::Complex32;
+
 use super::{Window, lowest, mean_difference, sharpest, stack_height};
 use crate::error::require;
-use crate::fft::{Fft, fast_length};
+use crate::fft::{Fft, Plans, fast_length};
 use crate::real_plane::{PlaneScratch, RealPlane, Support};
 use crate::{Border, Error, Microscope, MicroscopeParams};
 
@@ -60,9 +62,9 @@ pub fn condenser(
 
     // Reflected, so that the seam of the periodic grid has no step.
     let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
-    let plane = RealPlane::new(wide, high, Fft::Portable);
+    let plane = RealPlane::new(wide, high, &Plans::new(Fft::Portable));
     let support = Support::new(wide, high, 1.0);
-    let (mut line, mut scratch, mut spectrum) = (Vec::new(), PlaneScratch::default(), Vec::new());
+    let (mut scratch, mut spectrum) = (PlaneScratch::default(), Vec::new());
     let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
     let fill = |y: usize, row: &mut [f32]| {
         let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
@@ -71,7 +73,7 @@ pub fn condenser(
         }
         true
     };
-    plane.forward(&support, fill, &mut spectrum, &mut line, &mut scratch);
+    plane.forward(&support, 0..high, fill, &mut spectrum, &mut scratch);
     let frequencies: Vec<[f64; 2]> =
         support.frequencies(wide, high).map(|f| f.map(|f| f / microscope.pixel_um)).collect();
 
@@ -94,12 +96,15 @@ pub fn condenser(
                 })
                 .collect();
             let mut image = vec![0.0; outer.width * outer.height];
-            let keep = |y: usize, row: &[f32]| {
-                if let Some(image) = image.get_mut(y * outer.width..(y + 1) * outer.width) {
-                    image.copy_from_slice(&row[..outer.width]);
+            let fill = |x: usize, to: [&mut [Complex32]; 2]| {
+                for (to, from) in to.into_iter().zip(support.column(&filtered, x, high)) {
+                    to.copy_from_slice(from);
                 }
             };
-            plane.inverse(&support, &filtered, keep, &mut line, &mut scratch);
+            let keep = |y: usize, row: &[f32]| {
+                image[y * outer.width..(y + 1) * outer.width].copy_from_slice(&row[..outer.width]);
+            };
+            plane.inverse(&support, fill, outer.height, keep, &mut scratch);
             sum += mean_difference(&inner.crop(&image, outer.width), target);
         }
         tried.push([condenser_na, sum / (stack.len() - 1) as f64]);

@@ -1,0 +1,114 @@
+use crate::{Factor, Lattice, Microscope};
+
+/// The light of a picture, as the product of what many things let through.
+///
+/// Factors on the object's lattice are multiplied there, and those on the camera's with the mean over each pixel.
+#[derive(Debug, Clone)]
+pub struct Light {
+    oversampling: usize,
+    width_px: usize,
+    stray_light: f64,
+    object: Vec<f32>,
+    camera: Vec<f32>,
+}
+
+impl Light {
+    /// The light of empty slide.
+    #[must_use]
+    pub fn new(microscope: &Microscope, width_px: usize, height_px: usize) -> Self {
+        let oversampling = microscope.params().oversampling;
+        let pixels = width_px * height_px;
+        Self {
+            oversampling,
+            width_px,
+            stray_light: microscope.params().stray_light,
+            object: vec![1.0; pixels * oversampling * oversampling],
+            camera: vec![1.0; pixels],
+        }
+    }
+
+    /// Empties the slide.
+    pub fn clear(&mut self) {
+        self.object.fill(1.0);
+        self.camera.fill(1.0);
+    }
+
+    /// Multiplies by what a patch lets through. `at_px` is the pixel of the patch's upper left corner, without
+    /// the margin, anywhere inside the picture or outside.
+    pub fn multiply(&mut self, factor: &Factor, at_px: [i64; 2]) {
+        let (light, scale) = match factor.lattice {
+            Lattice::Object => (&mut self.object, self.oversampling),
+            Lattice::Camera => (&mut self.camera, 1),
+        };
+        let width = self.width_px * scale;
+        let (Some(height), Some(factor_height)) =
+            (light.len().checked_div(width), factor.values.len().checked_div(factor.width))
+        else {
+            return;
+        };
+        let place =
+            |at: i64, len: usize, side: usize| overlap((at - factor.margin_px as i64) * scale as i64, len, side);
+        let (from_x, to_x, columns) = place(at_px[0], factor.width, width);
+        let (from_y, to_y, rows) = place(at_px[1], factor_height, height);
+        for row in 0..rows {
+            let values = &factor.values[(from_y + row) * factor.width + from_x..][..columns];
+            let light = &mut light[(to_y + row) * width + to_x..][..columns];
+            for (light, value) in light.iter_mut().zip(values) {
+                *light *= value;
+            }
+        }
+    }
+
+    /// The picture: the light of each pixel of the camera relative to that of empty slide, stray light included.
+    ///
+    /// # Panics
+    ///
+    /// If `out` has not as many pixels as the light.
+    pub fn picture_into(&self, out: &mut [f32]) {
+        out.copy_from_slice(&self.camera);
+        if self.width_px > 0 {
+            mean_of_pixels(&self.object, self.width_px * self.oversampling, self.oversampling, out);
+        }
+        lift(out, self.stray_light);
+    }
+}
+
+/// Of `len` places from `at` on, which may be negative, those among `side`: the first, its place, and how many.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and a side")]
+fn overlap(at: i64, len: usize, side: usize) -> (usize, usize, usize) {
+    let first = (-at).max(0);
+    let end = (side as i64 - at).min(len as i64);
+    if end <= first { (0, 0, 0) } else { (first as usize, (at + first) as usize, (end - first) as usize) }
+}
+
+/// Multiplies `out` by the mean over the samples of each pixel.
+pub(crate) fn mean_of_pixels(samples: &[f32], width: usize, oversampling: usize, out: &mut [f32]) {
+    let n = oversampling;
+    #[expect(clippy::cast_possible_truncation, reason = "at most 256 samples")]
+    let weight = (1.0 / (n * n) as f64) as f32;
+    for (out, rows) in out.chunks_exact_mut(width / n).zip(samples.chunks_exact(width * n)) {
+        if n == 2 {
+            let (above, below) = rows.split_at(width);
+            for (out, (a, b)) in out.iter_mut().zip(above.as_chunks().0.iter().zip(below.as_chunks().0)) {
+                let ([a, b], [c, d]): (&[f32; 2], &[f32; 2]) = (a, b);
+                *out *= ((a + b) + (c + d)) * weight;
+            }
+            continue;
+        }
+        for (x, out) in out.iter_mut().enumerate() {
+            let pixel = rows.chunks_exact(width).map(|row| row[x * n..(x + 1) * n].iter().sum::<f32>());
+            *out *= pixel.sum::<f32>() * weight;
+        }
+    }
+}
+
+/// Adds stray light, that share of the light of empty slide.
+#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 pixels")]
+pub(crate) fn lift(out: &mut [f32], stray_light: f64) {
+    if stray_light > 0.0 {
+        let (stray, rest) = (stray_light as f32, (1.0 - stray_light) as f32);
+        for light in out {
+            *light = stray + rest * *light;
+        }
+    }
+}
