@@ -1,0 +1,189 @@
+use crate::curve::Curve;
+use crate::dye::{Amounts, DYES, Dye};
+use crate::error::{Error, require};
+use crate::params::{ColourParams, Mixing};
+use crate::rows::{self, Terms};
+use crate::srgb;
+
+/// Bands over which lamp times sensitivity is summed: 0.25 nm each, where the sharpest edge of a sensitivity has a
+/// standard deviation of 3.7 nm.
+const FINE_BANDS: usize = 1200;
+
+/// One wavelength of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// The wavelength in µm.
+    pub wavelength_um: f64,
+    /// Its share of the channel's light; the shares of a channel add up to 1.
+    pub weight: f64,
+}
+
+/// What one channel of the camera sees of an empty slide.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Mean wavelength of its light in µm.
+    pub wavelength_um: f64,
+    /// Full width in µm of an even band with the same variance.
+    pub bandwidth_um: f64,
+    /// Its light, relative to that of the strongest channel, whose is 1.
+    pub share: f64,
+    /// The wavelengths, the same in all channels, and how much each counts.
+    pub nodes: Vec<Node>,
+}
+
+/// The light of each channel as a function of the amounts of dye.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Colour {
+    channels: [Channel; 3],
+    mixing: Mixing,
+    /// Absorbance of unit amounts, and weight in each channel.
+    terms: Vec<(Amounts, [f64; 3])>,
+    rows: Terms,
+    to_srgb: [[f64; 3]; 3],
+}
+
+impl Colour {
+    /// Takes lamp and sensor at their wavelengths.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if a field of `params` is outside its range.
+    pub fn new(params: &ColourParams) -> Result<Self, Error> {
+        params.check()?;
+        let channels = channels(params);
+        let spectral: Vec<(Amounts, [f64; 3])> = (0..params.wavelengths)
+            .map(|i| {
+                let wavelength_um = channels[0].nodes[i].wavelength_um;
+                let weights = std::array::from_fn(|c| channels[c].nodes[i].weight);
+                (Dye::ALL.map(|dye| dye.absorbance(wavelength_um)), weights)
+            })
+            .collect();
+        let to_srgb = srgb::matrix(params, &spectral);
+        let terms = match params.mixing {
+            Mixing::Spectral => spectral,
+            Mixing::ThreeVectors => (0..3).map(|c| mean_term(&spectral, c)).collect(),
+        };
+        let rows = Terms::new(terms.iter().copied());
+        Ok(Self { channels, mixing: params.mixing, terms, rows, to_srgb })
+    }
+
+    /// What red, green and blue see of an empty slide.
+    #[must_use]
+    pub fn channels(&self) -> &[Channel; 3] {
+        &self.channels
+    }
+
+    /// How the light of a channel follows from the amounts of dye.
+    #[must_use]
+    pub fn mixing(&self) -> Mixing {
+        self.mixing
+    }
+
+    /// Factors that make the empty slide grey, as a microscope camera's white balance does: 1 / share.
+    #[must_use]
+    pub fn white_balance(&self) -> [f64; 3] {
+        self.channels.each_ref().map(|channel| 1.0 / channel.share)
+    }
+
+    /// From white-balanced light in the camera's channels to linear sRGB: a row of the matrix for each of red, green
+    /// and blue. White stays white; the rest is a least-squares fit to how the 1931 standard observer, adapted to
+    /// the lamp, sees stained smears. Results can lie somewhat outside 0 to 1.
+    #[must_use]
+    pub fn to_srgb(&self) -> &[[f64; 3]; 3] {
+        &self.to_srgb
+    }
+
+    /// Light in each channel relative to the empty slide, in double precision.
+    #[must_use]
+    pub fn transmittance(&self, amounts: &Amounts) -> [f64; 3] {
+        transmittance(&self.terms, amounts)
+    }
+
+    /// Light in each channel relative to the empty slide, from planes of amounts in the order of [`Dye::ALL`], each 0
+    /// or more; an empty plane stands for none of that dye. What a pixel gets depends on its own amounts alone, and
+    /// is exactly 1 where they are 0. Absolute error below 1e-5.
+    ///
+    /// # Panics
+    ///
+    /// If the planes of `out` differ in length, or a plane of `amounts` is neither empty nor as long as they are.
+    pub fn transmittance_into(&self, amounts: [&[f32]; DYES], out: [&mut [f32]; 3]) {
+        let pixels = out[0].len();
+        assert!(out.iter().all(|plane| plane.len() == pixels), "the channels differ in length");
+        let fits = |plane: &&[f32]| plane.is_empty() || plane.len() == pixels;
+        assert!(amounts.iter().all(fits), "a plane of amounts is not as long as the channels");
+        rows::transmittance(&self.rows, amounts, out);
+    }
+
+    /// The light of a mixture of dyes as a function of how much there is of it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if an amount in `mix` is not from 0 to 1000.
+    pub fn curve(&self, mix: &Amounts) -> Result<Curve, Error> {
+        for amount in mix {
+            require("mix", *amount, (0.0..=1e3).contains(amount), "from 0 to 1000")?;
+        }
+        Ok(Curve::new(&self.terms, mix))
+    }
+
+    /// Absorbance in each channel of a thin amount of a dye, scaled to length 1: the dye's vector of colour
+    /// deconvolution.
+    #[must_use]
+    pub fn stain_vector(&self, dye: Dye) -> [f64; 3] {
+        let thin = |c: usize| {
+            let nodes = self.channels[c].nodes.iter();
+            nodes.map(|node| node.weight * dye.absorbance(node.wavelength_um)).sum::<f64>()
+        };
+        let vector: [f64; 3] = std::array::from_fn(thin);
+        let length = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
+        vector.map(|v| v / length)
+    }
+}
+
+/// T_c = Σ_λ w_c(λ)·10^−A(λ)
+pub(crate) fn transmittance(terms: &[(Amounts, [f64; 3])], amounts: &Amounts) -> [f64; 3] {
+    let mut light = [0.0; 3];
+    for (absorbances, weights) in terms {
+        let absorbance: f64 = absorbances.iter().zip(amounts).map(|(a, amount)| a * amount).sum();
+        let power = libm::exp10(-absorbance);
+        for (light, weight) in light.iter_mut().zip(weights) {
+            *light += weight * power;
+        }
+    }
+    light
+}
+
+/// Mean absorbance of each dye over a channel's light, for that channel alone.
+fn mean_term(spectral: &[(Amounts, [f64; 3])], c: usize) -> (Amounts, [f64; 3]) {
+    let mean = |d: usize| spectral.iter().map(|(absorbances, weights)| weights[c] * absorbances[d]).sum();
+    let mut weights = [0.0; 3];
+    weights[c] = 1.0;
+    (std::array::from_fn(mean), weights)
+}
+
+/// Middles of equal bands.
+pub(crate) fn middles(params: &ColourParams, bands: usize) -> impl Iterator<Item = f64> + use<> {
+    let (from, width) = (params.from_um, (params.to_um - params.from_um) / bands as f64);
+    (0..bands).map(move |i| from + (i as f64 + 0.5) * width)
+}
+
+fn channels(params: &ColourParams) -> [Channel; 3] {
+    let light = |wavelength_um: f64| {
+        let power = params.lamp.power(wavelength_um);
+        params.sensor.sensitivity(wavelength_um).map(|sensitivity| sensitivity * power)
+    };
+    let fine: Vec<(f64, [f64; 3])> = middles(params, FINE_BANDS).map(|w| (w, light(w))).collect();
+    let total = |c: usize| fine.iter().map(|(_, light)| light[c]).sum::<f64>();
+    let strongest = (0..3).map(total).fold(0.0, f64::max);
+    std::array::from_fn(|c| {
+        let mean = |f: &dyn Fn(f64) -> f64| fine.iter().map(|(w, light)| f(*w) * light[c]).sum::<f64>() / total(c);
+        let wavelength_um = mean(&|w| w);
+        let variance = mean(&|w| (w - wavelength_um) * (w - wavelength_um));
+        let at = |w: f64| Node { wavelength_um: w, weight: light(w)[c] };
+        let mut nodes: Vec<Node> = middles(params, params.wavelengths).map(at).collect();
+        let sum: f64 = nodes.iter().map(|node| node.weight).sum();
+        nodes.iter_mut().for_each(|node| node.weight /= sum);
+        // An even band of width b has the variance b²/12.
+        Channel { wavelength_um, bandwidth_um: (12.0 * variance).sqrt(), share: total(c) / strongest, nodes }
+    })
+}

@@ -1,0 +1,151 @@
+use crate::lobe::{Lobe, lobe, sum};
+
+/// What absorbs light in a Papanicolaou smear.
+///
+/// The spectra are models of the *bound* dyes: sums of a few split Gaussians, with maxima where Conn's *Biological
+/// Stains* has them, shifted for binding. They are meant for 0.40 to 0.70 µm; beyond, the Gaussians run out.
+/// Bismarck brown is missing because cells do not bind it (Marshall and Galbraith).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Dye {
+    /// Haematein with aluminium, the blue of nuclei; 0.580 µm.
+    Haematein,
+    /// Eosin Y, the pink of superficial cells; 0.532 µm.
+    EosinY,
+    /// Light green SF, the blue-green of intermediate and parabasal cells; 0.628 µm, and 0.425 µm.
+    LightGreen,
+    /// Orange G, the orange of keratin; 0.470 µm.
+    OrangeG,
+    /// What absorbs alike at all wavelengths: soot, dust, ink.
+    Neutral,
+}
+
+/// How many dyes there are.
+pub const DYES: usize = Dye::ALL.len();
+
+/// How much there is of each dye, in the order of [`Dye::ALL`]: its decadic absorbance at its own peak, 0 or more.
+pub type Amounts = [f64; DYES];
+
+/// Amounts of the dyes named, 0 of the others; a dye named twice counts twice.
+///
+/// ```
+/// use dye_spectra::{Dye, amounts};
+/// assert_eq!(amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]), [0.0, 0.03, 0.15, 0.0, 0.0]);
+/// ```
+#[must_use]
+pub fn amounts<const N: usize>(named: [(Dye, f64); N]) -> Amounts {
+    let mut amounts = [0.0; DYES];
+    for (dye, amount) in named {
+        amounts[dye as usize] += amount;
+    }
+    amounts
+}
+
+/// Decadic absorbance at one wavelength of all dyes together: Beer and Lambert's law, A(λ) = Σ_d c_d·ε_d(λ).
+#[must_use]
+pub fn absorbance(amounts: &Amounts, wavelength_um: f64) -> f64 {
+    Dye::ALL.iter().zip(amounts).map(|(dye, amount)| amount * dye.absorbance(wavelength_um)).sum()
+}
+
+impl Dye {
+    /// All dyes, in the order of [`Amounts`].
+    pub const ALL: [Self; 5] = [Self::Haematein, Self::EosinY, Self::LightGreen, Self::OrangeG, Self::Neutral];
+
+    /// Its English name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Haematein => "haematein",
+            Self::EosinY => "eosin Y",
+            Self::LightGreen => "light green",
+            Self::OrangeG => "orange G",
+            Self::Neutral => "neutral",
+        }
+    }
+
+    /// Decadic absorbance at a wavelength of the amount whose absorbance at its peak is 1 (within 0.001).
+    #[must_use]
+    pub fn absorbance(self, wavelength_um: f64) -> f64 {
+        match self {
+            Self::Haematein => sum(&HAEMATEIN, wavelength_um),
+            Self::EosinY => sum(&EOSIN_Y, wavelength_um),
+            Self::LightGreen => sum(&LIGHT_GREEN, wavelength_um),
+            Self::OrangeG => sum(&ORANGE_G, wavelength_um),
+            Self::Neutral => 1.0,
+        }
+    }
+}
+
+const HAEMATEIN: [Lobe; 3] =
+    [lobe(0.3438, 440.0, 48.0, 48.0), lobe(0.9551, 580.0, 52.0, 42.0), lobe(0.0955, 640.0, 45.0, 45.0)];
+const EOSIN_Y: [Lobe; 3] =
+    [lobe(0.0190, 430.0, 60.0, 60.0), lobe(0.2848, 502.0, 16.0, 16.0), lobe(0.9492, 534.0, 22.0, 16.0)];
+const LIGHT_GREEN: [Lobe; 3] =
+    [lobe(0.1581, 425.0, 22.0, 22.0), lobe(0.2789, 588.0, 26.0, 26.0), lobe(0.9298, 634.0, 33.0, 22.0)];
+const ORANGE_G: [Lobe; 3] =
+    [lobe(0.4197, 422.0, 28.0, 28.0), lobe(0.9308, 480.0, 40.0, 24.0), lobe(0.1118, 512.0, 14.0, 14.0)];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Columns of the table, in the order of `Dye::ALL`.
+    const COLUMNS: [usize; 4] = [1, 2, 4, 3];
+
+    #[test]
+    fn spectra_are_those_of_the_table() {
+        let table = include_str!("../tests/dye_models.csv");
+        for row in table.lines().skip(1) {
+            let row: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+            for (dye, column) in Dye::ALL.into_iter().zip(COLUMNS) {
+                let error = dye.absorbance(row[0] * 1e-3) - row[column];
+                assert!(error.abs() < 1e-3, "{} at {} nm: {error}", dye.name(), row[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_peak_is_one_where_it_is_said_to_be() {
+        let peaks_um = [0.580, 0.532, 0.628, 0.470];
+        for (dye, peak_um) in Dye::ALL.into_iter().zip(peaks_um) {
+            let at = |i: &i32| dye.absorbance(f64::from(*i) * 1e-4);
+            let highest = (4000..=7000).max_by(|a, b| at(a).total_cmp(&at(b))).unwrap();
+            assert!((at(&highest) - 1.0).abs() < 1e-3, "{} {}", dye.name(), at(&highest));
+            assert!((f64::from(highest) * 1e-4 - peak_um).abs() < 0.003, "{} {highest}", dye.name());
+        }
+        assert_eq!(Dye::Neutral.absorbance(0.45), 1.0);
+    }
+
+    #[test]
+    fn transmittances_of_one_wavelength_multiply() {
+        let (a, b) = ([0.5, 0.01, 0.02, 0.0, 0.1], [0.0, 0.2, 0.1, 0.05, 0.0]);
+        let both: Amounts = std::array::from_fn(|d| a[d] + b[d]);
+        for i in 0..=300 {
+            let transmittance = |c: &Amounts| libm::exp10(-absorbance(c, 0.4 + f64::from(i) * 0.001));
+            assert!((transmittance(&both) - transmittance(&a) * transmittance(&b)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn order_of_names_is_order_of_amounts() {
+        for (i, dye) in Dye::ALL.into_iter().enumerate() {
+            assert_eq!(dye as usize, i);
+            assert_eq!(absorbance(&amounts([(dye, 0.5)]), 0.55), 0.5 * dye.absorbance(0.55));
+        }
+    }
+
+    /// Holmquist's filter, and the paper's, is at 0.570 µm.
+    #[test]
+    fn nuclei_stand_out_best_between_560_and_585_nm() {
+        let nucleus = amounts([(Dye::Haematein, 0.5)]);
+        let cytoplasms = [
+            amounts([(Dye::LightGreen, 0.15), (Dye::EosinY, 0.03)]),
+            amounts([(Dye::EosinY, 0.18), (Dye::OrangeG, 0.05)]),
+        ];
+        let contrast = |wavelength_um: f64| -> f64 {
+            let light = |c: &Amounts| libm::exp10(-absorbance(c, wavelength_um));
+            cytoplasms.iter().map(|c| light(c) * (1.0 - light(&nucleus))).sum()
+        };
+        let best = (400..=700).max_by(|a, b| contrast(f64::from(*a) * 1e-3).total_cmp(&contrast(f64::from(*b) * 1e-3)));
+        assert!((560..=585).contains(&best.unwrap()), "{best:?}");
+    }
+}

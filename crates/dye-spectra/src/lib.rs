@@ -1,0 +1,19 @@
+#![doc = include_str!("../README.md")]
+
+mod colour;
+mod curve;
+mod dye;
+mod error;
+mod light;
+mod lobe;
+mod params;
+mod rows;
+mod srgb;
+
+pub use colour::{Channel, Colour, Node};
+pub use curve::Curve;
+pub use dye::{Amounts, DYES, Dye, absorbance, amounts};
+pub use error::Error;
+pub use light::{Lamp, Sensor};
+pub use params::{ColourParams, Mixing};
+pub use srgb::encode_srgb;

@@ -1,0 +1,114 @@
+use crate::error::{Error, require};
+use crate::lobe::{Lobe, lobe, sum};
+
+/// What shines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lamp {
+    /// A glowing wire, as a black body (Planck's law).
+    Halogen {
+        /// Its colour temperature in kelvin, 1000 to 10 000; 3200 for a microscope's lamp at its rated voltage.
+        temperature_k: f64,
+    },
+    /// A white diode, blue with a yellow phosphor: CIE's LED-B3 (CIE 015:2018, 4103 K), within 0.04 of its peak.
+    Led,
+    /// The same power at all wavelengths.
+    Even,
+}
+
+impl Lamp {
+    pub(crate) fn check(self) -> Result<(), Error> {
+        match self {
+            Self::Halogen { temperature_k: t } => {
+                require("lamp.temperature_k", t, (1e3..=1e4).contains(&t), "from 1000 to 10000")
+            }
+            Self::Led | Self::Even => Ok(()),
+        }
+    }
+
+    /// Power at a wavelength, in a unit of its own.
+    pub(crate) fn power(self, wavelength_um: f64) -> f64 {
+        match self {
+            Self::Halogen { temperature_k } => {
+                let [x, x0] = [wavelength_um, MIDDLE_UM].map(|w| SECOND_RADIATION_UM_K / (w * temperature_k));
+                let ratio = MIDDLE_UM / wavelength_um;
+                // Planck's law B(λ) ∝ λ⁻⁵ / (exp(c₂/λT) − 1), relative to its value in the middle.
+                ratio * ratio * ratio * ratio * ratio * libm::expm1(x0) / libm::expm1(x)
+            }
+            Self::Led => sum(&LED_B3, wavelength_um),
+            Self::Even => 1.0,
+        }
+    }
+}
+
+/// Second radiation constant c₂ = hc/k, in µm·K (CODATA 2018).
+const SECOND_RADIATION_UM_K: f64 = 14_387.768_77;
+/// Middle of the visible range.
+const MIDDLE_UM: f64 = 0.55;
+
+const LED_B3: [Lobe; 3] =
+    [lobe(0.848, 448.2, 9.4, 9.1), lobe(0.199, 514.4, 50.1, 23.1), lobe(0.883, 592.2, 59.3, 56.9)];
+
+/// What sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {
+    /// A colour sensor with its infrared filter: red, green and blue of a Nikon D5100 as the National Physical
+    /// Laboratory measured them (Darrodi et al. 2015, doi:10.1364/JOSAA.32.000381; the copy in colour-science
+    /// 0.4.7), within 0.02 of the peak.
+    Camera,
+    /// Three equal channels that see all wavelengths alike: a monochrome camera without a filter.
+    Even,
+}
+
+impl Sensor {
+    /// Sensitivity of the red, green and blue channel to power at a wavelength; 1 at its peak.
+    pub(crate) fn sensitivity(self, wavelength_um: f64) -> [f64; 3] {
+        match self {
+            Self::Camera => [sum(&RED, wavelength_um), sum(&GREEN, wavelength_um), sum(&BLUE, wavelength_um)],
+            Self::Even => [1.0; 3],
+        }
+    }
+}
+
+const RED: [Lobe; 4] = [
+    lobe(0.060, 421.8, 3.7, 110.4),
+    lobe(0.084, 527.7, 10.3, 11.2),
+    lobe(0.961, 590.0, 9.1, 30.7),
+    lobe(0.199, 652.2, 26.8, 11.2),
+];
+const GREEN: [Lobe; 4] = [
+    lobe(0.156, 433.5, 9.5, 31.9),
+    lobe(0.365, 481.3, 15.9, 71.1),
+    lobe(0.615, 526.9, 19.3, 29.2),
+    lobe(0.269, 570.5, 28.1, 20.5),
+];
+const BLUE: [Lobe; 3] = [lobe(0.464, 424.6, 4.2, 10.2), lobe(0.777, 448.9, 13.8, 45.1), lobe(0.302, 475.7, 23.0, 21.1)];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hotter_wire_is_bluer_and_obeys_wien() {
+        let lamp = |temperature_k| Lamp::Halogen { temperature_k };
+        assert!((lamp(3200.0).power(MIDDLE_UM) - 1.0).abs() < 1e-15);
+        assert!(lamp(3200.0).power(0.65) > lamp(3200.0).power(0.45));
+        let share = |t: f64| lamp(t).power(0.45) / lamp(t).power(0.65);
+        assert!(share(2800.0) < share(3200.0) && share(3200.0) < share(5000.0));
+        // λ_max·T = 2898 µm·K
+        let hot = lamp(5000.0);
+        let peak =
+            (4000..7000).max_by(|a, b| hot.power(f64::from(*a) * 1e-4).total_cmp(&hot.power(f64::from(*b) * 1e-4)));
+        assert!((f64::from(peak.unwrap()) * 1e-4 * 5000.0 - 2898.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn each_channel_peaks_where_the_measured_one_does() {
+        let measured_nm = [590, 530, 460];
+        for (c, nm) in measured_nm.into_iter().enumerate() {
+            let at = |nm: &i32| Sensor::Camera.sensitivity(f64::from(*nm) * 1e-3)[c];
+            let peak = (400..=700).max_by(|a, b| at(a).total_cmp(&at(b))).unwrap();
+            assert!((peak - nm).abs() <= 6, "{c}: {peak}");
+            assert!((at(&peak) - 1.0).abs() < 0.03, "{c}: {}", at(&peak));
+        }
+    }
+}
