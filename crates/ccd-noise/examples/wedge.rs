@@ -18,7 +18,8 @@ const PLOT: u32 = 240;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "target/wedge.png".to_owned());
-    let params = CameraParams::orca_05g();
+    // Of a camera whose pixels are alike, as the variance is taken over the pixels of a step.
+    let params = CameraParams { prnu: 0.0, dsnu_e: 0.0, dark_current_e_per_s: 0.0, ..CameraParams::orca_05g() };
     let camera = Camera::new(&params)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     let (width, height) = (STEPS * STEP[0], STEP[1]);
@@ -48,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     // What EMVA 1288 says: σ² = K²σ_d² + 1/12 + K·(mean - offset)
-    let read = gain * single(params.read_noise_e);
+    let read = gain * single(params.read_noise.rms_e());
     for x in 0..PLOT {
         let mean = libm::exp10f(x as f32 / PLOT as f32 * DECADES - 1.0);
         let [_, y] = place(corner, mean, read * read + 1.0 / 12.0 + gain * mean);

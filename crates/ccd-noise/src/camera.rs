@@ -1,40 +1,56 @@
 use rand_core::Rng;
 
-use crate::field::{NoiseField, blocks, padded, rows, whole_rows};
-use crate::hash::{BLOCK, Block, RowWords};
-use crate::poisson::{at_least_nothing, poisson};
-use crate::{CameraParams, Error, PhotonNoise};
+use crate::bloom::{Spill, spread};
+use crate::chain::{Chain, Marker, expose_row, expose_uneven_row, gather_row, mean_row, read_row};
+use crate::field::{NoiseField, rows, whole_rows};
+use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
 /// A camera: photo-electrons in, grey levels out (Eq. 13 without its optics).
 ///
-/// Per pixel, with µ its mean number of photo-electrons:
-/// N = min(Poisson(µ), full well); y = ⌊K·(N + σ_d·n) + offset + ½⌋, clipped to 0 … 2ᵇ - 1,
-/// where n is a standard normal deviate. In the words of EMVA 1288 the variance of y is
-/// K²σ_d² + 1/12 + K·(mean of y - offset).
+/// The linear model of EMVA 1288. Per pixel, with µ its mean number of photo-electrons:
+///
+/// N = min(Poisson(µ·(1 + PRNU·g) + i_d·t), full well)
+/// y = ⌊K·(N + DSNU·d + σ_d·n) + offset + ½⌋, clipped to 0 … 2ᵇ - 1
+///
+/// where g and d are standard normal deviates that belong to the pixel, n one that belongs to pixel and frame, and i_d·t
+/// the dark current in the time of exposure. The variance of y in time is K²σ_d² + 1/12 + K·(mean of y - mean of y in the
+/// dark), with the dark current's shot noise in σ_d.
 ///
 /// # Differences from the paper
 ///
-/// Saturation and rounding stand here, which the paper leaves out; the paper's program adds both
-/// noises to grey levels, which is the same with [`CameraParams::paper`].
+/// Fixed pattern, dark current, saturation and rounding stand here, which the paper leaves out; the paper's
+/// program adds both noises to grey levels, which is the same with [`CameraParams::paper`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    electrons_per_dn: f64,
+    params: CameraParams,
     max_dn: u16,
     chain: Chain,
 }
 
-/// The camera as the pixels see it.
-#[derive(Debug, Clone, PartialEq)]
-struct Chain {
-    full_well: f32,
-    gain: f32,
-    offset: f32,
-    read_noise: f32,
-    highest: f32,
-    photon_noise: PhotonNoise,
-    /// Where one normal deviate serves for both noises.
-    normal_from: f32,
+/// Pixels side by side that are saturated: full, or their converter at its highest level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SaturatedRun {
+    /// The row of the frame.
+    pub y: u32,
+    /// The first of them.
+    pub x0: u32,
+    /// The first after them.
+    pub x1: u32,
 }
+
+/// What became of a whole frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Exposure {
+    /// Saturated pixels: full, or their converter at its highest level.
+    pub saturated: usize,
+    /// Electrons that the anti-blooming drains took. 0 where blooming is off: what is clipped then is not counted.
+    pub drained_e: u64,
+    /// Electrons that bloomed over the border of the frame.
+    pub escaped_e: u64,
+}
+
+/// Variance of rounding to whole grey levels.
+const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Camera {
     /// Checks the parameters.
@@ -42,31 +58,21 @@ impl Camera {
     /// # Errors
     ///
     /// If a field lies outside its range.
-    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
     pub fn new(params: &CameraParams) -> Result<Self, Error> {
         params.check()?;
-        Ok(Self {
-            electrons_per_dn: 1.0 / params.gain_dn_per_e,
-            max_dn: params.max_dn(),
-            chain: Chain {
-                full_well: params.full_well_e as f32,
-                gain: params.gain_dn_per_e as f32,
-                offset: params.offset_dn as f32,
-                read_noise: params.read_noise_e as f32,
-                highest: f32::from(params.max_dn()),
-                photon_noise: params.photon_noise,
-                normal_from: match params.photon_noise {
-                    PhotonNoise::NormalAbove { mean_e } => mean_e as f32,
-                    PhotonNoise::Exact | PhotonNoise::Off => f32::INFINITY,
-                },
-            },
-        })
+        Ok(Self { params: params.clone(), max_dn: params.max_dn(), chain: Chain::new(params) })
+    }
+
+    /// The parameters it was made from.
+    #[must_use]
+    pub fn params(&self) -> &CameraParams {
+        &self.params
     }
 
     /// Electrons that make one grey level, 1 / K.
     #[must_use]
     pub fn electrons_per_dn(&self) -> f64 {
-        self.electrons_per_dn
+        1.0 / self.params.gain_dn_per_e
     }
 
     /// The highest grey level, 2ᵇ - 1.
@@ -75,36 +81,113 @@ impl Camera {
         self.max_dn
     }
 
+    /// Mean photo-electrons of this many photons on a pixel: η·µ_p.
+    #[must_use]
+    pub fn electrons_from_photons(&self, photons: f64) -> f64 {
+        self.params.quantum_efficiency * photons
+    }
+
+    /// Mean photo-electrons at which an average pixel saturates: it is full, or the converter at its highest level.
+    #[must_use]
+    pub fn saturation_e(&self) -> f64 {
+        let converter = (f64::from(self.max_dn) - self.params.offset_dn) / self.params.gain_dn_per_e;
+        converter.min(self.params.full_well_e) - self.params.dark_e()
+    }
+
+    /// The grey level expected from this many photo-electrons, offset and mean dark current included, as if there were
+    /// no saturation.
+    #[must_use]
+    pub fn expected_dn(&self, electrons: f64) -> f64 {
+        self.params.offset_dn + self.params.gain_dn_per_e * (electrons + self.params.dark_e())
+    }
+
+    /// Standard deviation in time of the grey level of a pixel that expects this many photo-electrons, as if there were
+    /// no saturation: σ² = K²·(σ_d² + i_d·t + µ) + 1/12, where the light µ and the dark current have shot noise only if
+    /// [`CameraParams::photon_noise`] is on.
+    #[must_use]
+    pub fn noise_dn(&self, electrons: f64) -> f64 {
+        let shot = match self.params.photon_noise {
+            PhotonNoise::Off => 0.0,
+            PhotonNoise::Exact | PhotonNoise::NormalAbove { .. } => electrons + self.params.dark_e(),
+        };
+        let (gain, read) = (self.params.gain_dn_per_e, self.params.read_noise.rms_e());
+        (gain * gain * (read * read + shot) + ROUNDING).sqrt()
+    }
+
+    /// Standard deviation over the pixels of their mean grey levels, where all expect this many photo-electrons:
+    /// s² = K²·(DSNU² + PRNU²·µ²).
+    #[must_use]
+    pub fn pattern_dn(&self, electrons: f64) -> f64 {
+        let (response, offset) = (self.params.prnu * electrons, self.params.dsnu_e);
+        self.params.gain_dn_per_e * (response * response + offset * offset).sqrt()
+    }
+
+    /// Whether a frame must be exposed as a whole, as charge crosses its rows: blooming is on.
+    #[must_use]
+    pub fn needs_whole_frame(&self) -> bool {
+        self.params.blooming != Blooming::Off
+    }
+
     /// Exposes a frame: `electrons` are mean photo-electrons, >= 0 (anything else counts as
-    /// 0), in rows of `width` pixels; `out` becomes the grey levels. The noise takes one 64-bit key from `rng`. Returns the number of
-    /// saturated pixels, whether the pixel was full or the converter at its highest level.
+    /// 0), in rows of `width` pixels; `out` becomes the grey levels. The noise takes one 64-bit key from `rng`. Returns
+    /// the number of saturated pixels, whether the pixel was full or the converter at its highest level.
     ///
     /// # Panics
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
     pub fn expose_into<R: Rng + ?Sized>(&self, electrons: &[f32], width: usize, out: &mut [u16], rng: &mut R) -> usize {
-        self.expose_window(electrons, width, [0, 0], rng.next_u64(), out)
+        self.frame(electrons, width, rng.next_u64(), out, None).saturated
+    }
+
+    /// Exposes a frame under a `key`, and adds to `saturated` which of its pixels were, row by row.
+    ///
+    /// It is the window of the whole frame, but with [blooming](Blooming::On) of whole electrons.
+    ///
+    /// # Panics
+    ///
+    /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
+    pub fn expose_frame(
+        &self,
+        electrons: &[f32],
+        width: usize,
+        key: u64,
+        out: &mut [u16],
+        saturated: &mut Vec<SaturatedRun>,
+    ) -> Exposure {
+        self.frame(electrons, width, key, out, Some(saturated))
     }
 
     /// Exposes a window of a frame whose first pixel lies at `origin` [x, y] of it: the same grey
     /// levels as the whole frame has there, under the same `key`. Otherwise as
-    /// [`expose_into`](Self::expose_into).
+    /// [`expose_into`](Self::expose_into), but that [blooming](Self::needs_whole_frame) is left out: what a pixel cannot
+    /// hold is lost.
     ///
     /// # Panics
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
     pub fn expose_window(&self, electrons: &[f32], width: usize, origin: [u32; 2], key: u64, out: &mut [u16]) -> usize {
-        whole_rows(electrons.len(), width);
-        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
-        let field = NoiseField::new(key);
-        let both = electrons.chunks_exact(width).zip(out.chunks_exact_mut(width));
-        rows(origin)
-            .zip(both)
-            .map(|(y, (electrons, out))| expose_row(&self.chain, &field.row(y), origin[0], electrons, out))
-            .sum()
+        self.window(electrons, width, origin, key, out, None)
     }
 
-    /// The grey levels without noise and before rounding, within 0 … 2ᵇ - 1.
+    /// As [`expose_window`](Self::expose_window), and adds to `saturated` which pixels of the frame were, row by row.
+    ///
+    /// # Panics
+    ///
+    /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
+    pub fn expose_window_marking(
+        &self,
+        electrons: &[f32],
+        width: usize,
+        origin: [u32; 2],
+        key: u64,
+        out: &mut [u16],
+        saturated: &mut Vec<SaturatedRun>,
+    ) -> usize {
+        self.window(electrons, width, origin, key, out, Some(saturated))
+    }
+
+    /// The grey levels without noise and before rounding, within 0 … 2ᵇ - 1: the offset, the mean dark current and the
+    /// light. There is no fixed pattern in them either: it is noise to whoever wants to know the light.
     ///
     /// # Panics
     ///
@@ -127,102 +210,62 @@ impl Camera {
         }
         out.iter().filter(|&&code| code == self.max_dn).count()
     }
-}
 
-impl Chain {
-    /// y before rounding: K·charge + offset
-    #[inline(always)]
-    fn level(&self, charge: f32) -> f32 {
-        self.gain * charge + self.offset
-    }
-
-    /// ⌊y + ½⌋ within the range of the converter.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
-    fn code(&self, dn: f32) -> u16 {
-        /// Added to an integer below it, it leaves the integer in the lowest bits.
-        const UNIT: f32 = 8_388_608.0;
-        ((dn + 0.5).floor().max(0.0).min(self.highest) + UNIT).to_bits() as u16
-    }
-
-    /// Charges before and after reading, of a block of pixels.
-    #[inline(always)]
-    fn charges(&self, electrons: &[f32; BLOCK], row: &RowWords, x: u32) -> ([f32; BLOCK], [f32; BLOCK]) {
-        let block = row.block(x);
-        let [shot, read] = block.normal_pairs();
-        let mut means = *electrons;
-        for mean in &mut means {
-            *mean = at_least_nothing(*mean);
-        }
-        // g_po and the standard deviation of g_g of Eq. 13
-        let mut noise = [self.read_noise; BLOCK];
-        let mut charge = match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, &block),
-            PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, &mut noise, &shot, &block),
-        };
-        let mut after = [0.0; BLOCK];
-        for i in 0..BLOCK {
-            charge[i] = charge[i].min(self.full_well);
-            after[i] = charge[i] + noise[i] * read[i];
-        }
-        (charge, after)
-    }
-
-    /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
-    #[inline(always)]
-    fn one_normal(
+    fn window(
         &self,
-        means: &[f32; BLOCK],
-        noise: &mut [f32; BLOCK],
-        shot: &[f32; BLOCK],
-        block: &Block<'_>,
-    ) -> [f32; BLOCK] {
-        let mut everywhere = true;
-        for mean in means {
-            everywhere &= *mean >= self.normal_from;
+        electrons: &[f32],
+        width: usize,
+        origin: [u32; 2],
+        key: u64,
+        out: &mut [u16],
+        mut runs: Option<&mut Vec<SaturatedRun>>,
+    ) -> usize {
+        whole_rows(electrons.len(), width);
+        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
+        let (field, chain, x) = (NoiseField::new(key), &self.chain, origin[0]);
+        let mut saturated = 0;
+        let both = electrons.chunks_exact(width).zip(out.chunks_exact_mut(width));
+        for (y, (electrons, out)) in rows(origin).zip(both) {
+            let marker = &mut Marker { y, runs: runs.as_deref_mut() };
+            saturated += match &chain.pattern {
+                None => expose_row(chain, &field.row(y), x, electrons, out, marker),
+                Some(pattern) => expose_uneven_row(chain, &field.row(y), &pattern.row(y), x, electrons, out, marker),
+            };
         }
-        let mut charge = if everywhere { *means } else { poisson(means, shot, block) };
-        for i in 0..BLOCK {
-            let both = (means[i].min(self.full_well) + self.read_noise * self.read_noise).sqrt();
-            let normal = means[i] >= self.normal_from;
-            noise[i] = if normal { both } else { noise[i] };
-            charge[i] = if normal { means[i] } else { charge[i] };
-        }
-        charge
+        saturated
     }
-}
 
-#[multiversion::multiversion(targets = "simd")]
-fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
-    for (dn, &mean) in out.iter_mut().zip(electrons) {
-        *dn = chain.level(at_least_nothing(mean).min(chain.full_well)).max(0.0).min(chain.highest);
-    }
-}
-
-#[multiversion::multiversion(targets = "simd")]
-fn expose_row(chain: &Chain, row: &RowWords, x: u32, electrons: &[f32], out: &mut [u16]) -> usize {
-    let mut saturated = 0;
-    let both = electrons.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
-    for (x, (electrons, out)) in blocks(x).zip(both) {
-        // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
-        let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
-        let (before, after) = chain.charges(&electrons, row, x);
-        let mut codes = [0; BLOCK];
-        let mut full = [0; BLOCK];
-        for i in 0..BLOCK {
-            let dn = chain.level(after[i]);
-            codes[i] = chain.code(dn);
-            let saturated = (before[i] >= chain.full_well) | (dn + 0.5 >= chain.highest);
-            full[i] = u32::from(saturated);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a full well is at most 1e7")]
+    fn frame(
+        &self,
+        electrons: &[f32],
+        width: usize,
+        key: u64,
+        out: &mut [u16],
+        mut runs: Option<&mut Vec<SaturatedRun>>,
+    ) -> Exposure {
+        let Blooming::On { vertical, anti_blooming } = self.params.blooming else {
+            return Exposure {
+                saturated: self.window(electrons, width, [0, 0], key, out, runs),
+                ..Exposure::default()
+            };
+        };
+        whole_rows(electrons.len(), width);
+        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
+        let (field, chain) = (NoiseField::new(key), &self.chain);
+        let full_well = chain.full_well as u32;
+        let mut charge = vec![0; electrons.len()];
+        for (y, (electrons, charge)) in (0..).zip(electrons.chunks_exact(width).zip(charge.chunks_exact_mut(width))) {
+            let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
+            gather_row(chain, &field.row(y), pattern.as_ref(), electrons, charge);
         }
-        if let Some(out) = out.first_chunk_mut() {
-            *out = codes;
-        } else {
-            full[out.len()..].fill(0);
-            out.copy_from_slice(&codes[..out.len()]);
+        let Spill { drained, escaped } = spread(&mut charge, width, full_well, vertical, anti_blooming);
+        let mut saturated = 0;
+        for (y, (charge, out)) in (0..).zip(charge.chunks_exact(width).zip(out.chunks_exact_mut(width))) {
+            let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
+            let marker = &mut Marker { y, runs: runs.as_deref_mut() };
+            saturated += read_row(chain, &field.row(y), pattern.as_ref(), full_well, charge, out, marker);
         }
-        saturated += full.iter().sum::<u32>() as usize;
+        Exposure { saturated, drained_e: drained, escaped_e: escaped }
     }
-    saturated
 }

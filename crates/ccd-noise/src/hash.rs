@@ -75,7 +75,13 @@ impl Block<'_> {
     /// Two standard normal deviates for each pixel: one for the photons, one for reading.
     #[inline(always)]
     pub(crate) fn normal_pairs(&self) -> [[f32; BLOCK]; 2] {
-        normal_pairs(&self.words(Stream::Radius), &self.words(Stream::Angle))
+        self.normal_pairs_of(Stream::Radius, Stream::Angle)
+    }
+
+    /// Two standard normal deviates for each pixel, from any two streams.
+    #[inline(always)]
+    pub(crate) fn normal_pairs_of(&self, radii: Stream, angles: Stream) -> [[f32; BLOCK]; 2] {
+        normal_pairs(&self.words(radii), &self.words(angles))
     }
 
     /// As many further words as wanted for one pixel.

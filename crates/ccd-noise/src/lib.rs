@@ -1,15 +1,24 @@
 #![doc = include_str!("../README.md")]
 
+mod binning;
+mod bloom;
+pub mod calibrate;
 mod camera;
+mod chain;
 mod error;
 mod field;
 mod hash;
+mod jpeg;
 mod normal;
 mod params;
+mod pattern;
 mod poisson;
+mod presets;
 
-pub use camera::Camera;
+pub use binning::Binning;
+pub use camera::{Camera, Exposure, SaturatedRun};
 pub use error::Error;
 pub use field::NoiseField;
-pub use params::{CameraParams, PhotonNoise};
+pub use jpeg::{Jpeg, JpegParams, Subsampling};
+pub use params::{Blooming, CameraParams, PhotonNoise, ReadNoise};
 pub use rand_core::Rng;

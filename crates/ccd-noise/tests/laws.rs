@@ -1,10 +1,15 @@
 //! Laws of the noise and of the camera. All bounds are in standard errors under named seeds.
 
-use ccd_noise::{Camera, CameraParams, NoiseField, PhotonNoise};
+use ccd_noise::{Camera, CameraParams, NoiseField, PhotonNoise, ReadNoise};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 const KEY: u64 = 0x00e1_ec72_0000_0015;
+
+/// A camera of 12 bits whose pixels are alike.
+fn twelve_bits() -> CameraParams {
+    CameraParams { gain_dn_per_e: 3995.0 / 17_600.0, offset_dn: 100.0, bit_depth: 12, ..CameraParams::default() }
+}
 
 /// Deviates of one mean, 1000 to a row.
 fn poisson(mean: f32, n: usize) -> Vec<f64> {
@@ -114,13 +119,9 @@ fn what_is_no_mean_counts_as_dark() {
     assert_eq!([counts[0], counts[1], counts[2], counts[3], counts[6]], [0.0; 5]);
     assert!((4500.0..5500.0).contains(&counts[4]) && counts[5] > 16e6, "{counts:?}");
     let mut codes = [1; 7];
-    Camera::new(&CameraParams { read_noise_e: 0.0, ..CameraParams::default() }).unwrap().expose_window(
-        &means,
-        7,
-        [0, 0],
-        KEY,
-        &mut codes,
-    );
+    Camera::new(&CameraParams { read_noise: ReadNoise::Same { e: 0.0 }, ..CameraParams::default() })
+        .unwrap()
+        .expose_window(&means, 7, [0, 0], KEY, &mut codes);
     assert_eq!([codes[0], codes[1], codes[2], codes[3], codes[5]], [0, 0, 0, 0, 255]);
 }
 
@@ -184,7 +185,7 @@ fn a_window_is_the_frame_seen_through_it() {
     let (width, height) = (301, 57);
     let electrons = scene(width, height);
     for photon_noise in noises() {
-        let params = CameraParams { photon_noise, ..CameraParams::orca_05g() };
+        let params = CameraParams { photon_noise, ..twelve_bits() };
         let camera = Camera::new(&params).unwrap();
         let mut frame = vec![0; electrons.len()];
         let saturated = camera.expose_window(&electrons, width, [40, 1000], KEY, &mut frame);
@@ -225,7 +226,7 @@ fn a_frame_takes_one_word_and_is_the_window_of_that_key() {
 /// 12 bits, which leave room for 50 levels; two frames of each.
 #[test]
 fn the_photon_transfer_curve_gives_the_gain() {
-    let params = CameraParams::orca_05g();
+    let params = twelve_bits();
     let n = 256 * 320;
     for photon_noise in [PhotonNoise::Exact, PhotonNoise::NormalAbove { mean_e: 300.0 }] {
         let camera = Camera::new(&CameraParams { photon_noise, ..params.clone() }).unwrap();
@@ -253,7 +254,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
         let gain = xy / xx;
         assert!((gain / params.gain_dn_per_e - 1.0).abs() < 0.01, "{gain}");
         let read_noise = (dark_variance - 1.0 / 12.0).sqrt() / gain;
-        assert!((read_noise / params.read_noise_e - 1.0).abs() < 0.02, "{read_noise}");
+        assert!((read_noise / params.read_noise.rms_e() - 1.0).abs() < 0.02, "{read_noise}");
         // Shot-limited signal to noise ratio, read noise and rounding taken off.
         let (m, v) = points[40];
         let snr = (m - dark) / (v - dark_variance).sqrt();
@@ -267,7 +268,7 @@ fn rounding_adds_a_twelfth() {
     for sigma_dn in [0.5, 1.0, 3.0] {
         let params = CameraParams {
             gain_dn_per_e: 0.1,
-            read_noise_e: sigma_dn * 10.0,
+            read_noise: ReadNoise::Same { e: sigma_dn * 10.0 },
             photon_noise: PhotonNoise::Off,
             ..CameraParams::default()
         };
@@ -292,9 +293,10 @@ fn one_normal_deviate_has_the_summed_variance() {
         full_well_e: 1e5,
         gain_dn_per_e: 2.0,
         offset_dn: 500.0,
-        read_noise_e: 20.0,
+        read_noise: ReadNoise::Same { e: 20.0 },
         bit_depth: 16,
         photon_noise: PhotonNoise::NormalAbove { mean_e: 50.0 },
+        ..CameraParams::default()
     };
     let camera = Camera::new(&params).unwrap();
     let exact = Camera::new(&CameraParams { photon_noise: PhotonNoise::Exact, ..params }).unwrap();
@@ -318,7 +320,7 @@ fn levels_stay_in_range_and_saturation_is_counted() {
     for (bit_depth, photon_noise) in (8..=16).zip(noises().into_iter().cycle()) {
         let params = CameraParams {
             gain_dn_per_e: f64::from((1_u32 << bit_depth) - 1) / 17_600.0,
-            read_noise_e: 300.0,
+            read_noise: ReadNoise::Same { e: 300.0 },
             bit_depth,
             photon_noise,
             ..CameraParams::default()
@@ -337,8 +339,12 @@ fn levels_stay_in_range_and_saturation_is_counted() {
 
 #[test]
 fn a_full_pixel_holds_no_more() {
-    let params =
-        CameraParams { full_well_e: 10_000.0, gain_dn_per_e: 0.01, read_noise_e: 0.0, ..CameraParams::default() };
+    let params = CameraParams {
+        full_well_e: 10_000.0,
+        gain_dn_per_e: 0.01,
+        read_noise: ReadNoise::Same { e: 0.0 },
+        ..CameraParams::default()
+    };
     let camera = Camera::new(&params).unwrap();
     let mut codes = [0; 4];
     assert_eq!(camera.expose_window(&[5e3, 2e4, 1e6, 0.0], 4, [0, 0], KEY, &mut codes), 2);
@@ -366,7 +372,7 @@ fn noise_free_levels() {
 fn bits_are_pinned() {
     let electrons = scene(301, 57);
     let hashes = noises().map(|photon_noise| {
-        let params = CameraParams { photon_noise, ..CameraParams::orca_05g() };
+        let params = CameraParams { photon_noise, ..twelve_bits() };
         let mut out = vec![0; electrons.len()];
         Camera::new(&params).unwrap().expose_window(&electrons, 301, [3, 5], KEY, &mut out);
         out.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, &c| (h ^ u64::from(c)).wrapping_mul(0x100_0000_01b3))

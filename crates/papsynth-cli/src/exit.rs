@@ -201,6 +201,12 @@ pub(crate) fn install_reports() {
     }));
 }
 
+/// Says on standard error what is no failure and may surprise.
+pub(crate) fn note(text: &str) {
+    // Whoever has closed it does not want to know.
+    let _ = writeln!(io::stderr().lock(), "note: {text}");
+}
+
 /// Writes to standard output. Whoever closed the pipe has seen enough: that is no failure.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();

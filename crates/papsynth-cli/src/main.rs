@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod args;
+mod calibrate;
 mod diagnose;
 mod exit;
 mod generate;
@@ -55,6 +56,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
         Verb::Learn(args) => learn::run(&args),
+        Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();

@@ -56,7 +56,7 @@ impl RecipeFile {
     /// Reads the recipe and lays over it what was set.
     pub(crate) fn load(args: &RecipeArgs) -> Result<Self, Failure> {
         let sets = args.set.iter().map(|argument| Set::parse(argument)).collect::<Result<Vec<_>, _>>()?;
-        let (base, file, folder) = match &args.recipe {
+        let (mut base, file, folder) = match &args.recipe {
             None => (args.preset.unwrap_or(Preset::Lbc).recipe(), None, PathBuf::new()),
             Some(path) => {
                 let (name, text) = text_file::read(path, LARGEST, "a recipe, a few kilobytes of text")?;
@@ -68,6 +68,18 @@ impl RecipeFile {
                 (base, Some((name, text)), folder)
             }
         };
+        for path in &args.with {
+            let (name, text) = text_file::read(path, LARGEST, "sections of a recipe, a few kilobytes of text")?;
+            let text = Arc::new(text);
+            let sources = Sources { file: Some((name, Arc::clone(&text))), sets: Vec::new() };
+            let found = diagnose::read(&text)
+                .map_err(|faults| Failure::input(sources.complaint(faults, "these sections cannot be read")))?;
+            let sections: Table = toml::from_str(&text).unwrap_or_default();
+            base.replace(&found, |section| sections.contains_key(section));
+        }
+        if let Some(camera) = args.camera {
+            base.camera = camera.camera();
+        }
         let sources = Sources { file, sets };
         let recipe = sources
             .overlay(base)
@@ -252,7 +264,8 @@ mod tests {
     use super::*;
 
     fn load(preset: Preset, sets: &[&str]) -> Result<Recipe, String> {
-        let args = RecipeArgs { recipe: None, preset: Some(preset), set: sets.iter().map(|&s| s.to_owned()).collect() };
+        let set = sets.iter().map(|&s| s.to_owned()).collect();
+        let args = RecipeArgs { recipe: None, preset: Some(preset), with: Vec::new(), camera: None, set };
         RecipeFile::load(&args).map(|found| found.recipe).map_err(|failure| failure.json().to_string())
     }
 

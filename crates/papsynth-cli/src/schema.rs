@@ -172,7 +172,7 @@ mod tests {
     fn sections_know_their_keys() {
         let schema = Schema::new();
         let field = schema.at(&path("field")).unwrap();
-        assert_eq!(field.keys(None), ["height_px", "pixel_um", "width_px"]);
+        assert_eq!(field.keys(None), ["height_px", "magnification", "pixel_um", "width_px"]);
         assert!(schema.at(&path("field.width")).is_none());
         // Any class is a key of `cells`.
         assert!(schema.at(&path("cells.whatever.count")).unwrap().is_number());

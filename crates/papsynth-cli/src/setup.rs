@@ -7,7 +7,7 @@ use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 
 use crate::args::EngineArgs;
-use crate::exit::{Complaint, Failure};
+use crate::exit::{self, Complaint, Failure};
 use crate::recipe_file::RecipeFile;
 use crate::text_file;
 
@@ -38,6 +38,9 @@ impl Setup {
         let (inputs, map) = read_inputs(&mut recipe.recipe, &folder, &Limits::default())
             .map_err(|error| Failure::dataset(&error, recipe.complaint("layout.path", error.to_string())))?;
         let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
+        for note in recipe.recipe.notes() {
+            exit::note(&note.to_string());
+        }
         Ok(Self { recipe, model, map, engine, threads: args.threads() })
     }
 

@@ -8,7 +8,7 @@ use std::fs;
 use support::{Bench, TINY};
 
 /// Texts that are no recipe, each with something that its message must name.
-const HOSTILE: [(&str, &str); 62] = [
+const HOSTILE: [(&str, &str); 74] = [
     ("", "holds no setting"),
     ("\n\n# nothing but a comment\n", "holds no setting"),
     ("[field]\nwidth_px = nan", "field.width_px: NaN"),
@@ -50,7 +50,19 @@ const HOSTILE: [(&str, &str); 62] = [
     ("[focus]\nplanes = { normal = [3, 1], min = 50 }", "focus.planes"),
     ("[focus]\nplanes = { normal = [3, 1], min = nan }", "focus.planes"),
     ("[focus]\nplanes = { min = 3 }", "focus.planes"),
-    ("[optics]\nsigma_xy_um = -1", "optics.sigma_xy_um: -1 is outside 0 to 20"),
+    ("[optics]\nkind = \"gaussian\"\nsigma_xy_um = -1", "optics.sigma_xy_um: -1 is outside 0 to 20"),
+    ("[optics]\nna = 0.5", "missing field `kind`"),
+    ("[optics]\nkind = \"bright-field\"\nna = 1.2", "optics.na: 1.2 is above `optics.immersion_index` = 1"),
+    ("[optics]\nkind = \"bright-field\"\nslab_um = 0", "optics.slab_um: 0 is outside 0.1 to 10"),
+    ("[optics]\nkind = \"bright-field\"\noversampling = 1.5", "optics.oversampling: 1.5 is not a whole number"),
+    ("[optics]\nkind = \"bright-field\"\nsigma_xy_um = 1", "sigma_xy_um"),
+    ("[light]\nkind = \"monochrome\"\nwavelength_um = 0", "light.wavelength_um: 0 is outside 0.4 to 0.7"),
+    ("[light]\nkind = \"colour\"\n[optics]\nkind = \"gaussian\"", "light.kind: colour is not known"),
+    ("[camera]\noffset_dn = 255", "camera.offset_dn: 255 is half of the 8-bit range or more"),
+    ("[camera]\nbits = 12\njpeg_quality = 90", "camera.jpeg_quality: 90 is for 8 bits"),
+    ("[camera]\nread_noise_rms_e = 3", "camera.read_noise_rms_e: 3 does not fit"),
+    ("[stain.nucleus]\nhaematein = -1", "stain.nucleus.haematein: -1 is outside 0 to 100"),
+    ("[cells.intermediate.tints]\ncyanophilic = 0\neosinophilic = 0", "cells.intermediate.tints: no tint is left"),
     ("[camera]\nbits = 7", "camera.bits: 7 is outside 8 to 16"),
     ("[camera]\nbits = 17", "camera.bits"),
     ("[camera]\noffset_dn = 200", "camera.offset_dn"),
@@ -246,7 +258,7 @@ fn a_strange_folder_or_another_data_set_is_left_alone() {
     assert_eq!(bench.run(&format!("generate --out file --frames 1 {TINY}")).code, 2);
     bench.good(&format!("generate --out out --frames 1 {TINY}"));
     let before = bench.files("out");
-    for other in ["--seed 5", "--set optics.sigma_xy_um=0.5"] {
+    for other in ["--seed 5", "--set optics.na=0.5"] {
         let run = bench.run(&format!("generate --out out --frames 1 {TINY} {other}"));
         assert_eq!(run.code, 2, "{other}: {}", run.err);
         assert_eq!(bench.files("out"), before, "{other}");

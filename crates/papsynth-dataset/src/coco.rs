@@ -69,10 +69,13 @@ pub(crate) struct Image {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     all_in_focus: Option<String>,
     pixel_um: f64,
+    /// The pixels of each plane that are saturated, if some are.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    saturated: Vec<Rle>,
 }
 
 impl Image {
-    pub(crate) fn new(frame: &FrameSummary) -> Self {
+    pub(crate) fn new(frame: &FrameSummary, saturated: &[Mask]) -> Self {
         let form = Form::of(frame.planes_um.len());
         Self {
             id: frame.index,
@@ -81,6 +84,11 @@ impl Image {
             file_name: layout::image(frame.index, form),
             all_in_focus: (form == Form::Stack).then(|| layout::all_in_focus(frame.index)),
             pixel_um: frame.pixel_um,
+            saturated: if saturated.iter().all(Mask::is_empty) {
+                Vec::new()
+            } else {
+                saturated.iter().map(|mask| Rle::new(mask, frame.width, frame.height)).collect()
+            },
         }
     }
 }
@@ -161,7 +169,12 @@ impl Document {
     ///
     /// # Errors
     /// The category of an object that the recipe does not know.
-    pub(crate) fn of_frame(truth: &Truth, frame: &FrameSummary, categories: &[Category]) -> Result<Self, String> {
+    pub(crate) fn of_frame(
+        truth: &Truth,
+        frame: &FrameSummary,
+        saturated: &[Mask],
+        categories: &[Category],
+    ) -> Result<Self, String> {
         let annotation = |(id, object): (u64, &ObjectTruth)| {
             let name = category_name(&object.class, object.part);
             let category = categories.iter().find(|c| c.name == name).ok_or(name)?;
@@ -171,7 +184,7 @@ impl Document {
             info: Info::default(),
             licenses: Vec::new(),
             categories: categories.to_vec(),
-            images: vec![Image::new(frame)],
+            images: vec![Image::new(frame, saturated)],
             annotations: (1..).zip(&truth.objects).map(annotation).collect::<Result<_, String>>()?,
         })
     }

@@ -136,6 +136,22 @@ pub enum Problem {
     /// A TIFF file holds several images.
     #[error("holds several images; accepted is one image a file")]
     Pages,
+    /// A plane of a stack is of another size than the first.
+    #[error("plane {plane} is {} x {}, the first {} x {}; all must be the same", found[0], found[1], first[0], first[1])]
+    PlaneSize {
+        /// Which, counted from 0 over all files.
+        plane: usize,
+        /// Its columns and rows.
+        found: [usize; 2],
+        /// Columns and rows of the first.
+        first: [usize; 2],
+    },
+    /// A stack of too many pixels.
+    #[error("the stack has more than {limit} pixels up to this file; crop it, or take fewer planes")]
+    StackSize {
+        /// The limit.
+        limit: u64,
+    },
     /// A mask is of another size than its image.
     #[error("the mask is {} x {}, its image {} x {}; both must be the same", mask[0], mask[1], image[0], image[1])]
     MaskSize {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 
-use papsynth::scene::{Scene, View};
-use papsynth::truth::{Group, Truth};
+use papsynth::scene::Scene;
+use papsynth::truth::{Group, Mask, Truth};
 use papsynth::{Finished, Plane};
 use tiff::{TiffError, TiffResult};
 
@@ -16,7 +16,7 @@ use crate::files::{Handle, Pending};
 use crate::layout::{self, Form};
 use crate::record::{FORMAT_VERSION, FileRecord, FrameRecord, FrameSummary, Geometry, WRITER};
 use crate::table::table;
-use crate::write::{PageWriter, Pixels, compressed, description, grey_png, label_tiff};
+use crate::write::{PageWriter, Pixels, compressed, description, label_tiff, png};
 
 /// Writes the files of one frame. Planes are written as they arrive and not kept. Dropped before it is finished, it
 /// leaves no record, and the frame counts as not made.
@@ -26,7 +26,9 @@ pub struct FrameWriter<'a> {
     /// The planes of a stack; a single plane becomes a PNG.
     stack: Option<Pages>,
     noise_free: Pages,
-    saturated: Vec<usize>,
+    /// Masks of the planes' saturated pixels.
+    saturated: Vec<Mask>,
+    floored: Vec<usize>,
     files: Vec<FileRecord>,
 }
 
@@ -42,8 +44,9 @@ impl Pages {
         Ok(Self { pending, writer })
     }
 
-    fn write(&mut self, pixels: Pixels, view: &View, description: Option<&str>) -> Result<(), Error> {
-        self.writer.write(pixels, view.width, view.pixel_um, description).map_err(failed(&self.pending))
+    fn write(&mut self, pixels: Pixels, geometry: &Geometry, description: Option<&str>) -> Result<(), Error> {
+        let Geometry { view, channels, .. } = geometry;
+        self.writer.write(pixels, view.width, *channels, view.pixel_um, description).map_err(failed(&self.pending))
     }
 }
 
@@ -82,13 +85,14 @@ impl<'a> FrameWriter<'a> {
             _ => {}
         }
         let form = Form::of(planes);
-        let values = pixels as u64 * planes as u64;
+        let values = geometry.values() as u64 * planes as u64;
         let stack = match form {
             Form::Single => None,
             Form::Stack => Some(Pages::new(dataset.folder.pending(&layout::image(index, form))?, values * 2)?),
         };
         let noise_free = Pages::new(dataset.folder.pending(&layout::noise_free(index))?, values * 4)?;
-        Ok(Self { dataset, geometry, stack, noise_free, saturated: Vec::with_capacity(planes), files: Vec::new() })
+        let (saturated, floored) = (Vec::with_capacity(planes), Vec::with_capacity(planes));
+        Ok(Self { dataset, geometry, stack, noise_free, saturated, floored, files: Vec::new() })
     }
 
     /// Writes the next plane.
@@ -96,30 +100,31 @@ impl<'a> FrameWriter<'a> {
     /// # Errors
     /// If it is not the next one or of another size than the scene, or the system refuses.
     pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
-        let (pixels, bits) = (self.geometry.pixels(), self.geometry.bits);
+        let (values, bits) = (self.geometry.values(), self.geometry.bits);
         let (next, planes) = (self.saturated.len(), self.geometry.planes_um.len());
         if plane.index != next || next >= planes {
             return Err(self.wrong(format!("plane {} came where plane {next} of {planes} was due", plane.index)));
         }
-        self.check_size("grey levels", plane.grey.len(), pixels)?;
-        self.check_size("noise-free values", plane.noise_free.len(), pixels)?;
+        self.check_size("grey levels", plane.grey.len(), values)?;
+        self.check_size("noise-free values", plane.noise_free.len(), values)?;
         let brightest = plane.grey.iter().copied().max().unwrap_or(0);
         if brightest > white(bits) {
             return Err(self.wrong(format!("grey level {brightest} does not fit into {bits} bits")));
         }
-        let (view, index) = (self.geometry.view, self.geometry.key.index);
+        let (geometry, index) = (&self.geometry, self.geometry.key.index);
         let text = (plane.index == 0).then(|| description(&self.geometry));
         match &mut self.stack {
             Some(pages) if bits <= 8 => {
                 #[expect(clippy::cast_possible_truncation, reason = "checked above")]
                 let narrow: Vec<u8> = plane.grey.iter().map(|&g| g as u8).collect();
-                pages.write(Pixels::U8(&narrow), &view, text.as_deref())?;
+                pages.write(Pixels::U8(&narrow), geometry, text.as_deref())?;
             }
-            Some(pages) => pages.write(Pixels::U16(&plane.grey), &view, text.as_deref())?,
-            None => self.write_grey(&layout::image(index, Form::Single), &plane.grey)?,
+            Some(pages) => pages.write(Pixels::U16(&plane.grey), geometry, text.as_deref())?,
+            None => self.write_png(&layout::image(index, Form::Single), &plane.grey)?,
         }
-        self.noise_free.write(Pixels::F32(&plane.noise_free), &view, None)?;
-        self.saturated.push(plane.saturated);
+        self.noise_free.write(Pixels::F32(&plane.noise_free), &self.geometry, None)?;
+        self.saturated.push(plane.saturated.clone());
+        self.floored.push(plane.floored);
         Ok(())
     }
 
@@ -133,7 +138,7 @@ impl<'a> FrameWriter<'a> {
         if let Some(pages) = self.stack.take() {
             self.files.push(pages.pending.commit()?);
             let grey = rounded(&finished.all_in_focus, white(self.geometry.bits));
-            self.write_grey(&layout::all_in_focus(index), &grey)?;
+            self.write_png(&layout::all_in_focus(index), &grey)?;
         }
         let view = self.geometry.view;
         let mut ids = Vec::new();
@@ -146,8 +151,11 @@ impl<'a> FrameWriter<'a> {
         self.write_tiff(&layout::layers(index), compressed(Pixels::U16(&layers), view.width, view.pixel_um))?;
         let rows = table(truth, index).map_err(|e| self.wrong(e.to_string()))?;
         self.write(&layout::table(index), &rows)?;
-        let summary = summary(&self.geometry, truth, most_layers, std::mem::take(&mut self.saturated));
-        let document = Document::of_frame(truth, &summary, &self.dataset.categories)
+        let saturated = std::mem::take(&mut self.saturated);
+        let counts = saturated.iter().map(|mask| usize::try_from(mask.area()).unwrap_or(usize::MAX)).collect();
+        let floored = std::mem::take(&mut self.floored);
+        let summary = summary(&self.geometry, truth, most_layers, [counts, floored]);
+        let document = Document::of_frame(truth, &summary, &saturated, &self.dataset.categories)
             .map_err(|name| self.wrong(format!("the recipe knows no category `{name}`")))?;
         let document = serde_json::to_vec(&document).map_err(|e| self.wrong(e.to_string()))?;
         self.write(&layout::coco(index), &document)?;
@@ -172,9 +180,9 @@ impl<'a> FrameWriter<'a> {
         Ok(())
     }
 
-    fn write_grey(&mut self, name: &str, grey: &[u16]) -> Result<(), Error> {
-        let Geometry { view, bits, .. } = &self.geometry;
-        let png = grey_png(grey, view.width, *bits, view.pixel_um);
+    fn write_png(&mut self, name: &str, levels: &[u16]) -> Result<(), Error> {
+        let Geometry { view, bits, channels, .. } = &self.geometry;
+        let png = png(levels, view.width, *channels, *bits, view.pixel_um);
         let bytes = png.map_err(Error::io("encode", &self.dataset.folder.path(name)))?;
         self.write(name, &bytes)
     }
@@ -187,7 +195,7 @@ impl<'a> FrameWriter<'a> {
     /// Everything must fit to the scene before a file is written.
     fn check(&self, finished: &Finished) -> Result<(), Error> {
         let (view, due) = (&self.geometry.view, self.geometry.planes_um.len());
-        let (pixels, truth) = (self.geometry.pixels(), &finished.truth);
+        let (values, truth) = (self.geometry.values(), &finished.truth);
         if self.saturated.len() != due {
             return Err(self.wrong(format!("{} of {due} planes were written", self.saturated.len())));
         }
@@ -198,7 +206,7 @@ impl<'a> FrameWriter<'a> {
             )));
         }
         if due > 1 {
-            self.check_size("all-in-focus values", finished.all_in_focus.len(), pixels)?;
+            self.check_size("all-in-focus values", finished.all_in_focus.len(), values)?;
         }
         if [truth.width, truth.height] != [view.width, view.height] {
             let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
@@ -213,11 +221,14 @@ impl<'a> FrameWriter<'a> {
         outside.map_or(Ok(()), |object| Err(self.wrong(format!("the mask of object {} leaves the image", object.id))))
     }
 
-    fn check_size(&self, what: &str, found: usize, pixels: usize) -> Result<(), Error> {
-        if found == pixels {
+    fn check_size(&self, what: &str, found: usize, values: usize) -> Result<(), Error> {
+        if found == values {
             Ok(())
         } else {
-            Err(self.wrong(format!("{found} {what} for an image of {pixels} pixels")))
+            let channels = self.geometry.channels;
+            let pixels = values / channels;
+            let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
+            Err(self.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
         }
     }
 
@@ -238,7 +249,12 @@ fn rounded(values: &[f32], white: u16) -> Vec<u16> {
     values.iter().map(|&v| round(v)).collect()
 }
 
-fn summary(geometry: &Geometry, truth: &Truth, most_layers: u16, saturated: Vec<usize>) -> FrameSummary {
+fn summary(
+    geometry: &Geometry,
+    truth: &Truth,
+    most_layers: u16,
+    [saturated, floored]: [Vec<usize>; 2],
+) -> FrameSummary {
     let mut objects = BTreeMap::new();
     for object in &truth.objects {
         *objects.entry(category_name(&object.class, object.part)).or_insert(0) += 1;
@@ -249,8 +265,11 @@ fn summary(geometry: &Geometry, truth: &Truth, most_layers: u16, saturated: Vec<
         height: geometry.view.height,
         pixel_um: geometry.view.pixel_um,
         bits: geometry.bits,
+        channels: geometry.channels,
+        slide: geometry.slide,
         planes_um: geometry.planes_um.clone(),
         saturated,
+        floored,
         objects,
         truncated: truth.objects.iter().filter(|o| o.truncated).count() as u64,
         most_layers,

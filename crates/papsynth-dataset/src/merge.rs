@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::coco::{Annotation, Document, Image, Info};
+use crate::coco::{Annotation, Document, Info};
 use crate::dataset::{Dataset, read_record, recorded_frames, whole_record};
 use crate::error::Error;
 use crate::files::{Folder, Output};
 use crate::frame_writer::white;
 use crate::layout::{self, Form};
 use crate::picture::ContactSheet;
-use crate::read::{self, GreyImage, Limits};
+use crate::read::{self, LevelImage, Limits};
 use crate::record::{Check, FORMAT, FORMAT_VERSION, FileRecord, FrameSummary, ManifestHead, WRITER, broken};
 
 /// A data set in a few numbers.
@@ -75,7 +75,11 @@ fn documents(dataset: &Dataset, frames: &[u64], out: &mut Output) -> Result<(), 
     out.bytes(b",\"licenses\":[],\"categories\":")?;
     out.json(&dataset.categories)?;
     out.bytes(b",\"images\":[")?;
-    out.json_lines(frames.iter().map(|&index| Ok(Image::new(&read_record(folder, index)?.summary))))?;
+    let images = frames.iter().flat_map(|&index| match document(folder, index) {
+        Ok(document) => document.images.into_iter().map(Ok).collect(),
+        Err(error) => vec![Err(error)],
+    });
+    out.json_lines(images)?;
     out.bytes(b"],\"annotations\":[")?;
     let annotations = frames.iter().flat_map(|&index| match document(folder, index) {
         Ok(document) => document.annotations.into_iter().map(Ok).collect(),
@@ -95,7 +99,7 @@ fn contact_sheet(folder: &Folder, frames: &[u64]) -> Result<FileRecord, Error> {
     let mut sheet = ContactSheet::new(frames.len());
     for &index in frames.iter().take(ContactSheet::MAX_FRAMES) {
         let frame = read_record(folder, index)?.summary;
-        let image = grey_image(folder, &frame)?;
+        let image = level_image(folder, &frame)?;
         let document = document(folder, index)?;
         let path = folder.path(&layout::coco(index));
         let masks = document.annotations.iter().map(Annotation::amodal).collect::<Result<Vec<_>, _>>();
@@ -107,13 +111,13 @@ fn contact_sheet(folder: &Folder, frames: &[u64]) -> Result<FileRecord, Error> {
 }
 
 /// The image of a frame, of a stack the one with everything in focus.
-fn grey_image(folder: &Folder, frame: &FrameSummary) -> Result<GreyImage, Error> {
+fn level_image(folder: &Folder, frame: &FrameSummary) -> Result<LevelImage, Error> {
     let name = match Form::of(frame.planes_um.len()) {
         Form::Single => layout::image(frame.index, Form::Single),
         Form::Stack => layout::all_in_focus(frame.index),
     };
     let limits = Limits { max_pixels: 1 << 30, max_file_bytes: FRAME_FILE_BYTES, ..Limits::default() };
-    GreyImage::read(&folder.path(&name), &limits)
+    LevelImage::read(&folder.path(&name), &limits)
 }
 
 /// The head, then every file: those at the top, then frame by frame, each record after the files it vouches for.

@@ -6,7 +6,7 @@ use papsynth::truth::{Group, Mask};
 use papsynth::{Finished, Plane};
 
 use crate::frame_writer::white;
-use crate::read::GreyImage;
+use crate::read::LevelImage;
 use crate::write::rgb_png;
 
 /// A picture in colour.
@@ -24,7 +24,8 @@ impl Picture {
     pub fn overlay(plane: &Plane, finished: &Finished) -> Self {
         let (view, camera) = (&finished.scene.view, &finished.scene.camera);
         let mut picture = Self::blank(view.width, view.height, BACKGROUND);
-        let image = GreyImage { width: view.width, grey: plane.grey.clone(), white: white(camera.bits) };
+        let levels = plane.grey.clone();
+        let image = LevelImage { width: view.width, channels: plane.channels, levels, white: white(camera.bits) };
         let objects = &finished.truth.objects;
         let masks: Vec<_> = objects.iter().map(|object| (object.group(), object.amodal.clone())).collect();
         let place = Place { x: 0, y: 0, width: view.width, height: view.height };
@@ -54,20 +55,22 @@ impl Picture {
     }
 
     /// Draws an image, no larger than it is, and outlines over it.
-    fn draw(&mut self, image: &GreyImage, white: u16, masks: &[(Group, Mask)], place: Place) {
+    fn draw(&mut self, image: &LevelImage, white: u16, masks: &[(Group, Mask)], place: Place) {
         let (width, height) = (image.width, image.height());
         for y in 0..place.height {
             let rows = span(y, place.height, height);
             for x in 0..place.width {
                 let columns = span(x, place.width, width);
                 let count = (rows.len() * columns.len()) as u64;
-                let sum: u64 = rows
-                    .clone()
-                    .map(|row| image.grey[row * width..][columns.clone()].iter().map(|&g| u64::from(g)).sum::<u64>())
-                    .sum();
-                let full = count * u64::from(white);
-                let grey = u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX);
-                self.set(place.x + x, place.y + y, [grey; 3]);
+                let mean = |channel: usize| {
+                    let row =
+                        |row: usize| columns.clone().map(move |x| u64::from(image.level(x, row, channel))).sum::<u64>();
+                    let sum: u64 = rows.clone().map(row).sum();
+                    let full = count * u64::from(white);
+                    u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX)
+                };
+                let colour = if image.channels == 3 { [mean(0), mean(1), mean(2)] } else { [mean(0); 3] };
+                self.set(place.x + x, place.y + y, colour);
             }
         }
         // Nuclei lie over everything else, as they are looked at most.
@@ -179,7 +182,7 @@ impl ContactSheet {
         [Self::SIZE[0] + Self::GAP, Self::SIZE[1] + Self::CAPTION + Self::GAP]
     }
 
-    pub(crate) fn add(&mut self, name: &str, image: &GreyImage, white: u16, masks: &[(Group, Mask)]) {
+    pub(crate) fn add(&mut self, name: &str, image: &LevelImage, white: u16, masks: &[(Group, Mask)]) {
         let [cell_width, cell_height] = Self::cell();
         let x = Self::GAP + self.frames % Self::COLUMNS * cell_width;
         let y = Self::GAP + self.frames / Self::COLUMNS * cell_height;

@@ -74,10 +74,17 @@ pub struct FrameSummary {
     pub pixel_um: f64,
     /// Bits of a grey level.
     pub bits: u32,
-    /// Depths of the focal planes, µm, in the order of the stack.
+    /// Channels of a pixel: 1, or 3 for red, green and blue.
+    pub channels: usize,
+    /// Number of the slide that the frame shows a field of.
+    pub slide: u64,
+    /// Travel of the stage to the focal planes, µm, in the order of the stack.
     pub planes_um: Vec<f64>,
     /// Number of saturated pixels of each plane.
     pub saturated: Vec<usize>,
+    /// Number of places in each plane, in pixels, where the model of the optics would have given less light than there can
+    /// be and a least one was put in its place: beside very dark things.
+    pub floored: Vec<usize>,
     /// Number of objects and parts of cells by category, as `coco.json` names it.
     pub objects: BTreeMap<String, u64>,
     /// How many of them lie partly outside the image.
@@ -93,15 +100,29 @@ pub(crate) struct Geometry {
     pub(crate) view: View,
     pub(crate) planes_um: Vec<f64>,
     pub(crate) bits: u32,
+    pub(crate) channels: usize,
+    pub(crate) slide: u64,
 }
 
 impl Geometry {
     pub(crate) fn of(scene: &Scene) -> Self {
-        Self { key: scene.key, view: scene.view, planes_um: scene.planes_um.clone(), bits: scene.camera.bits }
+        Self {
+            key: scene.key,
+            view: scene.view,
+            planes_um: scene.planes_um.clone(),
+            bits: scene.camera.bits,
+            channels: scene.channels(),
+            slide: scene.slide,
+        }
     }
 
     pub(crate) fn pixels(&self) -> usize {
         self.view.width * self.view.height
+    }
+
+    /// Numbers of a plane: channels of pixels.
+    pub(crate) fn values(&self) -> usize {
+        self.pixels() * self.channels
     }
 }
 

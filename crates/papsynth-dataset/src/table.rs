@@ -13,7 +13,7 @@ type Column = (&'static str, fn(&Entry) -> String);
 
 /// The columns: what each is called and what stands in it. A number is printed with as few digits as read back to
 /// it; lists have one value a plane, separated by semicolons.
-const COLUMNS: [Column; 27] = [
+const COLUMNS: [Column; 28] = [
     ("image", |e| e.image.to_string()),
     ("id", |e| e.object.id.to_string()),
     ("part", |e| part(e.object.part).to_owned()),
@@ -27,6 +27,7 @@ const COLUMNS: [Column; 27] = [
     ("depth_um", |e| e.object.depth_um.to_string()),
     ("rotation_deg", |e| e.object.rotation_deg.to_string()),
     ("stain", |e| e.object.stain.to_string()),
+    ("tint", |e| e.object.tint.to_owned()),
     ("area_um2", |e| e.object.area_um2.to_string()),
     ("area_px", |e| e.object.amodal.area().to_string()),
     ("front_area_px", |e| e.object.front.area().to_string()),

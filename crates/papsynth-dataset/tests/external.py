@@ -72,8 +72,9 @@ def check_stack(path, frame):
         check(file.is_ome, f"{path} is no OME-TIFF for tifffile")
         equal(f"pages of {path}", len(file.pages), planes)
         series = file.series[0]
-        equal(f"axes of {path}", series.axes, "ZYX")
-        equal(f"shape of {path}", series.shape, (planes, height, width))
+        colour = frame["channels"] == 3
+        equal(f"axes of {path}", series.axes, "ZYXS" if colour else "ZYX")
+        equal(f"shape of {path}", series.shape, (planes, height, width, 3) if colour else (planes, height, width))
         stack = series.asarray()
         description = file.ome_metadata
     equal(f"type of {path}", stack.dtype, np.dtype("u1" if frame["bits"] <= 8 else "u2"))
@@ -85,6 +86,7 @@ def check_stack(path, frame):
     if ome_types is not None:
         typed = ome_types.from_xml(description).images[0].pixels
         equal(f"SizeZ of {path} by ome-types", typed.size_z, planes)
+        equal(f"SizeC of {path} by ome-types", typed.size_c, frame["channels"])
         found = [plane.position_z for plane in typed.planes]
         check(np.allclose(found, frame["planes_um"]), f"positions of {path}: {found}")
     return stack
@@ -93,6 +95,7 @@ def check_stack(path, frame):
 def check_images(folder, frame):
     """All pictures of a frame open and have its shape; returns its label images."""
     name, shape = f"{frame['index']:06}", (frame["height"], frame["width"])
+    pixels = shape if frame["channels"] == 1 else (*shape, 3)
     white = 2 ** frame["bits"] - 1
     planes = len(frame["planes_um"])
     grey = "u1" if frame["bits"] <= 8 else "u2"
@@ -100,19 +103,21 @@ def check_images(folder, frame):
     with Image.open(flat) as image:
         image.load()
         picture = np.array(image)
-    equal(f"shape of {flat}", picture.shape, shape)
-    equal(f"type of {flat}", picture.dtype, np.dtype(grey))
+    equal(f"shape of {flat}", picture.shape, pixels)
+    # Pillow reads 16-bit colour as 8 bits.
+    equal(f"type of {flat}", picture.dtype, np.dtype(grey if frame["channels"] == 1 else "u1"))
     check(picture.max() <= white, f"{flat} exceeds {frame['bits']} bits")
     if planes > 1:
         stack = check_stack(folder / "images" / f"{name}.ome.tif", frame)
     else:
         stack = picture[None]
-    floats = tifffile.imread(folder / "noise-free" / f"{name}.tif").reshape(planes, *shape)
+    floats = tifffile.imread(folder / "noise-free" / f"{name}.tif").reshape(planes, *pixels)
     equal(f"type of noise-free/{name}.tif", floats.dtype, np.dtype("f4"))
     check(np.isfinite(floats).all(), f"noise-free/{name}.tif is not finite")
     # Noise has no mean: over a whole plane it all but vanishes, unless pixels are saturated.
     clipped = np.clip(floats, 0, white)
-    off = np.abs(stack.astype(float).mean(axis=(1, 2)) - clipped.mean(axis=(1, 2)))
+    own = tuple(range(1, stack.ndim))
+    off = np.abs(stack.astype(float).mean(axis=own) - clipped.mean(axis=own))
     check((off < 0.02 * white + 0.5).all(), f"{name}: planes are {off} grey levels from their noise-free twins")
     labels = {}
     for kind in ["cytoplasm", "nucleus", "debris", "layers"]:
@@ -185,6 +190,8 @@ def main(folder):
         equal(f"identity in {path}", record["identity"], manifest["identity"])
         frame = record["summary"]
         image = coco.imgs[frame["index"]]
+        saturated = [int(rle.area(mask)) for mask in image.get("saturated", [])]
+        equal(f"saturated pixels of frame {frame['index']}", saturated or [0] * len(frame["planes_um"]), frame["saturated"])
         check((folder / image["file_name"]).exists(), f"{image['file_name']} is missing")
         equal(f"size of frame {frame['index']}", [image["width"], image["height"]], [frame["width"], frame["height"]])
         labels = check_images(folder, frame)

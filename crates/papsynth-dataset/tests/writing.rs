@@ -14,7 +14,7 @@ use papsynth::truth::Group;
 use papsynth_dataset::read::{GreyImage, Limits, read_label_map};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameRecord, FrameSummary, Picture, rle};
 use serde_json::Value;
-use support::{HEIGHT, SEED, Scratch, WIDTH, contents, frame, recipe};
+use support::{HEIGHT, SEED, Scratch, WIDTH, colour_frame, contents, frame, recipe};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
@@ -130,6 +130,36 @@ fn a_stack_reads_back_plane_by_plane() {
         let off = sharp.grey.iter().zip(&frame.finished.all_in_focus).map(|(&g, v)| (f32::from(g) - v).abs());
         assert!(off.fold(0.0, f32::max) <= 0.5);
         check_labels(&scratch, &frame);
+    }
+}
+
+#[test]
+fn colours_read_back() {
+    for (planes, bits) in [(1, 8), (1, 12), (3, 8), (3, 16)] {
+        let scratch = Scratch::new(&format!("colour-{planes}-{bits}"));
+        let frame = colour_frame(0, planes, bits);
+        let summary = write(&open(&scratch), &frame);
+        assert_eq!((summary.channels, summary.saturated.len()), (3, planes));
+        let (floats, _) = pages(&scratch, "noise-free/000000.tif");
+        for (plane, page) in frame.planes.iter().zip(floats) {
+            assert!(matches!(page, DecodingResult::F32(values) if values == plane.noise_free));
+        }
+        if planes == 1 {
+            let decoder = png::Decoder::new(BufReader::new(File::open(scratch.join("images/000000.png")).unwrap()));
+            let info = decoder.read_info().unwrap();
+            assert_eq!(info.output_color_type().0, png::ColorType::Rgb);
+            continue;
+        }
+        let (pages, description) = pages(&scratch, "images/000000.ome.tif");
+        for (plane, page) in frame.planes.iter().zip(&pages) {
+            let read: Vec<u16> = match page {
+                DecodingResult::U8(levels) => levels.iter().map(|&g| g.into()).collect(),
+                DecodingResult::U16(levels) => levels.clone(),
+                other => panic!("{other:?}"),
+            };
+            assert_eq!(read, plane.grey);
+        }
+        assert!(description.unwrap().contains("SizeC=\"3\""));
     }
 }
 

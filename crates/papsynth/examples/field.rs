@@ -27,7 +27,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         f32::from(u8::MAX) / f32::from(frame.planes.iter().flat_map(|p| &p.grey).copied().max().unwrap_or(1).max(255));
     let pixels: Vec<u8> = frame.planes[0].grey.iter().map(|grey| (f32::from(*grey) * scale) as u8).collect();
     let (width, height) = (u32::try_from(view.width)?, u32::try_from(view.height)?);
-    image::GrayImage::from_raw(width, height, pixels).ok_or("an image of another size")?.save(&out)?;
+    let colour = if frame.planes[0].channels == 3 { image::ColorType::Rgb8 } else { image::ColorType::L8 };
+    image::save_buffer(&out, &pixels, width, height, colour)?;
     eprintln!("{out}: {width} x {height}, {} rows of truth", frame.finished.truth.objects.len());
     Ok(())
 }

@@ -1,11 +1,13 @@
 //! Signal detection: from light to grey levels (Eq. 13), and how detectable an object is in them.
 
-use ccd_noise::{Camera, CameraParams};
+use ccd_noise::{Blooming, Camera, CameraParams, Jpeg, JpegParams, ReadNoise, SaturatedRun};
+use dye_spectra::{Colour, ColourParams, Lamp};
 use multiversion::multiversion;
 
-use crate::recipe::PhotonNoise;
-use crate::scene::{Scene, SceneCamera};
-use crate::truth::Run;
+use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
+use crate::rendition::Srgb;
+use crate::scene::{Scene, SceneCamera, SceneLight};
+use crate::truth::{Mask, Run};
 
 /// Electrons above which [`PhotonNoise::Normal`] draws one normal deviate: the skewness 1/√µ is below 0.05.
 const NORMAL_ABOVE_E: f64 = 400.0;
@@ -13,54 +15,272 @@ const NORMAL_ABOVE_E: f64 = 400.0;
 /// How much more than the largest grey level stands for a pixel holds: the converter clips first, as in real cameras.
 const WELL_MARGIN: f64 = 1.02;
 
+/// Bits of the converter of a camera that makes colours of its grey levels before it hands them over.
+const INNER_BITS: u32 = 16;
+
+/// Colours of the sensor as they are.
+const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// The camera of a scene.
 pub(crate) struct Detector {
-    pub(crate) camera: Camera,
-    scene: SceneCamera,
-    gain: f64,
+    channels: Vec<Channel>,
+    /// How colours are made of the channels, if they are.
+    srgb: Option<Srgb>,
+    jpeg: Option<Jpeg>,
+}
+
+/// The camera as one channel sees it.
+struct Channel {
+    camera: Camera,
+    /// Electrons of light 1: white balance leaves fewer to the colours of which lamp and sensor have little.
+    full_scale_e: f64,
+}
+
+/// What is on its way from electrons to grey levels, channel by channel.
+#[derive(Debug, Default)]
+pub(crate) struct Developing {
+    levels: Vec<Vec<u16>>,
+    means: Vec<Vec<f32>>,
+    /// Runs of saturated pixels, of all channels.
+    saturated: Vec<SaturatedRun>,
+    /// Electrons of the whole frame, for a camera that blooms.
+    frame: Vec<Vec<f32>>,
+}
+
+impl Developing {
+    /// Makes room for a frame.
+    pub(crate) fn start(&mut self) {
+        self.saturated.clear();
+        self.frame.iter_mut().for_each(Vec::clear);
+    }
+
+    /// The pixels that were saturated in some channel.
+    pub(crate) fn saturated(&mut self) -> Mask {
+        self.saturated.sort_by_key(|run| (run.y, run.x0));
+        let mut runs: Vec<Run> = Vec::new();
+        for run in &self.saturated {
+            match runs.last_mut() {
+                Some(last) if last.y == run.y && last.x1 >= run.x0 => last.x1 = last.x1.max(run.x1),
+                _ => runs.push(Run { y: run.y, x0: run.x0, x1: run.x1 }),
+            }
+        }
+        Mask::from_runs(runs)
+    }
+}
+
+/// How the dyes of a scene become colours.
+pub(crate) fn colour(scene: &Scene) -> Result<Colour, String> {
+    let SceneLight::Colour { lamp_k, mixing, .. } = scene.light else {
+        return Err("the light has no colour".to_owned());
+    };
+    let params = ColourParams {
+        lamp: Lamp::Halogen { temperature_k: lamp_k },
+        mixing: match mixing {
+            Mixing::Spectral | Mixing::PerWavelength => dye_spectra::Mixing::Spectral,
+            Mixing::ThreeVectors => dye_spectra::Mixing::ThreeVectors,
+        },
+        ..ColourParams::default()
+    };
+    Colour::new(&params).map_err(|e| format!("light: {e}"))
 }
 
 impl Detector {
     pub(crate) fn new(scene: &Scene) -> Result<Self, String> {
         let camera = scene.camera;
-        let largest = libm::exp2(f64::from(camera.bits)) - 1.0;
-        let gain = (largest - camera.offset_dn) / camera.full_well_e;
+        let jpeg = (camera.jpeg_quality > 0).then(|| jpeg(&camera)).transpose()?;
+        match scene.light {
+            SceneLight::Monochrome { .. } => {
+                let channels = vec![Channel::new(&camera, camera.bits, 1.0)?];
+                Ok(Self { channels, srgb: None, jpeg })
+            }
+            SceneLight::Colour { rendition, .. } => {
+                let colour = colour(scene)?;
+                let bits = match rendition {
+                    Rendition::Raw => camera.bits,
+                    Rendition::Display | Rendition::Srgb => INNER_BITS,
+                };
+                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.share);
+                let channels = colour.channels().iter().map(channel).collect::<Result<_, _>>()?;
+                let srgb = match rendition {
+                    Rendition::Raw => None,
+                    Rendition::Display => Some(Srgb::new(&UNCHANGED, INNER_BITS, camera.bits)),
+                    Rendition::Srgb => Some(Srgb::new(colour.to_srgb(), INNER_BITS, camera.bits)),
+                };
+                Ok(Self { channels, srgb, jpeg })
+            }
+        }
+    }
+
+    /// Light as a fraction of full scale becomes mean electrons.
+    pub(crate) fn electrons(&self, channel: usize, light: &mut [f32]) {
+        let scale = self.channels[channel].full_scale_e as f32;
+        light.iter_mut().for_each(|v| *v *= scale);
+    }
+
+    /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
+    /// charge crosses rows in this camera: then when all rows were [`finish`](Self::finish)ed.
+    pub(crate) fn expose(
+        &self,
+        electrons: &[&mut [f32]],
+        width: usize,
+        first: usize,
+        keys: &[u64],
+        grey: &mut [u16],
+        developing: &mut Developing,
+    ) {
+        if self.needs_whole_frame() {
+            developing.frame.resize(self.channels.len(), Vec::new());
+            developing.frame.iter_mut().zip(electrons).for_each(|(frame, rows)| frame.extend_from_slice(rows));
+            return;
+        }
+        let Developing { levels, saturated, .. } = developing;
+        let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
+        let mut expose = |channel: &Channel, electrons: &[f32], key, levels: &mut [u16]| {
+            channel.camera.expose_window_marking(electrons, width, origin, key, levels, saturated);
+        };
+        if let ([channel], [electrons]) = (&self.channels[..], electrons) {
+            expose(channel, electrons, keys[0], grey);
+            return;
+        }
+        levels.resize(self.channels.len(), Vec::new());
+        for (((channel, electrons), key), levels) in
+            self.channels.iter().zip(electrons).zip(keys).zip(levels.iter_mut())
+        {
+            levels.resize(electrons.len(), 0);
+            expose(channel, electrons, *key, levels);
+        }
+        self.develop(levels, grey);
+    }
+
+    /// What can be done with a whole frame alone: charge that crosses rows, and JPEG.
+    pub(crate) fn finish(&self, width: usize, keys: &[u64], grey: &mut [u16], developing: &mut Developing) {
+        if self.needs_whole_frame() {
+            let Developing { levels, saturated, frame, .. } = developing;
+            levels.resize(self.channels.len(), Vec::new());
+            for (((channel, electrons), key), levels) in
+                self.channels.iter().zip(frame).zip(keys).zip(levels.iter_mut())
+            {
+                levels.resize(electrons.len(), 0);
+                channel.camera.expose_frame(electrons, width, *key, levels, saturated);
+            }
+            self.develop(levels, grey);
+        }
+        match (&self.jpeg, self.channels.len()) {
+            (None, _) => {}
+            (Some(jpeg), 1) => jpeg.frame(grey, width),
+            (Some(jpeg), _) => {
+                #[expect(clippy::cast_possible_truncation, reason = "JPEG is for 8 bits")]
+                let mut rgb: Vec<u8> = grey.iter().map(|level| *level as u8).collect();
+                jpeg.rgb(&mut rgb, width);
+                grey.iter_mut().zip(&rgb).for_each(|(level, byte)| *level = u16::from(*byte));
+            }
+        }
+    }
+
+    fn develop(&self, levels: &[Vec<u16>], grey: &mut [u16]) {
+        match &self.srgb {
+            Some(srgb) => srgb.levels(levels, grey),
+            None => interleave(levels, grey),
+        }
+    }
+
+    fn needs_whole_frame(&self) -> bool {
+        self.channels.iter().any(|channel| channel.camera.needs_whole_frame())
+    }
+
+    /// Grey levels without any noise and before rounding.
+    pub(crate) fn mean_dn_into(&self, electrons: &[&mut [f32]], out: &mut [f32], developing: &mut Developing) {
+        if let ([channel], [electrons]) = (&self.channels[..], electrons) {
+            channel.camera.mean_dn_into(electrons, out);
+            return;
+        }
+        let means = &mut developing.means;
+        means.resize(self.channels.len(), Vec::new());
+        for ((channel, electrons), means) in self.channels.iter().zip(electrons).zip(means.iter_mut()) {
+            means.resize(electrons.len(), 0.0);
+            channel.camera.mean_dn_into(electrons, means);
+        }
+        match &self.srgb {
+            Some(srgb) => srgb.means(means, out),
+            None => interleave(means, out),
+        }
+    }
+
+    /// The grey level of a channel expected from a number of electrons.
+    pub(crate) fn expected_dn(&self, channel: usize, electrons: f64) -> f64 {
+        self.channels[channel].camera.expected_dn(electrons)
+    }
+
+    /// Standard deviation of the grey level of a pixel that expects this many electrons.
+    pub(crate) fn noise_dn(&self, channel: usize, electrons: f64) -> f64 {
+        self.channels[channel].camera.noise_dn(electrons)
+    }
+}
+
+impl Channel {
+    /// `share` is the light of the channel relative to the brightest one's.
+    fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, String> {
+        let largest = libm::exp2(f64::from(bits)) - 1.0;
+        let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
         let params = CameraParams {
+            exposure_s: camera.exposure_s,
+            dark_current_e_per_s: camera.dark_current_e_per_s,
+            dark_reference_c: camera.dark_reference_c,
+            temperature_c: camera.temperature_c,
+            dark_doubling_c: camera.dark_doubling_c,
+            prnu: camera.prnu,
+            dsnu_e: camera.dsnu_e,
+            serial: camera.serial,
             full_well_e: camera.full_well_e * WELL_MARGIN,
-            gain_dn_per_e: gain,
-            offset_dn: camera.offset_dn,
-            read_noise_e: camera.read_noise_e,
-            bit_depth: camera.bits,
+            blooming: match camera.blooming {
+                0.0 => Blooming::Off,
+                share => Blooming::On { vertical: camera.blooming_vertical, anti_blooming: 1.0 - share },
+            },
+            read_noise: match camera.read_noise_rms_e {
+                0.0 => ReadNoise::Same { e: camera.read_noise_e },
+                rms_e => ReadNoise::PerPixel { median_e: camera.read_noise_e, rms_e },
+            },
+            gain_dn_per_e: (largest - offset_dn) / (camera.full_well_e * share),
+            offset_dn,
+            bit_depth: bits,
             photon_noise: match camera.photon_noise {
                 PhotonNoise::Exact => ccd_noise::PhotonNoise::Exact,
                 PhotonNoise::Normal => ccd_noise::PhotonNoise::NormalAbove { mean_e: NORMAL_ABOVE_E },
                 PhotonNoise::Off => ccd_noise::PhotonNoise::Off,
             },
+            ..CameraParams::default()
         };
-        Ok(Self { camera: Camera::new(&params).map_err(|e| format!("camera: {e}"))?, scene: camera, gain })
-    }
-
-    /// Light as a fraction of full scale becomes mean electrons.
-    pub(crate) fn electrons(&self, light: &mut [f32]) {
-        let scale = self.scene.full_well_e as f32;
-        light.iter_mut().for_each(|v| *v *= scale);
-    }
-
-    /// The grey level expected from a number of electrons.
-    pub(crate) fn expected_dn(&self, electrons: f64) -> f64 {
-        self.scene.offset_dn + self.gain * electrons
-    }
-
-    /// Standard deviation of the grey level of a pixel that expects this many electrons.
-    pub(crate) fn noise_dn(&self, electrons: f64) -> f64 {
-        /// Variance of rounding to whole grey levels.
-        const ROUNDING: f64 = 1.0 / 12.0;
-        let shot = match self.scene.photon_noise {
-            PhotonNoise::Off => 0.0,
-            PhotonNoise::Exact | PhotonNoise::Normal => electrons,
+        let side = camera.binning_px;
+        let binned = match (side, camera.binning) {
+            (1, _) => Ok(params),
+            (_, Binning::Charge) => params.binned(ccd_noise::Binning::Charge { side }),
+            (_, Binning::Digital) => params.binned(ccd_noise::Binning::Digital { side }),
         };
-        let read = self.scene.read_noise_e * self.scene.read_noise_e;
-        (self.gain * self.gain * (shot + read) + ROUNDING).sqrt()
+        let camera = binned.and_then(|params| Camera::new(&params)).map_err(|e| format!("camera: {e}"))?;
+        let full_scale_e = (largest - offset_dn) * camera.electrons_per_dn();
+        Ok(Self { camera, full_scale_e })
+    }
+}
+
+fn jpeg(camera: &SceneCamera) -> Result<Jpeg, String> {
+    let params = JpegParams {
+        quality: camera.jpeg_quality,
+        subsampling: match camera.jpeg_subsampling {
+            Subsampling::Full => ccd_noise::Subsampling::Full,
+            Subsampling::Columns => ccd_noise::Subsampling::Columns,
+            Subsampling::Squares => ccd_noise::Subsampling::Squares,
+        },
+        bit_depth: camera.bits,
+    };
+    Jpeg::new(&params).map_err(|e| format!("camera: {e}"))
+}
+
+/// Values of several channels, side by side.
+fn interleave<T: Copy>(channels: &[Vec<T>], out: &mut [T]) {
+    for (channel, values) in channels.iter().enumerate() {
+        for (out, value) in out[channel..].iter_mut().step_by(channels.len()).zip(values) {
+            *out = *value;
+        }
     }
 }
 

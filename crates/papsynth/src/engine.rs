@@ -11,6 +11,7 @@ use crate::recipe::Recipe;
 use crate::render::{Desk, Rendering};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
+use crate::transmit::Lenses;
 
 /// What a recipe names but does not hold, and how numbers are computed.
 #[derive(Debug, Clone, Default)]
@@ -39,6 +40,7 @@ pub struct Engine {
     model: Model,
     weight_map: Option<WeightMap>,
     studio: Studio,
+    lenses: Lenses,
     /// Memory of finished images: as many as were ever made side by side.
     desks: Mutex<Vec<Desk>>,
 }
@@ -59,12 +61,17 @@ impl Engine {
             Arithmetic::Portable => spectral_field::Fft::Portable,
         };
         scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
+        let lenses = Lenses::new(match inputs.arithmetic {
+            Arithmetic::Fastest => optics_psf::Fft::Fastest,
+            Arithmetic::Portable => optics_psf::Fft::Portable,
+        });
         let studio = Studio::new(recipe, model, fft).map_err(Error::Model)?;
         Ok(Self {
             recipe: recipe.clone(),
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
             studio,
+            lenses,
             desks: Mutex::default(),
         })
     }
@@ -110,7 +117,7 @@ impl Engine {
         let index = scene.key.index;
         let fail = |message| E::from(Error::Image { index, message });
         let desk = self.desks().pop().unwrap_or_default();
-        let mut rendering = Rendering::new(&self.studio, scene, threads, desk).map_err(fail)?;
+        let mut rendering = Rendering::new(&self.studio, &self.lenses, scene, threads, desk).map_err(fail)?;
         for plane in 0..rendering.planes() {
             sink(rendering.plane(plane).map_err(fail)?)?;
         }

@@ -1,21 +1,26 @@
 //! What the engine makes: planes, and everything known about them.
 
 use crate::scene::Scene;
-use crate::truth::Truth;
+use crate::truth::{Mask, Truth};
 
 /// One focal plane.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plane {
     /// Its place in the stack, from 0.
     pub index: usize,
-    /// Its depth, µm, positive towards the objective.
-    pub depth_um: f64,
-    /// Grey levels as the camera gives them, `0..=2^bits − 1`, row by row.
+    /// Travel of the stage to it, µm: one of [`Scene::planes_um`].
+    pub stage_um: f64,
+    /// Channels of a pixel: 1, or 3 for red, green and blue.
+    pub channels: usize,
+    /// Grey levels as the camera gives them, `0..=2^bits − 1`, row by row, the channels of a pixel side by side.
     pub grey: Vec<u16>,
     /// The same without any noise and before rounding: the expected grey level at each pixel.
     pub noise_free: Vec<f32>,
-    /// Number of pixels at full well or at the largest grey level.
-    pub saturated: usize,
+    /// Pixels at full well, or whose converter is at its highest level, in some channel.
+    pub saturated: Mask,
+    /// Number of places, in pixels, where the model of the optics would have given less light than there can be and a least
+    /// one was put in its place: beside very dark things.
+    pub floored: usize,
 }
 
 /// Everything about an image except its planes.

@@ -17,6 +17,7 @@ mod phantom;
 mod random;
 pub mod recipe;
 mod render;
+mod rendition;
 mod restore;
 pub mod scene;
 mod threads;

@@ -2,14 +2,14 @@
 
 use rand_core::Rng;
 
-use crate::detect::{Detector, sum_over};
+use crate::detect::{Detector, Developing, sum_over};
 use crate::frame::{Finished, Plane};
 use crate::phantom::{self, Phantom, Studio};
 use crate::recipe::Restore;
 use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
-use crate::transmit::{Band, FocusAt, Light, LightPath};
+use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Passage, Slide};
 use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts};
 
 /// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
@@ -17,6 +17,7 @@ use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts};
 pub(crate) struct Desk {
     light: Light,
     plane: Plane,
+    developing: Developing,
     /// All zero between images.
     ids: Vec<u32>,
 }
@@ -27,7 +28,11 @@ pub(crate) struct Rendering {
     phantoms: Vec<Phantom>,
     /// Complete masks of every piece of every phantom.
     masks: Vec<Vec<Mask>>,
+    /// The number of pixels that each would have without the image's border.
+    covered: Vec<Vec<u64>>,
     path: LightPath,
+    /// The feathered mask C′ of the nuclei whose texture was taken from images, if any are to be restored.
+    feathered: Option<Feathered>,
     desk: Desk,
     detector: Detector,
     /// How detectable each piece is, plane by plane.
@@ -35,7 +40,13 @@ pub(crate) struct Rendering {
 }
 
 impl Rendering {
-    pub(crate) fn new(studio: &Studio, scene: Scene, threads: Threads, mut desk: Desk) -> Result<Self, String> {
+    pub(crate) fn new(
+        studio: &Studio,
+        lenses: &Lenses,
+        scene: Scene,
+        threads: Threads,
+        mut desk: Desk,
+    ) -> Result<Self, String> {
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
         let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
@@ -44,17 +55,12 @@ impl Rendering {
         for batch in made {
             phantoms.extend(batch?);
         }
-        let (width, height) = (scene.view.width, scene.view.height);
-        let masks = threads::map(threads, &phantoms, |phantom| {
-            let mask = |piece: &phantom::Piece| {
-                let cover = &piece.coverage;
-                Mask::from_tile(&cover.values, cover.width, cover.origin, width, height, |share| share >= COVERED)
-            };
-            phantom.pieces.iter().map(mask).collect()
-        });
-        let path = LightPath::new(&scene, &phantoms, threads, &mut desk.light)?;
+        let (masks, covered) = masks(&scene, &phantoms, threads);
+        let slide = Slide { scene: &scene, phantoms: &phantoms, masks: &masks };
+        let path = LightPath::new(slide, lenses, threads, &mut desk.light)?;
+        let feathered = Feathered::new(&scene, &phantoms)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, masks, path, desk, detector, detectability: Vec::new() })
+        Ok(Self { scene, phantoms, masks, covered, path, feathered, desk, detector, detectability: Vec::new() })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -63,36 +69,49 @@ impl Rendering {
 
     /// Images one plane. Planes are asked for in order, each once.
     pub(crate) fn plane(&mut self, index: usize) -> Result<&Plane, String> {
-        let depth_um = self.scene.planes_um[index];
-        let Desk { mut light, mut plane, ids } = core::mem::take(&mut self.desk);
-        let focus = FocusAt::Depth(depth_um);
-        let absorbances = self.path.absorb(&self.scene, &self.phantoms, &self.masks, focus, &mut light)?;
-        plane.start(index, depth_um, self.scene.view.width * self.scene.view.height);
-        let mut exposure = Exposure::new(self, &mut plane);
+        let stage_um = self.scene.planes_um[index];
+        let Desk { mut light, mut plane, mut developing, ids } = core::mem::take(&mut self.desk);
+        let passage = self.pass(FocusAt::Stage(stage_um), &mut light)?;
+        plane.start(index, stage_um, self.scene.channels(), self.scene.view.width * self.scene.view.height);
+        plane.floored = passage.floored;
+        let mut exposure = Exposure::new(self, &mut plane, &mut developing);
         self.path.spread(&mut light, |band| exposure.add(band));
-        let electrons = exposure.electrons.sums();
-        let detectability = self.detectabilities(&absorbances, &electrons);
+        exposure.finish();
+        let electrons: Vec<Vec<f64>> = exposure.electrons.iter().map(MaskSums::sums).collect();
+        let detectability = self.detectabilities(&passage.absorbances, &electrons);
         self.detectability.push(detectability);
-        self.desk = Desk { light, plane, ids };
+        self.desk = Desk { light, plane, developing, ids };
         Ok(&self.desk.plane)
     }
 
-    /// Contrast over noise of every piece: (Ī·10^Ā − Ī) / noise, with Ī the mean grey level over its mask and Ā its mean
-    /// absorbance there, both as they are in this plane. `electrons` are summed over the masks.
-    fn detectabilities(&self, absorbances: &[f64], electrons: &[f64]) -> Vec<f64> {
-        let pieces = self.masks.iter().flatten().zip(absorbances).zip(electrons);
-        pieces
-            .map(|((mask, absorbance), sum)| {
-                let area = mask.area();
-                if area == 0 {
-                    return 0.0;
-                }
-                let mean = sum / area as f64;
-                let without = mean * libm::exp10(*absorbance);
-                let contrast = self.detector.expected_dn(without) - self.detector.expected_dn(mean);
-                contrast / self.detector.noise_dn(mean).max(f64::MIN_POSITIVE)
-            })
-            .collect()
+    fn pass(&self, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+        let slide = Slide { scene: &self.scene, phantoms: &self.phantoms, masks: &self.masks };
+        self.path.pass(slide, focus, light)
+    }
+
+    /// Contrast over noise of every piece, in the channel that shows it best: (Ī·10^Ā − Ī) / noise, with Ī the mean grey
+    /// level over its mask and Ā its mean absorbance there, both as they are in this plane. `electrons` are summed over
+    /// the masks; both come channel by channel.
+    fn detectabilities(&self, absorbances: &[Vec<f64>], electrons: &[Vec<f64>]) -> Vec<f64> {
+        let mut best = vec![f64::NEG_INFINITY; self.masks.iter().map(Vec::len).sum()];
+        for (channel, (absorbances, electrons)) in absorbances.iter().zip(electrons).enumerate() {
+            let pieces = self.masks.iter().flatten().zip(absorbances).zip(electrons);
+            for (best, ((mask, absorbance), sum)) in best.iter_mut().zip(pieces) {
+                *best = best.max(self.detectability(channel, mask, *absorbance, *sum));
+            }
+        }
+        best
+    }
+
+    fn detectability(&self, channel: usize, mask: &Mask, absorbance: f64, electrons: f64) -> f64 {
+        let area = mask.area();
+        if area == 0 {
+            return 0.0;
+        }
+        let mean = electrons / area as f64;
+        let without = mean * libm::exp10(absorbance);
+        let dn = |electrons| self.detector.expected_dn(channel, electrons);
+        (dn(without) - dn(mean)) / self.detector.noise_dn(channel, mean).max(f64::MIN_POSITIVE)
     }
 
     /// The all-in-focus image and the truth, and the memory for the next image.
@@ -104,17 +123,38 @@ impl Rendering {
     }
 
     fn all_in_focus(&mut self) -> Result<Vec<f32>, String> {
-        let light = &mut self.desk.light;
-        self.path.absorb(&self.scene, &self.phantoms, &self.masks, FocusAt::Everywhere, light)?;
-        let (width, feathered) = (self.scene.view.width, self.path.feathered.as_ref());
-        let mut all_in_focus = Vec::with_capacity(width * self.scene.view.height);
-        self.path.spread(light, |Band { first, sharp, spread }| {
-            restore_light(feathered, first * width, sharp, spread);
-            self.detector.electrons(spread);
-            all_in_focus.resize(first * width + spread.len(), 0.0);
-            self.detector.camera.mean_dn_into(spread, &mut all_in_focus[first * width..]);
+        let (mut light, mut developing) =
+            (core::mem::take(&mut self.desk.light), core::mem::take(&mut self.desk.developing));
+        self.pass(FocusAt::Everywhere, &mut light)?;
+        let (width, channels) = (self.scene.view.width, self.scene.channels());
+        let mut all_in_focus = vec![0.0; width * self.scene.view.height * channels];
+        self.path.spread(&mut light, |Band { first, sharp, spread }| {
+            self.restore_light(first * width, sharp, spread);
+            self.count(spread);
+            let pixels = spread.first().map_or(0, |channel| channel.len());
+            let out = &mut all_in_focus[first * width * channels..][..pixels * channels];
+            self.detector.mean_dn_into(spread, out, &mut developing);
         });
+        (self.desk.light, self.desk.developing) = (light, developing);
         Ok(all_in_focus)
+    }
+
+    /// Eq. 15 on light, for rows that start at pixel `first`, where the light of restored nuclei comes apart.
+    fn restore_light(&self, first: usize, sharp: &[f32], spread: &mut [&mut [f32]]) {
+        let (Some(feathered), [spread]) = (&self.feathered, spread) else { return };
+        if sharp.is_empty() {
+            return;
+        }
+        for (span, shares) in feathered.within(first, spread.len()) {
+            restore(&mut spread[span.clone()], &sharp[span], shares);
+        }
+    }
+
+    /// Light becomes electrons.
+    fn count(&self, channels: &mut [&mut [f32]]) {
+        for (channel, light) in channels.iter_mut().enumerate() {
+            self.detector.electrons(channel, light);
+        }
     }
 
     /// `ids` is memory for an image.
@@ -123,10 +163,12 @@ impl Rendering {
         ids.resize(width * height, 0);
         let mut objects = Vec::new();
         let mut number = 0;
-        for ((object, phantom), masks) in self.scene.objects.iter().zip(&self.phantoms).zip(&self.masks) {
-            for (piece, mask) in phantom.pieces.iter().zip(masks) {
+        let phantoms = self.scene.objects.iter().zip(&self.phantoms);
+        for ((object, phantom), (masks, covered)) in phantoms.zip(self.masks.iter().zip(&self.covered)) {
+            for ((piece, mask), covered) in phantom.pieces.iter().zip(masks).zip(covered) {
                 if !mask.is_empty() {
-                    objects.push(self.row(object, phantom, piece, mask, number));
+                    let truncated = mask.area() < *covered;
+                    objects.push(ObjectTruth { truncated, ..self.row(object, phantom, piece, mask, number) });
                 }
                 number += 1;
             }
@@ -151,9 +193,12 @@ impl Rendering {
         mask: &Mask,
         number: usize,
     ) -> ObjectTruth {
-        let pixel_um = self.scene.view.pixel_um;
+        let grid_um = self.scene.grid().pixel_um;
         let kind = object.body.kind();
-        let covered = piece.coverage.values.iter().filter(|share| **share >= COVERED).count() as u64;
+        let tint = match &object.body {
+            Body::Cell(body) if piece.part != Part::Nucleus => body.tint.name(),
+            _ => "",
+        };
         let (class, stain) = match &object.body {
             Body::Cell(body) if piece.part == Part::Nucleus => (body.class.clone(), body.nucleus.absorbance),
             Body::Cell(body) => (body.class.clone(), body.cytoplasm_absorbance),
@@ -173,12 +218,18 @@ impl Rendering {
             centre_um: object.centre_um,
             depth_um: object.depth_um,
             stain,
+            tint,
             rotation_deg: object.rotation_deg,
-            area_um2: piece.area_px * pixel_um * pixel_um,
-            truncated: mask.area() < covered,
+            area_um2: piece.area_px * grid_um * grid_um,
+            truncated: false,
             amodal: mask.clone(),
             front: Mask::default(),
-            defocus_um: self.scene.planes_um.iter().map(|plane| plane - object.depth_um).collect(),
+            defocus_um: self
+                .scene
+                .planes_um
+                .iter()
+                .map(|plane| self.scene.in_focus_um(*plane) - object.depth_um)
+                .collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
         }
     }
@@ -186,46 +237,97 @@ impl Rendering {
 
 impl Plane {
     /// Makes this the plane of that index, its pixels to be written.
-    fn start(&mut self, index: usize, depth_um: f64, pixels: usize) {
-        (self.index, self.depth_um, self.saturated) = (index, depth_um, 0);
-        self.grey.resize(pixels, 0);
-        self.noise_free.resize(pixels, 0.0);
+    fn start(&mut self, index: usize, stage_um: f64, channels: usize, pixels: usize) {
+        (self.index, self.stage_um, self.channels) = (index, stage_um, channels);
+        (self.saturated, self.floored) = (Mask::default(), 0);
+        self.grey.resize(pixels * channels, 0);
+        self.noise_free.resize(pixels * channels, 0.0);
     }
+}
+
+/// The complete masks of all pieces, and how many pixels each covers when those outside the image count too.
+fn masks(scene: &Scene, phantoms: &[Phantom], threads: Threads) -> (Vec<Vec<Mask>>, Vec<Vec<u64>>) {
+    let (view, n) = (scene.view, scene.oversampling());
+    let both = threads::map(threads, phantoms, |phantom| {
+        let mask = |piece: &phantom::Piece| {
+            let coarse = (n > 1).then(|| piece.coverage.coarsened(n));
+            let cover = coarse.as_ref().unwrap_or(&piece.coverage);
+            let inside = |share: f32| share >= COVERED;
+            let mask = Mask::from_tile(&cover.values, cover.width, cover.origin, view.width, view.height, inside);
+            (mask, cover.values.iter().filter(|share| inside(**share)).count() as u64)
+        };
+        phantom.pieces.iter().map(mask).unzip()
+    });
+    both.into_iter().unzip()
 }
 
 /// One plane on its way through the camera.
 struct Exposure<'a> {
     rendering: &'a Rendering,
-    key: u64,
+    /// One for each channel.
+    keys: Vec<u64>,
     plane: &'a mut Plane,
-    electrons: MaskSums<'a>,
+    developing: &'a mut Developing,
+    electrons: Vec<MaskSums<'a>>,
 }
 
 impl<'a> Exposure<'a> {
-    fn new(rendering: &'a Rendering, plane: &'a mut Plane) -> Self {
-        let key = rendering.scene.key.stream("plane", plane.index as u64, "camera").next_u64();
-        Self { rendering, key, plane, electrons: MaskSums::new(&rendering.masks) }
+    fn new(rendering: &'a Rendering, plane: &'a mut Plane, developing: &'a mut Developing) -> Self {
+        let key = |purpose: &str| rendering.scene.key.stream("plane", plane.index as u64, purpose).next_u64();
+        let keys = match rendering.scene.channels() {
+            1 => vec![key("camera")],
+            _ => ["camera.red", "camera.green", "camera.blue"].map(key).to_vec(),
+        };
+        let electrons = keys.iter().map(|_| MaskSums::new(&rendering.masks)).collect();
+        developing.start();
+        Self { rendering, keys, plane, developing, electrons }
     }
 
     /// Eq. 13: I_f = g_po(10^(I_b − I_p) ∗ G_σxy) + g_g, and Eq. 15 before or after it.
     fn add(&mut self, Band { first, sharp, spread }: Band<'_>) {
-        let Rendering { scene, path, detector, .. } = self.rendering;
-        let width = scene.view.width;
-        let (early, late) = match scene.optics.restore {
-            Restore::AfterDetection => (None, path.feathered.as_ref()),
-            Restore::Off | Restore::BeforeDetection => (path.feathered.as_ref(), None),
-        };
-        restore_light(early, first * width, sharp, spread);
-        detector.electrons(spread);
-        let pixels = first * width..first * width + spread.len();
-        let (grey, noise_free) = (&mut self.plane.grey[pixels.clone()], &mut self.plane.noise_free[pixels]);
-        let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
-        self.plane.saturated += detector.camera.expose_window(spread, width, origin, self.key, grey);
-        detector.camera.mean_dn_into(spread, noise_free);
-        self.electrons.add(spread, width, first);
-        if let Some(feathered) = late {
-            restore_finished(detector, feathered, first * width, sharp, grey, noise_free);
+        let rendering = self.rendering;
+        let (scene, detector) = (&rendering.scene, &rendering.detector);
+        let (width, channels) = (scene.view.width, scene.channels());
+        let pixels = spread.first().map_or(0, |channel| channel.len());
+        let late = scene.restoration.restore == Restore::AfterDetection;
+        if !late {
+            rendering.restore_light(first * width, sharp, spread);
         }
+        rendering.count(spread);
+        let here = first * width * channels..(first * width + pixels) * channels;
+        let (grey, noise_free) = (&mut self.plane.grey[here.clone()], &mut self.plane.noise_free[here]);
+        detector.expose(spread, width, first, &self.keys, grey, self.developing);
+        detector.mean_dn_into(spread, noise_free, self.developing);
+        for (sums, electrons) in self.electrons.iter_mut().zip(spread.iter()) {
+            sums.add(electrons, width, first);
+        }
+        if let (true, Some(feathered)) = (late, &rendering.feathered) {
+            let clean = rendering.clean(sharp, noise_free, self.developing);
+            restore_finished(feathered, first * width, channels, &clean, grey, noise_free);
+        }
+    }
+
+    /// What is done to a whole frame.
+    fn finish(&mut self) {
+        let Plane { grey, saturated, .. } = &mut *self.plane;
+        let width = self.rendering.scene.view.width;
+        self.rendering.detector.finish(width, &self.keys, grey, self.developing);
+        *saturated = self.developing.saturated();
+    }
+}
+
+impl Rendering {
+    /// Rows as a camera without noise shows restored nuclei.
+    fn clean(&self, sharp: &[f32], noise_free: &[f32], developing: &mut Developing) -> Vec<f32> {
+        if sharp.is_empty() {
+            // They were restored on their way here.
+            return noise_free.to_vec();
+        }
+        let mut electrons = sharp.to_vec();
+        self.detector.electrons(0, &mut electrons);
+        let mut clean = vec![0.0; sharp.len()];
+        self.detector.mean_dn_into(&[&mut electrons], &mut clean, developing);
+        clean
     }
 }
 
@@ -256,36 +358,24 @@ impl<'a> MaskSums<'a> {
     }
 }
 
-/// Eq. 15 on light, for rows that start at pixel `first`.
-fn restore_light(feathered: Option<&Feathered>, first: usize, sharp: &[f32], spread: &mut [f32]) {
-    let Some(feathered) = feathered else { return };
-    for (span, shares) in feathered.within(first, spread.len()) {
-        restore(&mut spread[span.clone()], &sharp[span], shares);
-    }
-}
-
-/// Eq. 15 on finished grey levels: restored nuclei carry no noise of this camera.
+/// Eq. 15 on finished grey levels of rows that start at pixel `first`: restored nuclei carry no noise of this camera.
 fn restore_finished(
-    detector: &Detector,
     feathered: &Feathered,
     first: usize,
-    sharp: &[f32],
+    channels: usize,
+    clean: &[f32],
     grey: &mut [u16],
     noise_free: &mut [f32],
 ) {
-    let (mut electrons, mut clean) = (Vec::new(), Vec::new());
-    for (span, shares) in feathered.within(first, sharp.len()) {
-        electrons.clear();
-        electrons.extend_from_slice(&sharp[span.clone()]);
-        detector.electrons(&mut electrons);
-        clean.resize(electrons.len(), 0.0);
-        detector.camera.mean_dn_into(&electrons, &mut clean);
-        restore(&mut noise_free[span.clone()], &clean, shares);
-        for ((grey, clean), share) in grey[span].iter_mut().zip(&clean).zip(shares) {
-            let seen = f32::from(*grey);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
-            let restored = (seen + share * (clean - seen) + 0.5) as u16;
-            *grey = restored;
+    for (span, shares) in feathered.within(first, clean.len() / channels) {
+        for (pixel, share) in span.zip(shares) {
+            for at in pixel * channels..(pixel + 1) * channels {
+                let blend = |seen: f32| seen + share * (clean[at] - seen);
+                noise_free[at] = blend(noise_free[at]);
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
+                let restored = (blend(f32::from(grey[at])) + 0.5) as u16;
+                grey[at] = restored;
+            }
         }
     }
 }

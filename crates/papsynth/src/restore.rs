@@ -1,11 +1,13 @@
 //! Nucleus restoration (Eqs. 15–16): what was imaged once is not blurred again.
 
 use core::ops::Range;
+use std::borrow::Cow;
 
 use optics_psf::{Border, Gaussian, Scratch};
 
 use crate::phantom::Phantom;
 use crate::phantom::tile::{Tile, lay};
+use crate::recipe::Restore;
 use crate::scene::Scene;
 use crate::transmit::BAND;
 use crate::truth::COVERED;
@@ -21,15 +23,20 @@ pub(crate) struct Feathered {
 }
 
 impl Feathered {
-    /// Nothing if there are no such nuclei.
+    /// Nothing if there are no such nuclei, or none is to be restored.
     pub(crate) fn new(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Self>, String> {
-        let view = scene.view;
-        let imaged: Vec<&Tile> =
-            phantoms.iter().flat_map(|p| &p.pieces).filter(|piece| piece.imaged).map(|piece| &piece.coverage).collect();
+        let (view, n) = (scene.view, scene.oversampling());
+        if scene.restoration.restore == Restore::Off {
+            return Ok(None);
+        }
+        let pieces = phantoms.iter().flat_map(|p| &p.pieces).filter(|piece| piece.imaged);
+        let imaged: Vec<Cow<'_, Tile>> = pieces
+            .map(|piece| if n == 1 { Cow::Borrowed(&piece.coverage) } else { Cow::Owned(piece.coverage.coarsened(n)) })
+            .collect();
         if imaged.is_empty() {
             return Ok(None);
         }
-        let feather = Gaussian::new(scene.optics.restore_feather_um / view.pixel_um).map_err(|e| e.to_string())?;
+        let feather = Gaussian::new(scene.restoration.feather_um / view.pixel_um).map_err(|e| e.to_string())?;
         let mut feathered = Self { spans: Vec::new(), starts: Vec::new(), shares: Vec::new() };
         let (mut slab, mut shares, mut scratch) = (Vec::new(), Vec::new(), Scratch::default());
         for first in (0..view.height).step_by(BAND) {
@@ -37,8 +44,9 @@ impl Feathered {
             // The rows that these rows' blur reaches.
             let from = first.saturating_sub(feather.radius());
             let to = (end + feather.radius()).min(view.height);
-            let near =
-                |tile: &&&Tile| tile.origin[1] < to as i64 && tile.origin[1] + tile.height() as i64 > from as i64;
+            let near = |tile: &&Cow<'_, Tile>| {
+                tile.origin[1] < to as i64 && tile.origin[1] + tile.height() as i64 > from as i64
+            };
             let mut near = imaged.iter().filter(near).peekable();
             if near.peek().is_none() {
                 continue;
@@ -46,7 +54,7 @@ impl Feathered {
             slab.clear();
             slab.resize((to - from) * view.width, 0.0);
             for tile in near {
-                lay(&mut slab, view.width, from, tile.as_ref(), |row, shares| {
+                lay(&mut slab, view.width, from, Tile::as_ref(tile), |row, shares| {
                     row.iter_mut().zip(shares).filter(|(_, s)| **s >= COVERED).for_each(|(pixel, _)| *pixel = 1.0);
                 });
             }

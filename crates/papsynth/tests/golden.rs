@@ -9,6 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
+use image::ColorType;
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
@@ -49,15 +50,22 @@ fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
     let actual: Vec<u8> = frame.planes[0].grey.iter().map(|g| u8::try_from(*g).unwrap_or(u8::MAX)).collect();
     let (width, height) = (view.width as u32, view.height as u32);
     let golden = recipe_path.with_extension("png");
-    let actual = image::GrayImage::from_raw(width, height, actual).ok_or_else(|| format!("{name}: size"))?;
+    let colour = match frame.planes[0].channels {
+        1 => ColorType::L8,
+        _ => ColorType::Rgb8,
+    };
+    let save = |path: &Path, pixels: &[u8]| {
+        image::save_buffer(path, pixels, width, height, colour).map_err(|e| format!("{name}: {e}"))
+    };
     if bless {
-        return actual.save(&golden).map_err(|e| format!("{name}: {e}"));
+        return save(&golden, &actual);
     }
-    let expected = image::open(&golden).map_err(|e| format!("{name}: {e}"))?.to_luma8();
-    if expected.dimensions() != actual.dimensions() {
-        return Err(format!("{name}: {:?} instead of {:?} pixels", actual.dimensions(), expected.dimensions()));
+    let expected = image::open(&golden).map_err(|e| format!("{name}: {e}"))?;
+    if (expected.width(), expected.height(), expected.color()) != (width, height, colour) {
+        return Err(format!("{name}: {width} x {height} {colour:?}, not as the golden image"));
     }
-    let difference: Vec<u8> = actual.iter().zip(expected.iter()).map(|(a, b)| a.abs_diff(*b)).collect();
+    let expected = expected.into_bytes();
+    let difference: Vec<u8> = actual.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).collect();
     let largest = difference.iter().copied().max().unwrap_or(0);
     let differing = difference.iter().filter(|d| **d > 0).count();
     if largest <= LARGEST && differing as f64 <= SHARE * difference.len() as f64 {
@@ -65,10 +73,8 @@ fn compare(recipe_path: &Path, bless: bool) -> Result<(), String> {
     }
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden");
     std::fs::create_dir_all(&out).map_err(|e| format!("{name}: {e}"))?;
-    actual.save(out.join(format!("{name}.actual.png"))).map_err(|e| format!("{name}: {e}"))?;
-    let shown = difference.iter().map(|d| d.saturating_mul(32)).collect();
-    if let Some(picture) = image::GrayImage::from_raw(width, height, shown) {
-        picture.save(out.join(format!("{name}.difference.png"))).map_err(|e| format!("{name}: {e}"))?;
-    }
+    save(&out.join(format!("{name}.actual.png")), &actual)?;
+    let shown: Vec<u8> = difference.iter().map(|d| d.saturating_mul(32)).collect();
+    save(&out.join(format!("{name}.difference.png")), &shown)?;
     Err(format!("{name}: {differing} pixels differ, by up to {largest} grey levels; see {}", out.display()))
 }

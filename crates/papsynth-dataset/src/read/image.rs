@@ -5,7 +5,7 @@ use std::path::Path;
 use papsynth::truth::LabelMap;
 
 use super::png::{self, Meaning};
-use super::raster::{Raster, Samples};
+use super::raster::{Channels, Raster, Samples};
 use super::{Limits, parse, tiff};
 use crate::error::{Error, Problem};
 
@@ -32,18 +32,12 @@ impl GreyImage {
     /// # Errors
     /// If the bytes are not a whole image of grey pixels within the limits.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
-        let raster = decode(bytes, limits, Meaning::Brightness)?;
+        Self::of(decode(bytes, limits, Meaning::Brightness)?)
+    }
+
+    fn of(raster: Raster) -> Result<Self, Problem> {
         let width = raster.width;
-        let (grey, white) = match raster.grey()? {
-            Samples::U8(samples) => (samples.into_iter().map(u16::from).collect(), u8::MAX.into()),
-            Samples::U16(samples) => (samples, u16::MAX),
-            Samples::U32(_) => {
-                return Err(Problem::Samples {
-                    found: "32 bit samples".to_owned(),
-                    accepted: "8 or 16 bit grey images",
-                });
-            }
-        };
+        let (grey, white) = levels(raster.grey()?)?;
         Ok(Self { width, grey, white })
     }
 
@@ -69,6 +63,50 @@ impl GreyImage {
     }
 }
 
+/// An image in grey levels or in colour.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LevelImage {
+    pub(crate) width: usize,
+    /// 1, or 3 for red, green and blue.
+    pub(crate) channels: usize,
+    /// Levels `0..=white`, row by row, the channels of a pixel side by side.
+    pub(crate) levels: Vec<u16>,
+    pub(crate) white: u16,
+}
+
+impl LevelImage {
+    pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
+        parse(path, limits, |bytes| {
+            let raster = decode(bytes, limits, Meaning::Brightness)?;
+            if raster.channels != Channels::Rgb {
+                let GreyImage { width, grey: levels, white } = GreyImage::of(raster)?;
+                return Ok(Self { width, channels: 1, levels, white });
+            }
+            let width = raster.width;
+            let (levels, white) = levels(raster.samples)?;
+            Ok(Self { width, channels: 3, levels, white })
+        })
+    }
+
+    pub(crate) fn height(&self) -> usize {
+        self.levels.len() / (self.width * self.channels).max(1)
+    }
+
+    pub(crate) fn level(&self, x: usize, y: usize, channel: usize) -> u16 {
+        self.levels[(y * self.width + x) * self.channels + channel]
+    }
+}
+
+fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
+    match samples {
+        Samples::U8(samples) => Ok((samples.into_iter().map(u16::from).collect(), u8::MAX.into())),
+        Samples::U16(samples) => Ok((samples, u16::MAX)),
+        Samples::U32(_) | Samples::F32(_) => {
+            Err(Problem::Samples { found: "32 bit samples".to_owned(), accepted: "8 or 16 bit grey images" })
+        }
+    }
+}
+
 /// Decodes a PNG or TIFF file of labels; 0 is no object.
 ///
 /// # Errors
@@ -80,6 +118,12 @@ pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
         Samples::U8(samples) => samples.into_iter().map(u32::from).collect(),
         Samples::U16(samples) => samples.into_iter().map(u32::from).collect(),
         Samples::U32(samples) => samples,
+        Samples::F32(_) => {
+            return Err(Problem::Samples {
+                found: "floating-point samples".to_owned(),
+                accepted: "8, 16 or 32 bit labels",
+            });
+        }
     };
     Ok(LabelMap { width, ids })
 }
@@ -92,14 +136,20 @@ pub fn read_label_map(path: &Path, limits: &Limits) -> Result<LabelMap, Error> {
     parse(path, limits, |bytes| label_map(bytes, limits))
 }
 
-fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+/// The one image of a file.
+pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
     if bytes.starts_with(PNG_SIGNATURE) {
         png::decode(bytes, limits, meaning)
-    } else if TIFF_SIGNATURES.iter().any(|s| bytes.starts_with(s)) {
+    } else if is_tiff(bytes) {
         tiff::decode(bytes, limits)
     } else if bytes.len() < PNG_SIGNATURE.len() && PNG_SIGNATURE.starts_with(bytes) && !bytes.is_empty() {
         Err(Problem::Truncated { format: "PNG" })
     } else {
         Err(Problem::Format)
     }
+}
+
+/// Whether a file begins as a TIFF does.
+pub(super) fn is_tiff(bytes: &[u8]) -> bool {
+    TIFF_SIGNATURES.iter().any(|s| bytes.starts_with(s))
 }

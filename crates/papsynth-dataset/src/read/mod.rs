@@ -15,6 +15,7 @@ mod nucleus;
 mod outlines;
 mod png;
 mod raster;
+mod stack;
 mod tiff;
 mod weights;
 
@@ -23,9 +24,11 @@ use std::io::{self, Read};
 use std::path::Path;
 
 pub use components::{Component, components};
+pub(crate) use image::LevelImage;
 pub use image::{GreyImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
+pub use stack::{Stack, natural_order};
 pub use weights::{InputFile, label_weights, read_inputs, weights};
 
 use crate::error::{Error, Problem};

@@ -8,6 +8,7 @@ pub(super) enum Samples {
     U8(Vec<u8>),
     U16(Vec<u16>),
     U32(Vec<u32>),
+    F32(Vec<f32>),
 }
 
 /// Channels of a pixel.
@@ -17,6 +18,17 @@ pub(super) enum Channels {
     GreyAlpha,
     Rgb,
     Rgba,
+}
+
+impl Channels {
+    pub(super) fn count(self) -> usize {
+        match self {
+            Self::Grey => 1,
+            Self::GreyAlpha => 2,
+            Self::Rgb => 3,
+            Self::Rgba => 4,
+        }
+    }
 }
 
 /// A decoded image of one, two, three or four channels.
@@ -35,16 +47,17 @@ impl Raster {
             Samples::U8(samples) => Samples::U8(grey(samples, channels, u8::MAX, width)?),
             Samples::U16(samples) => Samples::U16(grey(samples, channels, u16::MAX, width)?),
             Samples::U32(samples) => Samples::U32(grey(samples, channels, u32::MAX, width)?),
+            Samples::F32(samples) => Samples::F32(grey(samples, channels, 1.0, width)?),
         })
     }
 }
 
 fn grey<T: Copy + PartialEq>(samples: Vec<T>, channels: Channels, opaque: T, width: usize) -> Result<Vec<T>, Problem> {
-    let (count, colours) = match channels {
+    let count = channels.count();
+    let colours = match channels {
         Channels::Grey => return Ok(samples),
-        Channels::GreyAlpha => (2, 1),
-        Channels::Rgb => (3, 3),
-        Channels::Rgba => (4, 3),
+        Channels::GreyAlpha => 1,
+        Channels::Rgb | Channels::Rgba => 3,
     };
     let pixels = samples.chunks_exact(count).enumerate();
     pixels

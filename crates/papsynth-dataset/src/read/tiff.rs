@@ -11,30 +11,70 @@ use super::raster::{Channels, Raster, Samples};
 use crate::error::Problem;
 
 const ACCEPTED: &str = "8 or 16 bit (labels: also 32 bit) unsigned grey samples";
+const ACCEPTED_PAGES: &str = "8, 16 or 32 bit unsigned or 32 bit floating-point grey samples";
 
 /// `PlanarConfiguration`: the channels of a pixel stand together.
 const CHUNKY: u16 = 1;
 
+/// At one of the images of a file.
+type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
+
+/// The one image of a file.
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
+    if decoder.more_images() {
+        // What is wrong with the first is told before.
+        shape(&mut decoder, limits, ACCEPTED)?;
+        return Err(Problem::Pages);
+    }
+    match page(decoder, limits, ACCEPTED)?.0 {
+        Raster { samples: Samples::F32(_), .. } => {
+            Err(Problem::Samples { found: "floating-point samples".to_owned(), accepted: ACCEPTED })
+        }
+        raster => Ok(raster),
+    }
+}
+
+/// Hands over the images of a file, one after the other.
+pub(super) fn pages(
+    bytes: &[u8],
+    limits: &Limits,
+    mut take: impl FnMut(Raster) -> Result<(), Problem>,
+) -> Result<(), Problem> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
+    loop {
+        let (raster, rest) = page(decoder, limits, ACCEPTED_PAGES)?;
+        take(raster)?;
+        decoder = rest;
+        if !decoder.more_images() {
+            return Ok(());
+        }
+        decoder.next_image().map_err(problem)?;
+    }
+}
+
+/// Columns, pixels, and channels of the image that the decoder is at.
+fn shape(decoder: &mut Reader, limits: &Limits, accepted: &'static str) -> Result<(usize, usize, Channels), Problem> {
     let (width, height) = decoder.dimensions().map_err(problem)?;
     limits.check(width, height)?;
     let colour = decoder.colortype().map_err(problem)?;
-    let (channels, count) = match colour {
-        ColorType::Gray(8 | 16 | 32) => (Channels::Grey, 1),
-        ColorType::GrayA(8 | 16) => (Channels::GreyAlpha, 2),
-        ColorType::RGB(8 | 16) => (Channels::Rgb, 3),
-        ColorType::RGBA(8 | 16) => (Channels::Rgba, 4),
-        other => return Err(Problem::Samples { found: format!("{other:?} samples"), accepted: ACCEPTED }),
+    let channels = match colour {
+        ColorType::Gray(8 | 16 | 32) => Channels::Grey,
+        ColorType::GrayA(8 | 16) => Channels::GreyAlpha,
+        ColorType::RGB(8 | 16) => Channels::Rgb,
+        ColorType::RGBA(8 | 16) => Channels::Rgba,
+        other => return Err(Problem::Samples { found: format!("{other:?} samples"), accepted }),
     };
     let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).map_err(problem)?;
-    if count > 1 && planar.is_some_and(|p| p != CHUNKY) {
-        return Err(Problem::Samples { found: "channels in separate planes".to_owned(), accepted: ACCEPTED });
+    if channels.count() > 1 && planar.is_some_and(|p| p != CHUNKY) {
+        return Err(Problem::Samples { found: "channels in separate planes".to_owned(), accepted });
     }
-    if decoder.more_images() {
-        return Err(Problem::Pages);
-    }
-    let pixels = width as usize * height as usize;
+    Ok((width as usize, width as usize * height as usize, channels))
+}
+
+/// The image that the decoder is at.
+fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) -> Result<(Raster, Reader<'a>), Problem> {
+    let (width, pixels, channels) = shape(&mut decoder, limits, accepted)?;
     let mut tiff_limits = tiff::decoder::Limits::default();
     // Four channels of two bytes, or one of four.
     tiff_limits.decoding_buffer_size = pixels.saturating_mul(8);
@@ -44,20 +84,22 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
         DecodingResult::U8(samples) => Samples::U8(samples),
         DecodingResult::U16(samples) => Samples::U16(samples),
         DecodingResult::U32(samples) => Samples::U32(samples),
-        DecodingResult::F16(_) | DecodingResult::F32(_) | DecodingResult::F64(_) => {
-            return Err(Problem::Samples { found: "floating-point samples".to_owned(), accepted: ACCEPTED });
+        DecodingResult::F32(samples) => Samples::F32(samples),
+        DecodingResult::F16(_) | DecodingResult::F64(_) => {
+            return Err(Problem::Samples { found: "floating-point samples".to_owned(), accepted });
         }
-        _ => return Err(Problem::Samples { found: "signed or 64 bit samples".to_owned(), accepted: ACCEPTED }),
+        _ => return Err(Problem::Samples { found: "signed or 64 bit samples".to_owned(), accepted }),
     };
     let found = match &samples {
         Samples::U8(s) => s.len(),
         Samples::U16(s) => s.len(),
         Samples::U32(s) => s.len(),
+        Samples::F32(s) => s.len(),
     };
-    if found != pixels * count {
+    if found != pixels * channels.count() {
         return Err(Problem::Broken { format: "TIFF", message: format!("{found} samples for {pixels} pixels") });
     }
-    Ok(Raster { width: width as usize, channels, samples })
+    Ok((Raster { width, channels, samples }, decoder))
 }
 
 fn problem(error: TiffError) -> Problem {

@@ -5,5 +5,5 @@ mod png;
 mod tiff;
 
 pub(crate) use ome::description;
-pub(crate) use png::{grey_png, rgb_png};
+pub(crate) use png::{png, rgb_png};
 pub(crate) use tiff::{PageWriter, Pixels, compressed, label_tiff};

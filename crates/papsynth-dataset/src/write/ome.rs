@@ -8,7 +8,7 @@ const MICROMETRE: &str = "&#181;m";
 
 /// The description of a focus stack, one page a plane in the order of the geometry.
 pub(crate) fn description(geometry: &Geometry) -> String {
-    let Geometry { view, bits, planes_um: planes, .. } = geometry;
+    let Geometry { view, bits, channels, planes_um: planes, .. } = geometry;
     let bits = *bits;
     let kind = if bits <= 8 { "uint8" } else { "uint16" };
     let step = match planes.as_slice() {
@@ -31,14 +31,17 @@ pub(crate) fn description(geometry: &Geometry) -> String {
          xsi:schemaLocation=\"http://www.openmicroscopy.org/Schemas/OME/2016-06 \
          http://www.openmicroscopy.org/Schemas/OME/2016-06/ome.xsd\" Creator=\"papsynth\">\
          <Image ID=\"Image:0\" Name=\"{name}\">\
-         <Pixels ID=\"Pixels:0\" DimensionOrder=\"XYZCT\" Type=\"{kind}\" SignificantBits=\"{bits}\" \
-         SizeX=\"{width}\" SizeY=\"{height}\" SizeZ=\"{count}\" SizeC=\"1\" SizeT=\"1\" \
+         <Pixels ID=\"Pixels:0\" DimensionOrder=\"{order}\"{interleaved} Type=\"{kind}\" SignificantBits=\"{bits}\" \
+         SizeX=\"{width}\" SizeY=\"{height}\" SizeZ=\"{count}\" SizeC=\"{channels}\" SizeT=\"1\" \
          PhysicalSizeX=\"{pixel}\" PhysicalSizeXUnit=\"{MICROMETRE}\" \
          PhysicalSizeY=\"{pixel}\" PhysicalSizeYUnit=\"{MICROMETRE}\"{step}>\
-         <Channel ID=\"Channel:0:0\" SamplesPerPixel=\"1\"/>\
+         <Channel ID=\"Channel:0:0\" SamplesPerPixel=\"{channels}\"/>\
          <TiffData IFD=\"0\" PlaneCount=\"{count}\"/>\
          {positions}</Pixels></Image></OME>",
         name = frame_name(geometry.key.index),
+        // The samples of a pixel lie side by side.
+        order = if *channels == 1 { "XYZCT" } else { "XYCZT" },
+        interleaved = if *channels == 1 { "" } else { " Interleaved=\"true\"" },
         width = view.width,
         height = view.height,
         count = planes.len(),

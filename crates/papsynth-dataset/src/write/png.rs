@@ -4,18 +4,18 @@ use std::io;
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter, PixelDimensions, Unit};
 
-/// A grey image of 8 bits if `bits` are no more, else 16; `pixel_um` goes into its physical size.
-pub(crate) fn grey_png(grey: &[u16], width: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
+/// A grey image or one in colour, of 8 bits if `bits` are no more, else 16; `pixel_um` goes into its physical size.
+pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
     let (bytes, depth): (Vec<u8>, _) = if bits <= 8 {
         #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]
-        let narrow = grey.iter().map(|&g| g as u8).collect();
+        let narrow = levels.iter().map(|&g| g as u8).collect();
         (narrow, BitDepth::Eight)
     } else {
-        (grey.iter().flat_map(|g| g.to_be_bytes()).collect(), BitDepth::Sixteen)
+        (levels.iter().flat_map(|g| g.to_be_bytes()).collect(), BitDepth::Sixteen)
     };
     let mut out = Vec::with_capacity(bytes.len());
-    let mut encoder = Encoder::new(&mut out, side(width)?, side(grey.len() / width.max(1))?);
-    encoder.set_color(ColorType::Grayscale);
+    let mut encoder = Encoder::new(&mut out, side(width)?, side(levels.len() / (width * channels).max(1))?);
+    encoder.set_color(if channels == 3 { ColorType::Rgb } else { ColorType::Grayscale });
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
     // One filter for all rows: as small on noisy images as a choice for each row, and twice as fast.

@@ -3,7 +3,7 @@
 use std::io::{Cursor, Seek, Write};
 
 use tiff::TiffResult;
-use tiff::encoder::colortype::{ColorType, Gray8, Gray16, Gray32, Gray32Float};
+use tiff::encoder::colortype::{ColorType, Gray8, Gray16, Gray32, Gray32Float, RGB8, RGB16, RGB32Float};
 use tiff::encoder::{
     Compression, DeflateLevel, Predictor, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue,
 };
@@ -38,17 +38,18 @@ impl<W: Write + Seek> PageWriter<W> {
         })
     }
 
-    /// Writes a page; `description` is ASCII.
+    /// Writes a page of one channel or of three; `description` is ASCII.
     pub(crate) fn write(
         &mut self,
         pixels: Pixels,
         width: usize,
+        channels: usize,
         pixel_um: f64,
         description: Option<&str>,
     ) -> TiffResult<()> {
         match self {
-            Self::Classic(encoder) => page(encoder, pixels, width, pixel_um, description),
-            Self::Big(encoder) => page(encoder, pixels, width, pixel_um, description),
+            Self::Classic(encoder) => page(encoder, pixels, width, channels, pixel_um, description),
+            Self::Big(encoder) => page(encoder, pixels, width, channels, pixel_um, description),
         }
     }
 }
@@ -69,7 +70,7 @@ pub(crate) fn compressed(pixels: Pixels, width: usize, pixel_um: f64) -> TiffRes
     let mut encoder = TiffEncoder::new(&mut out)?
         .with_compression(Compression::Deflate(DeflateLevel::Fast))
         .with_predictor(Predictor::Horizontal);
-    page(&mut encoder, pixels, width, pixel_um, None)?;
+    page(&mut encoder, pixels, width, 1, pixel_um, None)?;
     Ok(out.into_inner())
 }
 
@@ -77,10 +78,14 @@ fn page<W: Write + Seek, K: TiffKind>(
     encoder: &mut TiffEncoder<W, K>,
     pixels: Pixels,
     width: usize,
+    channels: usize,
     pixel_um: f64,
     description: Option<&str>,
 ) -> TiffResult<()> {
     match pixels {
+        Pixels::U8(data) if channels == 3 => image::<_, RGB8, _>(encoder, data, width, pixel_um, description),
+        Pixels::U16(data) if channels == 3 => image::<_, RGB16, _>(encoder, data, width, pixel_um, description),
+        Pixels::F32(data) if channels == 3 => image::<_, RGB32Float, _>(encoder, data, width, pixel_um, description),
         Pixels::U8(data) => image::<_, Gray8, _>(encoder, data, width, pixel_um, description),
         Pixels::U16(data) => image::<_, Gray16, _>(encoder, data, width, pixel_um, description),
         Pixels::U32(data) => image::<_, Gray32, _>(encoder, data, width, pixel_um, description),
@@ -98,7 +103,7 @@ fn image<W: Write + Seek, C: ColorType, K: TiffKind>(
 where
     [C::Inner]: TiffValue,
 {
-    let height = data.len() / width.max(1);
+    let height = data.len() / (width * C::BITS_PER_SAMPLE.len()).max(1);
     let mut image = encoder.new_image::<C>(u32::try_from(width)?, u32::try_from(height)?)?;
     let tags = image.encoder();
     if let Some(text) = description {

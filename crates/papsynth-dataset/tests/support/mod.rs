@@ -6,9 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use papsynth::key::Key;
-use papsynth::recipe::{PhotonNoise, Recipe, Restore};
-use papsynth::scene::{Kind, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View};
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Truth, front_masks};
+use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
+use papsynth::scene::{
+    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics, View,
+};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Truth, front_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
@@ -76,6 +78,7 @@ pub(crate) fn class() -> String {
 pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
+        slide: index / 16,
         view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
         background: SceneBackground {
@@ -84,18 +87,31 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             scatter: 0.01,
             scatter_um: 60.0,
         },
-        optics: SceneOptics {
-            sigma_xy_um: 0.225,
-            sigma_z_um_per_um: 0.25,
-            restore: Restore::Off,
-            restore_feather_um: 1.0,
-        },
+        light: SceneLight::Monochrome { wavelength_um: 0.57, bandwidth_um: 0.01 },
+        optics: SceneOptics::Gaussian { sigma_xy_um: 0.225, sigma_z_um_per_um: 0.25 },
+        restoration: Restoration { restore: Restore::Off, feather_um: 1.0 },
+        dyes: SceneDyes { nucleus: [0.0; 5], bacillus: [0.0; 5], speckle: [0.0; 5] },
         camera: SceneCamera {
             bits,
             full_well_e: 17_600.0,
             read_noise_e: 8.0,
+            read_noise_rms_e: 0.0,
             offset_dn: 0.0,
             photon_noise: PhotonNoise::Exact,
+            prnu: 0.0,
+            dsnu_e: 0.0,
+            serial: 1,
+            exposure_s: 0.02,
+            dark_current_e_per_s: 0.0,
+            dark_reference_c: 25.0,
+            temperature_c: 25.0,
+            dark_doubling_c: 8.0,
+            blooming: 0.0,
+            blooming_vertical: 0.95,
+            binning_px: 1,
+            binning: Binning::Charge,
+            jpeg_quality: 0,
+            jpeg_subsampling: Subsampling::Squares,
         },
         objects: Vec::new(),
     }
@@ -123,6 +139,7 @@ fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &
         centre_um: [3.25, 7.5],
         depth_um,
         stain: 0.3,
+        tint: if part == Part::Cytoplasm { "cyanophilic" } else { "" },
         rotation_deg: 12.5,
         area_um2: amodal.area() as f64 / 16.0,
         truncated: amodal.bounds().is_some_and(|b| b.x == 0),
@@ -135,7 +152,18 @@ fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &
 
 /// Two cells of which one overlaps the other, and two things that are no cell. `first_id` is that of the first cell.
 pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Frame {
-    let scene = scene(index, planes, bits);
+    frame_of(scene(index, planes, bits), first_id)
+}
+
+/// The same in colour.
+pub(crate) fn colour_frame(index: u64, planes: usize, bits: u32) -> Frame {
+    let light =
+        SceneLight::Colour { lamp_k: 3200.0, mixing: Mixing::Spectral, chromatic_um: 0.3, rendition: Rendition::Srgb };
+    frame_of(Scene { light, ..scene(index, planes, bits) }, 1)
+}
+
+fn frame_of(scene: Scene, first_id: u32) -> Frame {
+    let (index, planes, bits, channels) = (scene.key.index, scene.planes_um.len(), scene.camera.bits, scene.channels());
     let (class, z) = (class(), &scene.planes_um);
     let shift = (index % 7) as f32;
     let near = first_id + 1;
@@ -161,10 +189,10 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
     let truth = Truth { width: WIDTH, height: HEIGHT, objects };
     let labels = Group::ALL.map(|group| truth.labels(group));
     let white = u16::try_from((1_u32 << bits) - 1).unwrap();
-    let all_in_focus: Vec<f32> = (0..WIDTH * HEIGHT)
+    let all_in_focus: Vec<f32> = (0..WIDTH * HEIGHT * channels)
         .map(|i| {
-            let ids = labels.iter().filter(|l| l.ids[i] > 0).count() as f32;
-            f32::from(white) * (0.9 - 0.25 * ids)
+            let ids = labels.iter().filter(|l| l.ids[i / channels] > 0).count() as f32;
+            f32::from(white) * (0.9 - 0.25 * ids - 0.05 * (i % channels) as f32)
         })
         .collect();
     let planes = (0..planes)
@@ -176,7 +204,11 @@ pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Fram
                 let noise = (state >> 40) as f32 / (1 << 24) as f32 - 0.5;
                 (v + noise * 0.05 * f32::from(white)).clamp(0.0, f32::from(white)) as u16
             });
-            Plane { index: z, depth_um: scene.planes_um[z], grey: grey.collect(), noise_free, saturated: z }
+            let (grey, stage_um) = (grey.collect(), scene.planes_um[z]);
+            // As many saturated pixels as the number of the plane.
+            let run = Run { y: 0, x0: 3, x1: 3 + z as u32 };
+            let saturated = Mask::from_runs(if z > 0 { vec![run] } else { Vec::new() });
+            Plane { index: z, stage_um, channels, grey, noise_free, saturated, floored: 0 }
         })
         .collect();
     Frame { planes, finished: Finished { scene, truth, all_in_focus } }

@@ -9,13 +9,13 @@ use crate::scene::{Body, Object, Scene};
 const PARTS: usize = 6;
 
 pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
-    let Body::Bacillus { length_um, width_um, bend_deg, absorbance } = object.body else {
+    let Body::Bacillus { length_um, width_um, bend_deg, absorbance, phase_rad } = object.body else {
         return Phantom { pieces: Vec::new(), traits: Vec::new() };
     };
-    let pixel = scene.view.pixel_um;
+    let pixel = scene.grid().pixel_um;
     let half_width = 0.5 * width_um / pixel;
     let spine = spine((length_um - width_um).max(0.0) / pixel, bend_deg.to_radians());
-    let centre = scene.view.to_px(object.centre_um);
+    let centre = scene.grid().to_px(object.centre_um);
     let spine: Vec<Point> = spine.iter().map(|p| placed(*p, object.rotation_deg.to_radians(), centre)).collect();
     let mut coverage = Tile::around(&spine, half_width + 2.0);
     coverage.for_each(|p, value| {
@@ -25,10 +25,10 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
     });
     let mut tile = coverage.clone();
     for value in &mut tile.values {
-        *value *= absorbance as f32;
+        *value *= absorbance.max(super::LEAST_ABSORBANCE) as f32;
     }
     let area = (length_um - width_um).max(0.0) * width_um + core::f64::consts::FRAC_PI_4 * width_um * width_um;
-    Phantom::whole(tile, coverage, area / (pixel * pixel))
+    Phantom::whole(tile, coverage, area / (pixel * pixel), scene.dyes.bacillus).refracting(phase_rad, absorbance)
 }
 
 /// The middle line of a rod: an arc of a circle about the origin.

@@ -27,6 +27,9 @@ const GRANULE: f64 = 0.75;
 /// Largest angle between the two creases of a cell that is folded from both sides, radians.
 const SKEW: f64 = 0.45;
 
+/// Distance between the points of a roughened rim, µm.
+const RIM_STEP_UM: f64 = 0.375;
+
 /// Makes cells, sixteen sheets at a time.
 pub(super) fn make(
     studio: &Studio,
@@ -61,9 +64,9 @@ impl<'a> Plan<'a> {
             .get(&body.class)
             .ok_or_else(|| format!("the scene holds a cell of class `{}`, which its recipe does not", body.class))?;
         let mut rng = scene.key.stream("cell", object.number, "outline");
-        let radius_px = body.radius_um / scene.view.pixel_um;
+        let radius_px = body.radius_um / scene.grid().pixel_um;
         let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
-        let centre = scene.view.to_px(object.centre_um);
+        let centre = scene.grid().to_px(object.centre_um);
         let outline = drawn.descriptors.outline(POINTS);
         let middle = fsd_shape::centroid(&outline);
         let outline: Vec<Point> =
@@ -77,8 +80,8 @@ impl<'a> Plan<'a> {
 /// The lines along which a cell is folded, each with its side turned in.
 fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene: &Scene) -> Vec<Crease> {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
-    let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / scene.view.pixel_um);
-    let nucleus_radius = body.nucleus.radius_um / scene.view.pixel_um;
+    let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / scene.grid().pixel_um);
+    let nucleus_radius = body.nucleus.radius_um / scene.grid().pixel_um;
     let crease = |direction: f64| {
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach =
@@ -94,7 +97,7 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
             // The line runs a quarter turn before the direction that leads beyond it.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
-            radius: fold.radius_um / scene.view.pixel_um,
+            radius: fold.radius_um / scene.grid().pixel_um,
             turn,
         }
     };
@@ -145,14 +148,14 @@ fn finish(
     sheet: Option<Sheet>,
 ) -> Result<Phantom, String> {
     let mut rng = scene.key.stream("cell", object.number, "detail");
-    let pixel_um = scene.view.pixel_um;
+    let pixel_um = scene.grid().pixel_um;
     let mut pieces = vec![plan.outline.clone()];
     for crease in &plan.creases {
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
         pieces = folded.map_err(|e| e.to_string())?.concat();
     }
     let rough: Vec<Vec<Point>> =
-        pieces.iter().map(|piece| roughened(piece, body.detail.fray_um / pixel_um, &mut rng)).collect();
+        pieces.iter().map(|p| roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng)).collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
     for piece in &rough {
         coverage.cover(piece);
@@ -179,10 +182,12 @@ fn finish(
     add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     for (value, cover) in absorbance.values.iter_mut().zip(&coverage.values) {
         // Eq. 12: A = κ·c·l.
-        *value *= cover * body.cytoplasm_absorbance as f32;
+        *value *= cover * body.cytoplasm_absorbance.max(super::LEAST_ABSORBANCE) as f32;
     }
     let area_px = coverage.values.iter().map(|v| f64::from(*v)).sum();
-    let cytoplasm = Piece { part: Part::Cytoplasm, absorbance, coverage, area_px, imaged: false };
+    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(super::LEAST_ABSORBANCE);
+    let dyes = body.dyes;
+    let cytoplasm = Piece { part: Part::Cytoplasm, absorbance, coverage, area_px, imaged: false, dyes, phase_rad };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
@@ -212,13 +217,11 @@ fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, 
 }
 
 /// An outline whose points are pushed in and out a little, finely and unevenly: the frayed rim of a real cell.
-fn roughened(outline: &[Point], depth_px: f64, rng: &mut Stream) -> Vec<Point> {
-    /// Distance between the points of a roughened rim, px.
-    const STEP: f64 = 1.5;
+fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mut Stream) -> Vec<Point> {
     if depth_px < 0.05 || outline.len() < 3 {
         return outline.to_vec();
     }
-    let count = random::count(fsd_shape::perimeter(outline) / STEP).max(outline.len());
+    let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
     let fine = fsd_shape::resample(outline, count);
     // Slow waves say where the rim is frayed, quick ones how: a first-order autoregression of either.
     let (mut slow, mut quick) = (random::normal(rng), random::normal(rng));

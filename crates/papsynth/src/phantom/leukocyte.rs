@@ -24,9 +24,9 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
         return Phantom { pieces: Vec::new(), traits: Vec::new() };
     };
     let mut rng = scene.key.stream("leukocyte", object.number, "shape");
-    let centre = scene.view.to_px(object.centre_um);
+    let centre = scene.grid().to_px(object.centre_um);
     let turn = object.rotation_deg.to_radians();
-    let radius = radius_um / scene.view.pixel_um;
+    let radius = radius_um / scene.grid().pixel_um;
     let place = |shape: Vec<Point>, at: Point| -> Vec<Point> {
         shape.iter().map(|p| placed([p[0] + at[0], p[1] + at[1]], turn, centre)).collect()
     };
@@ -64,7 +64,7 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
         *cover = cover.max(*inside);
     }
     let whole = coverage.values.iter().map(|share| f64::from(*share)).sum();
-    Phantom::whole(tile, coverage, whole)
+    Phantom::whole(tile, coverage, whole, scene.dyes.nucleus)
 }
 
 /// Absorbance of a lobe at its rim, relative to its middle: a lobe is a ball that dries flat.

@@ -14,6 +14,8 @@ mod studio;
 pub(crate) mod tile;
 mod wobble;
 
+use dye_spectra::Amounts;
+
 use crate::scene::{Body, Object, Scene};
 use crate::truth::Part;
 
@@ -34,6 +36,10 @@ pub(crate) struct Piece {
     pub(crate) area_px: f64,
     /// Whether its absorbance was taken from an image, and has been through optics already.
     pub(crate) imaged: bool,
+    /// What stains it, where its absorbance is 1.
+    pub(crate) dyes: Amounts,
+    /// How late light comes, radians, where its absorbance is 1.
+    pub(crate) phase_rad: f64,
 }
 
 /// What an object absorbs.
@@ -75,15 +81,24 @@ pub(crate) fn make(
         .collect())
 }
 
+/// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.
+const LEAST_ABSORBANCE: f64 = 1e-6;
+
 /// Number of objects that are worth making together: the lanes of a batch of sheets.
 pub(crate) const BATCH: usize = 16;
 
 impl Phantom {
     /// A phantom without parts of its own.
-    fn whole(absorbance: Tile, coverage: Tile, area_px: f64) -> Self {
-        Self {
-            pieces: vec![Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false }],
-            traits: Vec::new(),
+    fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
+        let piece = Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false, dyes, phase_rad: 0.0 };
+        Self { pieces: vec![piece], traits: Vec::new() }
+    }
+
+    /// The same, through which light comes late.
+    fn refracting(mut self, phase_rad: f64, absorbance: f64) -> Self {
+        for piece in &mut self.pieces {
+            piece.phase_rad = phase_rad / absorbance.max(LEAST_ABSORBANCE);
         }
+        self
     }
 }

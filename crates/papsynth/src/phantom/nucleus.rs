@@ -34,7 +34,7 @@ pub(super) fn make(
     cell_centre: Point,
 ) -> Result<Piece, String> {
     let nucleus = &body.nucleus;
-    let pixel_um = scene.view.pixel_um;
+    let pixel_um = scene.grid().pixel_um;
     let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
@@ -74,7 +74,15 @@ pub(super) fn make(
         let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
-    Ok(Piece { part: Part::Nucleus, absorbance, coverage, area_px: area(&outline), imaged })
+    Ok(Piece {
+        part: Part::Nucleus,
+        absorbance,
+        coverage,
+        area_px: area(&outline),
+        imaged,
+        dyes: nucleus.dyes,
+        phase_rad: 0.0,
+    })
 }
 
 /// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.

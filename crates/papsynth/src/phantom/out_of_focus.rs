@@ -17,8 +17,8 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
         return Phantom { pieces: Vec::new(), traits: Vec::new() };
     };
     let mut rng = scene.key.stream("out-of-focus", object.number, "shape");
-    let centre = scene.view.to_px(object.centre_um);
-    let radius = radius_um / scene.view.pixel_um;
+    let centre = scene.grid().to_px(object.centre_um);
+    let radius = radius_um / scene.grid().pixel_um;
     let turn = object.rotation_deg.to_radians();
     let shape: Vec<Point> =
         wobbled_circle(radius, alpha, beta, &mut rng).iter().map(|p| placed(*p, turn, centre)).collect();
@@ -26,5 +26,5 @@ pub(super) fn make(scene: &Scene, object: &Object) -> Phantom {
     coverage.cover(&shape);
     let mut tile = coverage.clone();
     textured(&mut tile, centre, NOISE_CELL * radius, 3, NOISE_STRENGTH, absorbance, rng.next_u64());
-    Phantom::whole(tile, coverage, area(&shape))
+    Phantom::whole(tile, coverage, area(&shape), scene.dyes.nucleus)
 }

@@ -51,6 +51,29 @@ impl Tile {
         Self { origin: self.origin, width: self.width, values: vec![0.0; self.values.len()] }
     }
 
+    /// The tile on a grid of pixels `n` times as wide: each the mean of what lies in it.
+    pub(crate) fn coarsened(&self, n: usize) -> Self {
+        let side = n as i64;
+        let origin = self.origin.map(|at| at.div_euclid(side));
+        let length = |axis: usize, length: usize| {
+            let end = self.origin[axis] + length as i64;
+            usize::try_from((end + side - 1).div_euclid(side) - origin[axis]).unwrap_or(0)
+        };
+        let (width, height) = (length(0, self.width), length(1, self.height()));
+        let mut values = vec![0.0; width * height];
+        let weight = 1.0 / (n * n) as f32;
+        let at = |axis: usize, place: usize| {
+            usize::try_from((self.origin[axis] + place as i64).div_euclid(side) - origin[axis]).unwrap_or(0)
+        };
+        for (y, row) in self.values.chunks_exact(self.width).enumerate() {
+            let coarse = &mut values[at(1, y) * width..][..width];
+            for (x, value) in row.iter().enumerate() {
+                coarse[at(0, x)] += weight * value;
+            }
+        }
+        Self { origin, width, values }
+    }
+
     pub(crate) fn height(&self) -> usize {
         self.values.len() / self.width
     }
@@ -93,7 +116,19 @@ pub(crate) fn lay(
     tile: TileRef<'_>,
     mut blend: impl FnMut(&mut [f32], &[f32]),
 ) {
-    let [left, top] = [tile.origin[0], tile.origin[1] - first as i64];
+    lay_at(image, width, [0, first as i64], tile, |row, values| blend(row, values));
+}
+
+/// The same where the first pixel of `image` is pixel `origin`.
+#[inline(always)]
+pub(crate) fn lay_at(
+    image: &mut [f32],
+    width: usize,
+    origin: [i64; 2],
+    tile: TileRef<'_>,
+    mut blend: impl FnMut(&mut [f32], &[f32]),
+) {
+    let [left, top] = [tile.origin[0] - origin[0], tile.origin[1] - origin[1]];
     let column = |x: i64| usize::try_from(x).unwrap_or(0).min(tile.width);
     let (from, to) = (column(-left), column(width as i64 - left));
     if from >= to {

@@ -92,6 +92,8 @@ pub struct Bacilli {
     pub bend_deg: Number,
     /// Absorbance, 0 to 4.
     pub absorbance: Number,
+    /// How late light comes through a bacillus, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
 }
 
 impl Default for Bacilli {
@@ -105,8 +107,19 @@ impl Default for Bacilli {
             width_um: Number::normal(0.55, 0.06),
             bend_deg: Number::uniform(0.0, 30.0),
             absorbance: Number::normal(0.16, 0.03),
+            phase_rad: Number::uniform(0.1, 0.25),
         }
     }
+}
+
+/// How a speck is grown from its two pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpeckForm {
+    /// Round, whatever the pixels.
+    Round,
+    /// The paper's: dilated by a cross of pixels, which makes diamonds.
+    Dilated,
 }
 
 /// Specks of dust and stain ("Speckles").
@@ -115,18 +128,25 @@ impl Default for Bacilli {
 pub struct Speckles {
     /// Number of speckles, 0 to 1000000; drawn once a field.
     pub count: Number,
+    /// How it is grown from its two pixels.
+    pub form: SpeckForm,
     /// How often a speckle is grown by a pixel to all sides (binary dilation), 0 to 50.
     pub dilations: Number,
     /// Absorbance, 0 to 4.
     pub absorbance: Number,
+    /// How late light comes through a speck, radians of phase, -3 to 3: the halo that changes sign with focus. Seen by
+    /// bright-field optics alone.
+    pub phase_rad: Number,
 }
 
 impl Default for Speckles {
     fn default() -> Self {
         Self {
             count: Number::uniform(40.0, 160.0),
+            form: SpeckForm::Round,
             dilations: Number::log_normal(0.35, 0.9),
             absorbance: Number::log_normal(0.07, 0.5),
+            phase_rad: Number::normal(0.25, 0.15),
         }
     }
 }

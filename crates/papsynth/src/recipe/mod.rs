@@ -18,12 +18,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use check::Problem;
-pub use debris::{Bacilli, Debris, Leukocytes, NucleusForm, OutOfFocus, Speckles};
-pub use imaging::{Background, Camera, Field, Focus, Illumination, Optics, PhotonNoise};
+pub use debris::{Bacilli, Debris, Leukocytes, NucleusForm, OutOfFocus, SpeckForm, Speckles};
+pub use imaging::{
+    Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,
+    Rendition, Subsampling,
+};
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use specimen::{
-    Acceptance, CellMix, Chromatin, Cytoplasm, Folds, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet, Slide, Stain,
+    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
+    Slide, Stain, TintMix,
 };
 
 /// The version of recipes that this crate reads and writes.
@@ -55,7 +59,9 @@ pub struct Recipe {
     pub debris: Debris,
     /// The empty slide, as the lamp shows it.
     pub background: Background,
-    /// The spread of light.
+    /// The light: one wavelength or three colours.
+    pub light: Light,
+    /// How light spreads between slide and sensor.
     pub optics: Optics,
     /// The camera.
     pub camera: Camera,
@@ -74,6 +80,18 @@ impl Recipe {
         print::plain_toml(self)
     }
 
+    /// Takes those sections of another recipe whose names are chosen.
+    pub fn replace(&mut self, other: &Self, chosen: impl Fn(&str) -> bool) {
+        macro_rules! take {
+            ($($section:ident),*) => {
+                $(if chosen(stringify!($section)) {
+                    self.$section.clone_from(&other.$section);
+                })*
+            };
+        }
+        take!(field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera);
+    }
+
     /// The JSON schema of recipes.
     #[must_use]
     pub fn schema() -> serde_json::Value {
@@ -84,6 +102,14 @@ impl Recipe {
     #[must_use]
     pub fn problems(&self) -> Vec<Problem> {
         check::problems(self)
+    }
+}
+
+impl Recipe {
+    /// What is legitimate and may surprise, such as a condenser wider than the objective.
+    #[must_use]
+    pub fn notes(&self) -> Vec<Problem> {
+        check::notes(self)
     }
 }
 

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::specimen::defaults;
 use super::{
-    Acceptance, Background, Camera, CellMix, Chromatin, Cytoplasm, Debris, Field, Focus, Folds, Illumination, Layout,
-    Nucleus, NucleusForm, Number, Optics, RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, Stain,
+    Acceptance, Background, Camera, CameraPreset, CellMix, Chromatin, Cytoplasm, Debris, DyeAmounts, Field, Focus,
+    Folds, Illumination, Layout, Light, Nucleus, NucleusForm, Number, Optics, RECIPE_VERSION, Recipe, Restore, Seam,
+    ShapeSpread, Sheet, Slide, SpeckForm, Stain, TintMix,
 };
 
 /// A named recipe.
@@ -76,7 +77,11 @@ impl Preset {
 }
 
 fn mix<const N: usize>(counts: [(&str, Number); N]) -> BTreeMap<String, CellMix> {
-    counts.into_iter().map(|(class, count)| (class.to_owned(), CellMix { count, ..CellMix::default() })).collect()
+    let tints = |class: &str| if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
+    let mix = |(class, count): (&str, Number)| {
+        (class.to_owned(), CellMix { count, tints: tints(class), ..CellMix::default() })
+    };
+    counts.into_iter().map(mix).collect()
 }
 
 fn lbc() -> Recipe {
@@ -96,6 +101,7 @@ fn lbc() -> Recipe {
         stain: Stain::default(),
         debris: Debris::default(),
         background: Background::default(),
+        light: Light::default(),
         optics: Optics::default(),
         camera: Camera::default(),
     }
@@ -155,6 +161,7 @@ fn paper() -> Recipe {
         median_um: 8.0.into(),
         stacking_um: 0.0.into(),
         spacing_um: 0.0.into(),
+        fields: 1,
     };
     recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
     recipe.cells = mix([("intermediate", 30.0.into())]);
@@ -172,6 +179,7 @@ fn paper() -> Recipe {
         granular: 0.0.into(),
         granules: 0.0.into(),
         fray_um: 0.0.into(),
+        phase_rad: 0.0.into(),
     };
     recipe.nucleus = Nucleus {
         shape: ShapeSpread::Independent,
@@ -185,7 +193,23 @@ fn paper() -> Recipe {
         rim: 0.0.into(),
         ..Nucleus::default()
     };
-    recipe.stain = Stain { field_cytoplasm: 1.0.into(), field_nucleus: 1.0.into(), field_texture: 1.0.into() };
+    // The paper's stain is a grey value.
+    recipe.stain = Stain {
+        slide_cytoplasm: 1.0.into(),
+        slide_nucleus: 1.0.into(),
+        field_cytoplasm: 1.0.into(),
+        field_nucleus: 1.0.into(),
+        field_texture: 1.0.into(),
+        slide_balance: 0.0.into(),
+        field_balance: 0.0.into(),
+        cell_balance: 0.0.into(),
+        cyanophilic: DyeAmounts::grey(),
+        eosinophilic: DyeAmounts::grey(),
+        orangeophilic: DyeAmounts::grey(),
+        nucleus: DyeAmounts::grey(),
+        bacillus: DyeAmounts::grey(),
+        speckle: DyeAmounts::grey(),
+    };
     recipe.debris.leukocytes.form = NucleusForm::Round;
     recipe.debris.leukocytes.absorbance = 0.70.into();
     recipe.debris.leukocytes.halo = 0.0.into();
@@ -193,10 +217,13 @@ fn paper() -> Recipe {
     recipe.debris.leukocytes.per_cluster = Number::uniform(3.0, 6.0);
     recipe.debris.bacilli.absorbance = 0.15.into();
     recipe.debris.bacilli.bend_deg = 0.0.into();
+    recipe.debris.bacilli.phase_rad = 0.0.into();
     recipe.debris.bacilli.clusters = 8.0.into();
     recipe.debris.bacilli.per_cluster = Number::uniform(8.0, 20.0);
     recipe.debris.speckles.absorbance = 0.25.into();
     recipe.debris.speckles.count = 120.0.into();
+    recipe.debris.speckles.form = SpeckForm::Dilated;
+    recipe.debris.speckles.phase_rad = 0.0.into();
     recipe.debris.speckles.dilations =
         Number::Drawn { law: super::Law::Choice(vec![0.0, 0.0, 1.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
     recipe.debris.out_of_focus.absorbance = 0.35.into();
@@ -208,8 +235,8 @@ fn paper() -> Recipe {
         scatter_um: 55.0.into(),
     };
     // 70 photo-electrons a grey level of 8 bits; the released read noise is one grey level.
-    recipe.camera = Camera { full_well_e: (255.0 * 70.0).into(), read_noise_e: 70.0.into(), ..Camera::default() };
-    recipe.optics = Optics::default();
+    recipe.camera = CameraPreset::Paper.camera();
+    recipe.optics = Optics::gaussian();
     recipe
 }
 
@@ -234,7 +261,8 @@ mod tests {
     fn the_paper_preset_holds_the_published_values() {
         let paper = Preset::Paper2015.recipe();
         assert_eq!(paper.field.pixel_um, 0.25.into());
-        assert_eq!(paper.optics.sigma_xy_um, 0.225.into(), "0.9 px");
+        let Optics::Gaussian { sigma_xy_um, sigma_z_um_per_um } = paper.optics else { panic!("{:?}", paper.optics) };
+        assert_eq!((sigma_xy_um, sigma_z_um_per_um), (0.225.into(), 0.25.into()), "0.9 px, 1 px a µm");
         assert_eq!(paper.camera.full_well_e, 17_850.0.into());
         assert_eq!(paper.nucleus.donors, 3.0.into());
         assert_eq!(paper.cytoplasm.sheet, Sheet::Verlet);

@@ -19,6 +19,9 @@ pub struct Slide {
     pub stacking_um: Number,
     /// Least distance between the middles of two cells, µm, 0 to 1000; drawn once a field.
     pub spacing_um: Number,
+    /// Fields that are taken of one slide, 1 to 1000000: images 0 to n − 1 show the first, the next n the second. Fields of
+    /// one slide were stained together.
+    pub fields: usize,
 }
 
 impl Default for Slide {
@@ -29,6 +32,7 @@ impl Default for Slide {
             median_um: 20.0.into(),
             stacking_um: 0.6.into(),
             spacing_um: 9.0.into(),
+            fields: 16,
         }
     }
 }
@@ -112,11 +116,45 @@ pub struct CellMix {
     pub cytoplasm_stain: Number,
     /// Factor on the absorbance of its nucleus, 0 to 20; drawn for each cell.
     pub nucleus_stain: Number,
+    /// How likely its cytoplasm is to take each tint.
+    pub tints: TintMix,
+}
+
+/// How likely each tint of cytoplasm is, relative to the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TintMix {
+    /// Blue-green, as in young and intermediate cells, 0 to 1000.
+    pub cyanophilic: Number,
+    /// Pink, as in superficial cells, 0 to 1000.
+    pub eosinophilic: Number,
+    /// Orange, as in keratinised cells, 0 to 1000.
+    pub orangeophilic: Number,
+}
+
+impl Default for TintMix {
+    fn default() -> Self {
+        Self { cyanophilic: 0.85.into(), eosinophilic: 0.15.into(), orangeophilic: 0.0.into() }
+    }
+}
+
+impl TintMix {
+    /// The tints of superficial cells.
+    #[must_use]
+    pub fn superficial() -> Self {
+        Self { cyanophilic: 0.25.into(), eosinophilic: 0.65.into(), orangeophilic: 0.1.into() }
+    }
 }
 
 impl Default for CellMix {
     fn default() -> Self {
-        Self { count: 10.0.into(), size: 1.0.into(), cytoplasm_stain: 1.0.into(), nucleus_stain: 1.0.into() }
+        Self {
+            count: 10.0.into(),
+            size: 1.0.into(),
+            cytoplasm_stain: 1.0.into(),
+            nucleus_stain: 1.0.into(),
+            tints: TintMix::default(),
+        }
     }
 }
 
@@ -200,6 +238,9 @@ pub struct Cytoplasm {
     pub granules: Number,
     /// Roughness of the rim, µm, 0 to 5: the edge is frayed over about this distance.
     pub fray_um: Number,
+    /// How late light comes through a flat sheet, radians of phase, -3 to 3: thicker parts and folds in proportion. It shows
+    /// as bright and dark rims that change places when the focus passes.
+    pub phase_rad: Number,
 }
 
 impl Default for Cytoplasm {
@@ -218,6 +259,7 @@ impl Default for Cytoplasm {
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
             fray_um: Number::uniform(0.1, 0.6),
+            phase_rad: Number::uniform(0.05, 0.15),
         }
     }
 }
@@ -321,20 +363,97 @@ impl Default for Nucleus {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stain {
+    /// Factor on the absorbance of all cytoplasm of a slide, 0 to 20; drawn once a slide.
+    pub slide_cytoplasm: Number,
+    /// Factor on the absorbance of all nuclei of a slide, 0 to 20; drawn once a slide.
+    pub slide_nucleus: Number,
     /// Factor on the absorbance of all cytoplasm of a field, 0 to 20; drawn once a field.
     pub field_cytoplasm: Number,
     /// Factor on the absorbance of all nuclei of a field, 0 to 20; drawn once a field.
     pub field_nucleus: Number,
     /// Factor on the contrast of the texture inside all nuclei of a field, 0 to 20; drawn once a field.
     pub field_texture: Number,
+    /// Balance of the dyes: standard deviation of the logarithm of each dye's amount between slides, 0 to 2.
+    pub slide_balance: Number,
+    /// The same between the fields of a slide, 0 to 2.
+    pub field_balance: Number,
+    /// The same between the cells of a field, 0 to 2.
+    pub cell_balance: Number,
+    /// Dyes of cyanophilic cytoplasm.
+    pub cyanophilic: DyeAmounts,
+    /// Dyes of eosinophilic cytoplasm.
+    pub eosinophilic: DyeAmounts,
+    /// Dyes of orangeophilic, keratinised cytoplasm.
+    pub orangeophilic: DyeAmounts,
+    /// Dyes of nuclei, also of leukocytes.
+    pub nucleus: DyeAmounts,
+    /// Dyes of bacteria.
+    pub bacillus: DyeAmounts,
+    /// Dyes of specks.
+    pub speckle: DyeAmounts,
 }
 
 impl Default for Stain {
     fn default() -> Self {
         Self {
-            field_cytoplasm: Number::log_normal(1.0, 0.25),
-            field_nucleus: Number::log_normal(1.0, 0.12),
+            slide_cytoplasm: Number::log_normal(1.0, 0.15),
+            slide_nucleus: Number::log_normal(1.0, 0.08),
+            field_cytoplasm: Number::log_normal(1.0, 0.2),
+            field_nucleus: Number::log_normal(1.0, 0.09),
             field_texture: Number::log_normal(1.0, 0.25),
+            slide_balance: 0.15.into(),
+            field_balance: 0.05.into(),
+            cell_balance: 0.12.into(),
+            cyanophilic: DyeAmounts { light_green: 2.68, eosin_y: 0.3, orange_g: 0.5, ..DyeAmounts::none() },
+            eosinophilic: DyeAmounts { eosin_y: 2.6, orange_g: 0.8, light_green: 0.4, ..DyeAmounts::none() },
+            orangeophilic: DyeAmounts { orange_g: 4.5, eosin_y: 1.2, light_green: 0.2, ..DyeAmounts::none() },
+            nucleus: DyeAmounts { haematein: 1.0, eosin_y: 0.1, light_green: 0.05, ..DyeAmounts::none() },
+            bacillus: DyeAmounts { haematein: 0.6, light_green: 1.15, ..DyeAmounts::none() },
+            speckle: DyeAmounts { neutral: 1.0, ..DyeAmounts::none() },
         }
+    }
+}
+
+/// Amounts of dyes in what is stained with strength 1, each as the absorbance at the dye's own peak. The strength of
+/// the stain is what the model and the factors of this section say: the absorbance at 0.57 µm where the amounts are
+/// such that their absorbances add up to 1 there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DyeAmounts {
+    /// Haematein bound to aluminium, blue-violet, peak near 0.58 µm, 0 to 100.
+    pub haematein: f64,
+    /// Eosin Y, pink, peak near 0.53 µm, 0 to 100.
+    pub eosin_y: f64,
+    /// Light green SF, blue-green, peak near 0.63 µm, 0 to 100.
+    pub light_green: f64,
+    /// Orange G, orange, peak near 0.48 µm, 0 to 100.
+    pub orange_g: f64,
+    /// Something grey that absorbs all light alike, 0 to 100.
+    pub neutral: f64,
+}
+
+impl DyeAmounts {
+    /// No dye at all.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self { haematein: 0.0, eosin_y: 0.0, light_green: 0.0, orange_g: 0.0, neutral: 0.0 }
+    }
+
+    /// Grey of strength 1.
+    #[must_use]
+    pub const fn grey() -> Self {
+        Self { neutral: 1.0, ..Self::none() }
+    }
+
+    /// In the order of [`dye_spectra::Dye::ALL`].
+    #[must_use]
+    pub fn amounts(&self) -> dye_spectra::Amounts {
+        [self.haematein, self.eosin_y, self.light_green, self.orange_g, self.neutral]
+    }
+}
+
+impl Default for DyeAmounts {
+    fn default() -> Self {
+        Self::none()
     }
 }

@@ -10,6 +10,7 @@ use crate::recipe::{CellMix, Recipe};
 use super::depth::Relief;
 use super::draw::FieldNumbers;
 use super::layout::{Places, weight_map};
+use super::stain::FieldStain;
 use super::{Body, CellBody, CellDetail, Fold, FoldForm, NucleusBody, Object, View, WeightMap};
 
 /// Draws every cell of a field, class by class.
@@ -19,6 +20,7 @@ pub(super) fn draw_cells(
     given: Option<&WeightMap>,
     view: View,
     field: &FieldNumbers,
+    stain: &FieldStain<'_>,
 ) -> Result<Vec<Object>, String> {
     let counts: Vec<usize> =
         recipe.cells.iter().map(|(class, mix)| field.count(&format!("cells.{class}.count"), &mix.count)).collect();
@@ -36,11 +38,6 @@ pub(super) fn draw_cells(
         field.draw("slide.median_um", &recipe.slide.median_um),
         field.key.stream("field", 0, "slide.relief").next_u64(),
     )?;
-    let stain = FieldStain {
-        cytoplasm: field.draw("stain.field_cytoplasm", &recipe.stain.field_cytoplasm),
-        nucleus: field.draw("stain.field_nucleus", &recipe.stain.field_nucleus),
-        texture: field.draw("stain.field_texture", &recipe.stain.field_texture),
-    };
     let mut cells = Vec::with_capacity(total);
     for ((name, mix), count) in recipe.cells.iter().zip(counts) {
         let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
@@ -49,7 +46,8 @@ pub(super) fn draw_cells(
             let centre_um = places.next(&mut field.key.stream("cell", number, "place"))?;
             let mut rng = field.key.stream("cell", number, "body");
             let rotation_deg = random::between(0.0, 360.0, &mut rng);
-            let body = draw_body(recipe, name, class, mix, &stain, &mut rng);
+            let own = |purpose: &str| field.key.stream("cell", number, purpose);
+            let body = draw_body(recipe, name, class, mix, stain, &mut rng, own);
             let stacking = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
             cells.push(Object {
                 id: 0,
@@ -72,20 +70,14 @@ pub(crate) fn unknown_class(name: &str, model: &Model) -> String {
     format!("the model has no class `{name}`; it has {}", known.join(", "))
 }
 
-/// How strongly a field took up the stain.
-struct FieldStain {
-    cytoplasm: f64,
-    nucleus: f64,
-    texture: f64,
-}
-
 fn draw_body(
     recipe: &Recipe,
     name: &str,
     class: &CellClass,
     mix: &CellMix,
-    stain: &FieldStain,
+    stain: &FieldStain<'_>,
     rng: &mut Stream,
+    own: impl Fn(&str) -> Stream,
 ) -> CellBody {
     let size = mix.size.draw(rng);
     let cytoplasm = &class.cytoplasm;
@@ -123,6 +115,7 @@ fn draw_body(
         off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
         rotation_deg: random::between(0.0, 360.0, rng),
         absorbance: nucleus_absorbance,
+        dyes: [0.0; dye_spectra::DYES],
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
         pyknotic,
@@ -134,7 +127,19 @@ fn draw_body(
         body.absorbance *= random::between(1.4, 2.0, rng);
         body.texture *= random::between(0.2, 0.5, rng);
     }
-    CellBody { class: name.to_owned(), radius_um, cytoplasm_absorbance, detail, fold, nucleus: body }
+    let (tint, dyes, nucleus_dyes) = stain.cell(&mix.tints, &mut own("stain"));
+    body.dyes = nucleus_dyes;
+    CellBody {
+        class: name.to_owned(),
+        radius_um,
+        cytoplasm_absorbance,
+        tint,
+        dyes,
+        phase_rad: recipe.cytoplasm.phase_rad.draw(&mut own("phase")),
+        detail,
+        fold,
+        nucleus: body,
+    }
 }
 
 /// Share of the spread of chromatin's standard deviation that is left when the absorbance is known.

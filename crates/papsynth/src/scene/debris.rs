@@ -138,6 +138,7 @@ fn bacilli(recipe: &Bacilli, view: View, field: &FieldNumbers, cells: &[CellPlac
                 width_um: recipe.width_um.draw(&mut rng),
                 bend_deg: recipe.bend_deg.draw(&mut rng),
                 absorbance: recipe.absorbance.draw(&mut rng),
+                phase_rad: recipe.phase_rad.draw(&mut field.key.stream("bacillus", number, "phase")),
             };
             let depth_um = clump.depth_um + 0.3 * random::normal(&mut rng);
             objects.push(object(number, index, centre_um, depth_um, body, &mut rng));
@@ -154,8 +155,10 @@ fn speckles(recipe: &Speckles, view: View, field: &FieldNumbers) -> Vec<Object> 
             let mut rng = field.key.stream("speckle", number, "body");
             let centre_um = [random::between(0.0, width, &mut rng), random::between(0.0, height, &mut rng)];
             let body = Body::Speckle {
+                form: recipe.form,
                 dilations: recipe.dilations.draw_count(&mut rng),
                 absorbance: recipe.absorbance.draw(&mut rng),
+                phase_rad: recipe.phase_rad.draw(&mut field.key.stream("speckle", number, "phase")),
             };
             let depth_um = random::normal(&mut rng);
             alone(object(number, 0, centre_um, depth_um, body, &mut rng))

@@ -4,11 +4,15 @@ use crate::error::Error;
 use crate::key::{Key, Stream};
 use crate::model::Model;
 use crate::random;
-use crate::recipe::{Illumination, Number, Recipe};
+use crate::recipe::{Illumination, Light, Number, Optics, Recipe};
 
 use super::cells::draw_cells;
 use super::debris::draw_debris;
-use super::{Scene, SceneBackground, SceneCamera, SceneIllumination, SceneOptics, View, WeightMap};
+use super::stain::{FieldStain, slide_of};
+use super::{
+    Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
+    View, WeightMap,
+};
 
 /// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of
 /// them a distribution changes none of the others.
@@ -41,34 +45,42 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     let view = View {
         width: field.count("field.width_px", &recipe.field.width_px),
         height: field.count("field.height_px", &recipe.field.height_px),
-        pixel_um: field.draw("field.pixel_um", &recipe.field.pixel_um),
+        pixel_um: pixel_um(recipe, &field),
     };
     let fail = |message: String| Error::Image { index: key.index, message };
-    let mut objects = draw_cells(recipe, model, weight_map, view, &field).map_err(fail)?;
+    let stain = FieldStain::draw(recipe, &field);
+    let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
     draw_debris(recipe, view, &field, &mut objects).map_err(fail)?;
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }
     Ok(Scene {
         key,
+        slide: slide_of(recipe, key),
         view,
         planes_um: planes(recipe, &field),
         background: background(recipe, &field),
-        optics: SceneOptics {
-            sigma_xy_um: field.draw("optics.sigma_xy_um", &recipe.optics.sigma_xy_um),
-            sigma_z_um_per_um: field.draw("optics.sigma_z_um_per_um", &recipe.optics.sigma_z_um_per_um),
+        light: light(recipe, &field),
+        optics: optics(recipe, &field),
+        restoration: Restoration {
             restore: recipe.nucleus.restore,
-            restore_feather_um: field.draw("nucleus.restore_feather_um", &recipe.nucleus.restore_feather_um),
+            feather_um: field.draw("nucleus.restore_feather_um", &recipe.nucleus.restore_feather_um),
         },
-        camera: SceneCamera {
-            bits: u32::try_from(field.count("camera.bits", &recipe.camera.bits)).unwrap_or(8),
-            full_well_e: field.draw("camera.full_well_e", &recipe.camera.full_well_e),
-            read_noise_e: field.draw("camera.read_noise_e", &recipe.camera.read_noise_e),
-            offset_dn: field.draw("camera.offset_dn", &recipe.camera.offset_dn),
-            photon_noise: recipe.camera.photon_noise,
-        },
+        dyes: stain.debris(),
+        camera: camera(recipe, &field),
         objects,
     })
+}
+
+/// Size of a pixel in the object.
+fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
+    let magnification = field.draw("field.magnification", &recipe.field.magnification);
+    if magnification <= 0.0 {
+        return field.draw("field.pixel_um", &recipe.field.pixel_um);
+    }
+    let camera = &recipe.camera;
+    let binning = field.count("camera.binning_px", &camera.binning_px).max(1);
+    field.draw("camera.pixel_um", &camera.pixel_um) * binning as f64 / magnification
 }
 
 fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
@@ -77,6 +89,91 @@ fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
     let centre = field.draw("focus.centre_um", &recipe.focus.centre_um);
     let middle = (count - 1) as f64 / 2.0;
     (0..count).map(|plane| centre + (plane as f64 - middle) * step).collect()
+}
+
+fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {
+    let draw = |name: &str, number: &Number| field.draw(&format!("light.{name}"), number);
+    match &recipe.light {
+        Light::Monochrome { wavelength_um, bandwidth_um } => SceneLight::Monochrome {
+            wavelength_um: draw("wavelength_um", wavelength_um),
+            bandwidth_um: draw("bandwidth_um", bandwidth_um),
+        },
+        Light::Colour { lamp_k, mixing, chromatic_um, rendition } => SceneLight::Colour {
+            lamp_k: draw("lamp_k", lamp_k),
+            mixing: *mixing,
+            chromatic_um: draw("chromatic_um", chromatic_um),
+            rendition: *rendition,
+        },
+    }
+}
+
+fn optics(recipe: &Recipe, field: &FieldNumbers) -> SceneOptics {
+    let draw = |name: &str, number: &Number| field.draw(&format!("optics.{name}"), number);
+    match &recipe.optics {
+        Optics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => SceneOptics::Gaussian {
+            sigma_xy_um: draw("sigma_xy_um", sigma_xy_um),
+            sigma_z_um_per_um: draw("sigma_z_um_per_um", sigma_z_um_per_um),
+        },
+        Optics::BrightField {
+            na,
+            condenser_na,
+            mount_index,
+            immersion_index,
+            cover_error_um,
+            spherical,
+            coma,
+            astigmatism,
+            extra_blur_um,
+            stray_light,
+            oversampling,
+            slab_um,
+            imaging,
+            directions,
+        } => SceneOptics::BrightField(SceneMicroscope {
+            na: draw("na", na),
+            condenser_na: draw("condenser_na", condenser_na),
+            mount_index: draw("mount_index", mount_index),
+            immersion_index: draw("immersion_index", immersion_index),
+            cover_error_um: draw("cover_error_um", cover_error_um),
+            spherical: draw("spherical", spherical),
+            coma: draw("coma", coma),
+            astigmatism: draw("astigmatism", astigmatism),
+            extra_blur_um: draw("extra_blur_um", extra_blur_um),
+            stray_light: draw("stray_light", stray_light),
+            oversampling: field.count("optics.oversampling", oversampling).max(1),
+            slab_um: draw("slab_um", slab_um),
+            imaging: *imaging,
+            directions: field.count("optics.directions", directions).max(1),
+        }),
+    }
+}
+
+fn camera(recipe: &Recipe, field: &FieldNumbers) -> SceneCamera {
+    let camera = &recipe.camera;
+    let draw = |name: &str, number: &Number| field.draw(&format!("camera.{name}"), number);
+    let count = |name: &str, number: &Number| field.count(&format!("camera.{name}"), number);
+    SceneCamera {
+        bits: u32::try_from(count("bits", &camera.bits)).unwrap_or(8),
+        full_well_e: draw("full_well_e", &camera.full_well_e),
+        read_noise_e: draw("read_noise_e", &camera.read_noise_e),
+        read_noise_rms_e: draw("read_noise_rms_e", &camera.read_noise_rms_e),
+        offset_dn: draw("offset_dn", &camera.offset_dn),
+        photon_noise: camera.photon_noise,
+        prnu: draw("prnu", &camera.prnu),
+        dsnu_e: draw("dsnu_e", &camera.dsnu_e),
+        serial: camera.serial,
+        exposure_s: draw("exposure_s", &camera.exposure_s),
+        dark_current_e_per_s: draw("dark_current_e_per_s", &camera.dark_current_e_per_s),
+        dark_reference_c: draw("dark_reference_c", &camera.dark_reference_c),
+        temperature_c: draw("temperature_c", &camera.temperature_c),
+        dark_doubling_c: draw("dark_doubling_c", &camera.dark_doubling_c),
+        blooming: draw("blooming", &camera.blooming),
+        blooming_vertical: draw("blooming_vertical", &camera.blooming_vertical),
+        binning_px: count("binning_px", &camera.binning_px).max(1),
+        binning: camera.binning,
+        jpeg_quality: u32::try_from(count("jpeg_quality", &camera.jpeg_quality)).unwrap_or(0),
+        jpeg_subsampling: camera.jpeg_subsampling,
+    }
 }
 
 fn background(recipe: &Recipe, field: &FieldNumbers) -> SceneBackground {

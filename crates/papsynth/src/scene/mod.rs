@@ -7,12 +7,14 @@ mod debris;
 mod depth;
 mod draw;
 mod layout;
+mod stain;
 mod weight;
 
+use dye_spectra::Amounts;
 use serde::Serialize;
 
 use crate::key::Key;
-use crate::recipe::{PhotonNoise, Restore};
+use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, SpeckForm, Subsampling};
 
 pub(crate) use cells::unknown_class;
 pub use draw::draw;
@@ -57,14 +59,23 @@ impl Kind {
 pub struct Scene {
     /// Seed and index the scene was drawn from.
     pub key: Key,
+    /// Number of the slide that the field is part of.
+    pub slide: u64,
     /// The image and its pixels.
     pub view: View,
-    /// Depths of the focal planes, µm, in the order of the stack.
+    /// Travel of the stage to each focal plane, µm, in the order of the stack; larger where what is nearer to the objective
+    /// is in focus.
     pub planes_um: Vec<f64>,
     /// The empty slide.
     pub background: SceneBackground,
-    /// The spread of light.
+    /// The light.
+    pub light: SceneLight,
+    /// How it spreads.
     pub optics: SceneOptics,
+    /// What happens to nuclei whose donors were images already.
+    pub restoration: Restoration,
+    /// What stains everything that is no epithelial cell.
+    pub dyes: SceneDyes,
     /// The camera.
     pub camera: SceneCamera,
     /// Every object, by id.
@@ -129,17 +140,157 @@ pub enum SceneIllumination {
     },
 }
 
-/// The spread of light, its numbers drawn.
+impl Scene {
+    /// The grid on which the slide is rendered: that of the image, or a finer one.
+    #[must_use]
+    pub fn grid(&self) -> View {
+        let n = self.oversampling();
+        View { width: self.view.width * n, height: self.view.height * n, pixel_um: self.view.pixel_um / n as f64 }
+    }
+
+    /// Samples of the slide along the side of a pixel.
+    #[must_use]
+    pub fn oversampling(&self) -> usize {
+        match &self.optics {
+            SceneOptics::BrightField(microscope) => microscope.oversampling,
+            SceneOptics::Gaussian { .. } => 1,
+        }
+    }
+
+    /// The depth that is in focus at a travel of the stage, µm. Light bends at the cover glass: with a dry lens the focus
+    /// goes 1.5 times as deep as the stage.
+    #[must_use]
+    pub fn in_focus_um(&self, plane_um: f64) -> f64 {
+        match &self.optics {
+            SceneOptics::BrightField(microscope) => plane_um * microscope.mount_index / microscope.immersion_index,
+            SceneOptics::Gaussian { .. } => plane_um,
+        }
+    }
+
+    /// Channels of the image: 1 or 3.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        match self.light {
+            SceneLight::Monochrome { .. } => 1,
+            SceneLight::Colour { .. } => 3,
+        }
+    }
+}
+
+/// The light, its numbers drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SceneOptics {
-    /// Standard deviation in the image plane, µm.
-    pub sigma_xy_um: f64,
-    /// Growth with distance from focus, µm per µm.
-    pub sigma_z_um_per_um: f64,
-    /// What happens to nuclei whose donors were images already.
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum SceneLight {
+    /// One interference filter.
+    Monochrome {
+        /// Wavelength, µm.
+        wavelength_um: f64,
+        /// Width of the band, µm.
+        bandwidth_um: f64,
+    },
+    /// Three colours.
+    Colour {
+        /// Temperature of the lamp, K.
+        lamp_k: f64,
+        /// How dyes make colours.
+        mixing: Mixing,
+        /// How much farther from the objective red light comes to focus than green, µm of stage travel.
+        chromatic_um: f64,
+        /// How colours are written.
+        rendition: Rendition,
+    },
+}
+
+/// How light spreads, its numbers drawn.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum SceneOptics {
+    /// Partially coherent bright field.
+    BrightField(SceneMicroscope),
+    /// The paper's Gaussians.
+    Gaussian {
+        /// Standard deviation in the image plane, µm.
+        sigma_xy_um: f64,
+        /// Growth with distance from focus, µm per µm.
+        sigma_z_um_per_um: f64,
+    },
+}
+
+/// A bright-field microscope, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SceneMicroscope {
+    /// Numerical aperture of the objective.
+    pub na: f64,
+    /// Numerical aperture of the condenser.
+    pub condenser_na: f64,
+    /// Refractive index of the mountant.
+    pub mount_index: f64,
+    /// Refractive index between cover glass and objective.
+    pub immersion_index: f64,
+    /// How much too thick the cover glass is, µm.
+    pub cover_error_um: f64,
+    /// Spherical aberration, waves.
+    pub spherical: f64,
+    /// Coma along the rows, waves.
+    pub coma: f64,
+    /// Astigmatism between rows and columns, waves.
+    pub astigmatism: f64,
+    /// Standard deviation of further spread, µm.
+    pub extra_blur_um: f64,
+    /// Share of an empty field's light that lies evenly over the picture.
+    pub stray_light: f64,
+    /// Samples of the slide along the side of a pixel.
+    pub oversampling: usize,
+    /// Thickness of the slabs between which Abbe's way carries light, µm.
+    pub slab_um: f64,
+    /// How light is followed through the slabs.
+    pub imaging: Imaging,
+    /// Directions of light that Abbe's way follows.
+    pub directions: usize,
+}
+
+/// What happens to nuclei whose donors were images already.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Restoration {
+    /// What happens.
     pub restore: Restore,
-    /// Feathering of that, µm.
-    pub restore_feather_um: f64,
+    /// Spread of their feathered mask, µm.
+    pub feather_um: f64,
+}
+
+/// Dyes of everything that is no epithelial cell, in what is stained with strength 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SceneDyes {
+    /// Of leukocytes, and of objects out of focus.
+    pub nucleus: Amounts,
+    /// Of bacteria.
+    pub bacillus: Amounts,
+    /// Of specks.
+    pub speckle: Amounts,
+}
+
+/// The tint that a cytoplasm has taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tint {
+    /// Blue-green.
+    Cyanophilic,
+    /// Pink.
+    Eosinophilic,
+    /// Orange.
+    Orangeophilic,
+}
+
+impl Tint {
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cyanophilic => "cyanophilic",
+            Self::Eosinophilic => "eosinophilic",
+            Self::Orangeophilic => "orangeophilic",
+        }
+    }
 }
 
 /// The camera, its numbers drawn.
@@ -151,10 +302,40 @@ pub struct SceneCamera {
     pub full_well_e: f64,
     /// Read noise, electrons.
     pub read_noise_e: f64,
+    /// Root of its mean square where pixels differ, else 0.
+    pub read_noise_rms_e: f64,
     /// Grey level of a dark pixel.
     pub offset_dn: f64,
     /// How photons are counted.
     pub photon_noise: PhotonNoise,
+    /// Spread of the pixels' responses.
+    pub prnu: f64,
+    /// Spread of the pixels' offsets, electrons.
+    pub dsnu_e: f64,
+    /// Which camera of its kind it is.
+    pub serial: u64,
+    /// Exposure, seconds.
+    pub exposure_s: f64,
+    /// Dark current, electrons per second.
+    pub dark_current_e_per_s: f64,
+    /// Temperature for which it is given, °C.
+    pub dark_reference_c: f64,
+    /// Temperature of the sensor, °C.
+    pub temperature_c: f64,
+    /// Warming that doubles the dark current, K.
+    pub dark_doubling_c: f64,
+    /// Share of the charge too much that blooms.
+    pub blooming: f64,
+    /// Share of that which stays within its column.
+    pub blooming_vertical: f64,
+    /// Pixels of the sensor along the side of one of the picture.
+    pub binning_px: usize,
+    /// How they are joined.
+    pub binning: Binning,
+    /// Quality of the JPEG, or 0.
+    pub jpeg_quality: u32,
+    /// How much of the colour it leaves out.
+    pub jpeg_subsampling: Subsampling,
 }
 
 /// One thing on the slide.
@@ -209,13 +390,19 @@ pub enum Body {
         bend_deg: f64,
         /// Absorbance.
         absorbance: f64,
+        /// How late light comes through it, radians.
+        phase_rad: f64,
     },
     /// A speck of dust or stain.
     Speckle {
+        /// How it was grown.
+        form: SpeckForm,
         /// How often it was grown by a pixel.
         dilations: usize,
         /// Absorbance.
         absorbance: f64,
+        /// How late light comes through it, radians.
+        phase_rad: f64,
     },
     /// An object far outside the depth of the slide.
     OutOfFocus {
@@ -251,8 +438,14 @@ pub struct CellBody {
     pub class: String,
     /// Radius of the cell (of the circle of its first descriptor), µm.
     pub radius_um: f64,
-    /// Mean absorbance of its cytoplasm.
+    /// Mean absorbance of its cytoplasm: the strength of its stain.
     pub cytoplasm_absorbance: f64,
+    /// The tint of its cytoplasm.
+    pub tint: Tint,
+    /// Dyes of its cytoplasm where it is stained with strength 1.
+    pub dyes: Amounts,
+    /// How late light comes through its flat sheet, radians.
+    pub phase_rad: f64,
     /// Strengths of the cytoplasm's detail.
     pub detail: CellDetail,
     /// The part that lies doubled back.
@@ -318,8 +511,10 @@ pub struct NucleusBody {
     pub off_centre: [f64; 2],
     /// Direction of its long axis against the cell's, degrees.
     pub rotation_deg: f64,
-    /// Mean absorbance above the cytoplasm.
+    /// Mean absorbance above the cytoplasm: the strength of its stain.
     pub absorbance: f64,
+    /// Its dyes where it is stained with strength 1.
+    pub dyes: Amounts,
     /// Standard deviation of the absorbance inside.
     pub texture: f64,
     /// Absorbance of the rim relative to the nucleus.

@@ -74,8 +74,11 @@ pub struct ObjectTruth {
     pub centre_um: [f64; 2],
     /// Depth, µm; positive towards the objective, 0 in the middle of the slide.
     pub depth_um: f64,
-    /// Mean absorbance it was given (its stain), decadic.
+    /// Strength of its stain: the mean decadic absorbance it was given, at 0.57 µm where its dyes have the amounts of a
+    /// usual stain.
     pub stain: f64,
+    /// The tint of a cytoplasm ("cyanophilic", "eosinophilic", "orangeophilic"); of all else empty.
+    pub tint: &'static str,
     /// Direction it was turned to, degrees.
     pub rotation_deg: f64,
     /// Area of the whole object, also of what lies outside the image, µm².
@@ -86,7 +89,7 @@ pub struct ObjectTruth {
     pub amodal: Mask,
     /// Its front-most mask: the pixels where it is nearest to the objective within its group.
     pub front: Mask,
-    /// Distance from each focal plane, µm (`plane − depth`).
+    /// Distance from what is in focus in each plane, µm (`Scene::in_focus_um(plane) − depth`).
     pub defocus_um: Vec<f64>,
     /// How detectable it is in each plane: mean contrast over its mask, in units of the noise of one pixel there.
     pub detectability: Vec<f64>,

@@ -1,20 +1,17 @@
-//! Signal transmission: from phantoms to the light on the sensor (Eqs. 8–14).
+//! The paper's way: absorbances blurred by depth, added, and the light spread in the image plane (Eqs. 11–14).
 
 use std::borrow::Cow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method, Scratch};
-use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, Scatter};
-use rand_core::Rng;
 
+use super::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::exp10::exp10_from;
 use crate::phantom::tile::{TileRef, lay};
 use crate::phantom::{Phantom, Piece};
-use crate::recipe::Restore;
-use crate::restore::Feathered;
-use crate::scene::{Scene, SceneIllumination};
+use crate::scene::{Scene, SceneLight};
 use crate::threads::{self, Threads};
 use crate::truth::Mask;
 
@@ -31,16 +28,15 @@ const LOST_TAIL_IN_PLANE: f64 = 1e-5;
 /// Objects whose blurred tiles are in memory at one time, when several threads make them.
 const CHUNK: usize = 64;
 
-/// Rows that go from light to grey levels together: few enough to stay in the cache of one core.
-pub(crate) const BAND: usize = 32;
-
 /// What all planes of one scene share.
-pub(crate) struct LightPath {
+pub(crate) struct GaussianPath {
     width: usize,
     height: usize,
     in_plane: Gaussian,
-    /// The feathered mask C′ of the nuclei whose texture was taken from images, if any are to be restored.
-    pub(crate) feathered: Option<Feathered>,
+    /// Growth of the spread with distance from focus, px per µm.
+    px_per_um: f64,
+    /// Wavelength of the light, µm.
+    wavelength_um: f64,
     threads: Threads,
     spare: Mutex<Spare>,
 }
@@ -52,36 +48,6 @@ struct Spare {
     scratches: Vec<Scratch>,
 }
 
-/// Rows of the light of one plane, as fractions of full scale.
-pub(crate) struct Band<'a> {
-    /// The first row.
-    pub(crate) first: usize,
-    /// 10^(I_b − I_p): before the spread in the image plane.
-    pub(crate) sharp: &'a [f32],
-    /// The same after it.
-    pub(crate) spread: &'a mut [f32],
-}
-
-/// Memory for the light of a plane.
-#[derive(Debug, Default)]
-pub(crate) struct Light {
-    /// I_b of Eq. 10: the logarithm of the empty slide's light, as a fraction of full scale.
-    empty_log10: Vec<f32>,
-    /// The absorbance until it is spread, then the light.
-    whole: Vec<f32>,
-    band: Vec<f32>,
-    scratch: Scratch,
-}
-
-/// Which plane is in focus.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum FocusAt {
-    /// One depth for all.
-    Depth(f64),
-    /// Every object its own: the all-in-focus image.
-    Everywhere,
-}
-
 /// The absorbance of a piece as it is in a plane.
 struct Blurred<'a> {
     origin: [i64; 2],
@@ -90,75 +56,66 @@ struct Blurred<'a> {
     values: Cow<'a, [f32]>,
     /// Mean over the mask of the piece.
     mean: f64,
+    /// What its dyes absorb at this wavelength, relative to the values.
+    strength: f32,
 }
 
-impl LightPath {
-    /// Prepares the path, and the empty slide's light in `light`.
-    pub(crate) fn new(
-        scene: &Scene,
-        phantoms: &[Phantom],
+impl GaussianPath {
+    pub(super) fn new(
+        slide: Slide<'_>,
+        sigma_xy_um: f64,
+        sigma_z_um_per_um: f64,
         threads: Threads,
-        light: &mut Light,
     ) -> Result<Self, String> {
-        let (width, height) = (scene.view.width, scene.view.height);
-        light.empty_log10.resize(width * height, 0.0);
-        background(scene)?.log10_into(&mut light.empty_log10, width, [0, 0]);
-        let sigma_px = scene.optics.sigma_xy_um / scene.view.pixel_um;
-        let in_plane = Gaussian::truncated(sigma_px, Method::Direct, LOST_TAIL_IN_PLANE).map_err(|e| e.to_string())?;
-        let feathered = match scene.optics.restore {
-            Restore::Off => None,
-            Restore::BeforeDetection | Restore::AfterDetection => Feathered::new(scene, phantoms)?,
+        let view = slide.scene.view;
+        let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)
+            .map_err(|e| e.to_string())?;
+        let wavelength_um = match slide.scene.light {
+            SceneLight::Monochrome { wavelength_um, .. } => wavelength_um,
+            SceneLight::Colour { .. } => return Err("colour is not known to Gaussians".to_owned()),
         };
-        Ok(Self { width, height, in_plane, feathered, threads, spare: Mutex::default() })
+        let px_per_um = sigma_z_um_per_um / view.pixel_um;
+        let (width, height) = (view.width, view.height);
+        Ok(Self { width, height, in_plane, px_per_um, wavelength_um, threads, spare: Mutex::default() })
     }
 
-    /// Lets light through the phantoms of a scene: `light` becomes their absorbance I_p. `masks` are those
-    /// of the phantoms' pieces, in their order, as are the mean absorbances over them that are returned.
-    pub(crate) fn absorb(
-        &self,
-        scene: &Scene,
-        phantoms: &[Phantom],
-        masks: &[Vec<Mask>],
-        focus: FocusAt,
-        light: &mut Light,
-    ) -> Result<Vec<f64>, String> {
-        let absorbance = &mut light.whole;
+    /// `light` becomes the absorbance I_p of the phantoms.
+    pub(super) fn absorb(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+        let absorbance = &mut light.channels[0];
         absorbance.clear();
         absorbance.resize(self.width * self.height, 0.0);
         let mut absorbances = Vec::new();
-        let indices: Vec<usize> = (0..phantoms.len()).collect();
+        let indices: Vec<usize> = (0..slide.phantoms.len()).collect();
         // One thread adds a tile while it is still in the cache.
         let chunk = match self.threads {
             Threads::One => 1,
             Threads::All => CHUNK,
         };
         for chunk in indices.chunks(chunk) {
-            let work = |&index: &usize| {
-                self.blur(scene, scene.objects[index].depth_um, &phantoms[index], &masks[index], focus)
-            };
+            let work =
+                |&index: &usize| self.blur(slide.scene, index, &slide.phantoms[index], &slide.masks[index], focus);
             let blurred = threads::map(self.threads, chunk, work);
             // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects whatever thread made them.
             for pieces in blurred {
                 for piece in pieces? {
-                    add(
-                        absorbance,
-                        self.width,
-                        TileRef { origin: piece.origin, width: piece.width, values: &piece.values },
-                    );
-                    absorbances.push(piece.mean);
+                    let tile = TileRef { origin: piece.origin, width: piece.width, values: &piece.values };
+                    add(absorbance, self.width, tile, piece.strength);
+                    absorbances.push(piece.mean * f64::from(piece.strength));
                     if let Cow::Owned(values) = piece.values {
                         self.spare().tiles.push(values);
                     }
                 }
             }
         }
-        Ok(absorbances)
+        Ok(Passage { absorbances: vec![absorbances], floored: 0 })
     }
 
-    /// Turns the absorbance into light, 10^(I_b − I_p), and spreads it in the image plane, band by band from the top.
-    pub(crate) fn spread(&self, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
-        let Light { empty_log10, whole, band, scratch } = light;
+    /// Turns the absorbance into light, 10^(I_b − I_p), and spreads it in the image plane.
+    pub(super) fn spread(&self, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
+        let Light { empty_log10, channels, bands, scratch, .. } = light;
         let (width, height) = (self.width, self.height);
+        bands.resize(1, Vec::new());
+        let (whole, band) = (&mut channels[0], &mut bands[0]);
         let mut lit = 0;
         for first in (0..height).step_by(BAND) {
             let end = (first + BAND).min(height);
@@ -168,7 +125,7 @@ impl LightPath {
             lit = needed;
             band.resize((end - first) * width, 0.0);
             self.in_plane.blur_rows_into(whole, width, Border::Reflect, first, band, scratch);
-            visit(Band { first, sharp: &whole[first * width..end * width], spread: band });
+            visit(Band { first, sharp: &whole[first * width..end * width], spread: &mut [band] });
         }
     }
 
@@ -176,7 +133,7 @@ impl LightPath {
     fn blur<'a>(
         &self,
         scene: &Scene,
-        depth_um: f64,
+        index: usize,
         phantom: &'a Phantom,
         masks: &[Mask],
         focus: FocusAt,
@@ -184,7 +141,7 @@ impl LightPath {
         let sigma_px = match focus {
             FocusAt::Everywhere => 0.0,
             // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
-            FocusAt::Depth(plane) => scene.optics.sigma_z_um_per_um * (plane - depth_um).abs() / scene.view.pixel_um,
+            FocusAt::Stage(plane) => self.px_per_um * (plane - scene.objects[index].depth_um).abs(),
         };
         let gaussian = (sigma_px > SHARP_PX)
             .then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL))
@@ -200,11 +157,12 @@ impl LightPath {
 
     fn blur_piece<'a>(&self, piece: &'a Piece, mask: &Mask, gaussian: Option<&Gaussian>) -> Blurred<'a> {
         let tile = &piece.absorbance;
+        let strength = dye_spectra::absorbance(&piece.dyes, self.wavelength_um) as f32;
         let margin = gaussian.map_or(0, Gaussian::radius);
         let origin = tile.origin.map(|at| at - margin as i64);
         let (width, height) = (tile.width + 2 * margin, tile.height() + 2 * margin);
         if !self.meets(origin, width, height) {
-            return Blurred { origin, width, values: Cow::Borrowed(&[]), mean: 0.0 };
+            return Blurred { origin, width, values: Cow::Borrowed(&[]), mean: 0.0, strength };
         }
         let values = match gaussian {
             None => Cow::Borrowed(&tile.values[..]),
@@ -218,7 +176,7 @@ impl LightPath {
             }
         };
         let mean = sum_over(mask.runs(), &values, width, origin) / (mask.area() as f64).max(1.0);
-        Blurred { origin, width, values, mean }
+        Blurred { origin, width, values, mean, strength }
     }
 
     /// Whether a tile has a pixel in the image.
@@ -234,30 +192,8 @@ impl LightPath {
 }
 
 #[multiversion(targets = "simd")]
-fn add(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value));
-}
-
-/// The background of a scene (Eqs. 8–10), in fractions of full scale.
-fn background(scene: &Scene) -> Result<Background, String> {
-    let view = scene.view;
-    let illumination = match scene.background.illumination {
-        SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
-        // A bowl whose top is off the centre, 1 − x2 (x − tx)² − …, has a tilt; the constant left over is in the level.
-        SceneIllumination::Bowl { x2, y2, top } => {
-            Illumination::Bowl { x2, y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
-        }
-    };
-    let params = BackgroundParams {
-        level: scene.background.level,
-        illumination,
-        scatter: Scatter {
-            strength: scene.background.scatter,
-            cell_px: (scene.background.scatter_um / view.pixel_um).max(1.0),
-            noise: FractalParams::default(),
-            ..Scatter::default()
-        },
-    };
-    let key = scene.key.stream("field", 0, "background").next_u64();
-    Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))
+fn add(image: &mut [f32], width: usize, tile: TileRef<'_>, strength: f32) {
+    lay(image, width, 0, tile, |row, values| {
+        row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += strength * value);
+    });
 }

@@ -1,8 +1,10 @@
 //! What a recipe must fulfil before anything is drawn from it.
 
+mod imaging;
+
 use std::fmt;
 
-use super::{Illumination, Law, Layout, Number, RECIPE_VERSION, Recipe};
+use super::{Law, Layout, Number, RECIPE_VERSION, Recipe};
 
 /// Something wrong with a recipe.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,8 +21,8 @@ impl fmt::Display for Problem {
     }
 }
 
-/// Most pixels that one plane may have: 2³⁰, a gigapixel.
-const MAX_PIXELS: f64 = 1_073_741_824.0;
+/// Most that light may be late: beyond it the transfer of phase is no longer near to linear.
+const MOST_PHASE_RAD: f64 = 3.0;
 
 struct Check {
     problems: Vec<Problem>,
@@ -31,6 +33,10 @@ impl Check {
         if let Some(message) = number.problem(low, high) {
             self.problems.push(Problem { field: field.to_owned(), message });
         }
+    }
+
+    fn add(&mut self, field: &str, message: String) {
+        self.problems.push(Problem { field: field.to_owned(), message });
     }
 
     fn numbers(&mut self, section: &str, fields: &[(&str, &Number, f64, f64)]) {
@@ -55,6 +61,10 @@ impl Check {
     }
 }
 
+pub(super) fn notes(recipe: &Recipe) -> Vec<Problem> {
+    imaging::notes(recipe)
+}
+
 pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
     let mut check = Check { problems: Vec::new() };
     if recipe.version != RECIPE_VERSION {
@@ -66,93 +76,11 @@ pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
             ),
         });
     }
-    imaging(recipe, &mut check);
+    imaging::check(recipe, &mut check);
     layout(recipe, &mut check);
     cells(recipe, &mut check);
     debris(recipe, &mut check);
     check.problems
-}
-
-fn imaging(recipe: &Recipe, check: &mut Check) {
-    let Recipe { field, focus, background, optics, camera, .. } = recipe;
-    check.numbers(
-        "field",
-        &[
-            ("width_px", &field.width_px, 16.0, 32_768.0),
-            ("height_px", &field.height_px, 16.0, 32_768.0),
-            ("pixel_um", &field.pixel_um, 0.05, 4.0),
-        ],
-    );
-    check.whole("field", &[("width_px", &field.width_px), ("height_px", &field.height_px)]);
-    check.whole("focus", &[("planes", &focus.planes)]);
-    check.whole("camera", &[("bits", &camera.bits)]);
-    let [_, width] = field.width_px.bounds();
-    let [_, height] = field.height_px.bounds();
-    if width * height > MAX_PIXELS {
-        check.problems.push(Problem {
-            field: "field.width_px".to_owned(),
-            message: format!("{width} x {height} pixels are more than the {MAX_PIXELS} that an image may have"),
-        });
-    }
-    check.numbers(
-        "focus",
-        &[
-            ("planes", &focus.planes, 1.0, 1024.0),
-            ("step_um", &focus.step_um, 1e-3, 100.0),
-            ("centre_um", &focus.centre_um, -1000.0, 1000.0),
-        ],
-    );
-    check.numbers(
-        "background",
-        &[
-            ("level", &background.level, 0.01, 1.0),
-            ("scatter", &background.scatter, 0.0, 0.5),
-            ("scatter_um", &background.scatter_um, 1.0, 10_000.0),
-        ],
-    );
-    match &background.illumination {
-        Illumination::Border { exponent } => check.number("background.illumination.exponent", exponent, 0.0, 2.0),
-        Illumination::Bowl { x2, y2, off_centre } => check.numbers(
-            "background.illumination",
-            &[("x2", x2, 0.0, 0.45), ("y2", y2, 0.0, 0.45), ("off_centre", off_centre, 0.0, 0.9)],
-        ),
-    }
-    // Eq. 10 takes the logarithm of H − c·I_pe, which must stay above zero.
-    let ([level, _], [_, scatter]) = (background.level.bounds(), background.scatter.bounds());
-    if scatter >= level {
-        check.problems.push(Problem {
-            field: "background.scatter".to_owned(),
-            message: format!(
-                "{} takes more light than `background.level` = {} leaves; expected less than {level}",
-                background.scatter, background.level
-            ),
-        });
-    }
-    check.numbers(
-        "optics",
-        &[("sigma_xy_um", &optics.sigma_xy_um, 0.0, 20.0), ("sigma_z_um_per_um", &optics.sigma_z_um_per_um, 0.0, 10.0)],
-    );
-    check.numbers(
-        "camera",
-        &[
-            ("bits", &camera.bits, 8.0, 16.0),
-            ("full_well_e", &camera.full_well_e, 10.0, 1e7),
-            ("read_noise_e", &camera.read_noise_e, 0.0, 1e5),
-            ("offset_dn", &camera.offset_dn, 0.0, 4096.0),
-        ],
-    );
-    let [bits, _] = camera.bits.bounds();
-    let [_, offset] = camera.offset_dn.bounds();
-    if offset >= libm::exp2(bits) / 2.0 {
-        check.problems.push(Problem {
-            field: "camera.offset_dn".to_owned(),
-            message: format!(
-                "{} is half of the {bits}-bit range or more; expected less than {}",
-                camera.offset_dn,
-                libm::exp2(bits) / 2.0
-            ),
-        });
-    }
 }
 
 fn layout(recipe: &Recipe, check: &mut Check) {
@@ -167,6 +95,9 @@ fn layout(recipe: &Recipe, check: &mut Check) {
             ("spacing_um", &slide.spacing_um, 0.0, 1000.0),
         ],
     );
+    if !(1..=1_000_000).contains(&slide.fields) {
+        check.add("slide.fields", format!("{} is outside 1 to 1000000", slide.fields));
+    }
     match &recipe.layout {
         Layout::Uniform {} | Layout::Map { .. } => {}
         Layout::Clusters { count, radius_um, outside } => {
@@ -195,6 +126,16 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ],
         );
         check.whole(&format!("cells.{class}"), &[("count", &mix.count)]);
+        let tints = &mix.tints;
+        let weights = [
+            ("cyanophilic", &tints.cyanophilic, 0.0, 1000.0),
+            ("eosinophilic", &tints.eosinophilic, 0.0, 1000.0),
+            ("orangeophilic", &tints.orangeophilic, 0.0, 1000.0),
+        ];
+        check.numbers(&format!("cells.{class}.tints"), &weights);
+        if weights.iter().all(|(_, weight, ..)| weight.bounds()[1] <= 0.0) {
+            check.add(&format!("cells.{class}.tints"), "no tint is left; expected one above 0".to_owned());
+        }
     }
     let cytoplasm = &recipe.cytoplasm;
     check.numbers(
@@ -210,6 +151,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("granular", &cytoplasm.granular, 0.0, 1.0),
             ("granules", &cytoplasm.granules, 0.0, 1000.0),
             ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
+            ("phase_rad", &cytoplasm.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
     let folds = &cytoplasm.folds;
@@ -254,11 +196,35 @@ fn cells(recipe: &Recipe, check: &mut Check) {
     check.numbers(
         "stain",
         &[
+            ("slide_cytoplasm", &stain.slide_cytoplasm, 0.0, 20.0),
+            ("slide_nucleus", &stain.slide_nucleus, 0.0, 20.0),
             ("field_cytoplasm", &stain.field_cytoplasm, 0.0, 20.0),
             ("field_nucleus", &stain.field_nucleus, 0.0, 20.0),
             ("field_texture", &stain.field_texture, 0.0, 20.0),
+            ("slide_balance", &stain.slide_balance, 0.0, 2.0),
+            ("field_balance", &stain.field_balance, 0.0, 2.0),
+            ("cell_balance", &stain.cell_balance, 0.0, 2.0),
         ],
     );
+    for (name, dyes) in [
+        ("cyanophilic", &stain.cyanophilic),
+        ("eosinophilic", &stain.eosinophilic),
+        ("orangeophilic", &stain.orangeophilic),
+        ("nucleus", &stain.nucleus),
+        ("bacillus", &stain.bacillus),
+        ("speckle", &stain.speckle),
+    ] {
+        let parts = [
+            ("haematein", dyes.haematein),
+            ("eosin_y", dyes.eosin_y),
+            ("light_green", dyes.light_green),
+            ("orange_g", dyes.orange_g),
+            ("neutral", dyes.neutral),
+        ];
+        for (dye, amount) in parts {
+            check.number(&format!("stain.{name}.{dye}"), &Number::Fixed(amount), 0.0, 100.0);
+        }
+    }
 }
 
 fn debris(recipe: &Recipe, check: &mut Check) {
@@ -291,6 +257,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("width_um", &bacilli.width_um, 0.1, 5.0),
             ("bend_deg", &bacilli.bend_deg, 0.0, 120.0),
             ("absorbance", &bacilli.absorbance, 0.0, 4.0),
+            ("phase_rad", &bacilli.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
     check.whole("debris.bacilli", &[("clusters", &bacilli.clusters), ("per_cluster", &bacilli.per_cluster)]);
@@ -301,6 +268,7 @@ fn debris(recipe: &Recipe, check: &mut Check) {
             ("count", &speckles.count, 0.0, 1e6),
             ("dilations", &speckles.dilations, 0.0, 50.0),
             ("absorbance", &speckles.absorbance, 0.0, 4.0),
+            ("phase_rad", &speckles.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
     check.whole("debris.speckles", &[("count", &speckles.count), ("dilations", &speckles.dilations)]);
@@ -326,7 +294,8 @@ mod tests {
     #[test]
     fn a_bad_field_is_named_with_its_value_and_what_would_do() {
         let mut recipe = Recipe::default();
-        recipe.optics.sigma_xy_um = Number::Fixed(f64::NAN);
+        recipe.optics =
+            crate::recipe::Optics::Gaussian { sigma_xy_um: Number::Fixed(f64::NAN), sigma_z_um_per_um: 0.25.into() };
         recipe.field.width_px = Number::Fixed(-3.0);
         recipe.background.scatter = Number::Fixed(0.95);
         recipe.nucleus.overlap_um = Number::Fixed(1.5);

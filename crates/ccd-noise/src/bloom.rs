@@ -1,0 +1,141 @@
+//! Blooming: charge that a full pixel cannot hold, on its way. Whole electrons, so that none is lost to rounding.
+
+/// Electrons that left the frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Spill {
+    /// By the anti-blooming drains.
+    pub(crate) drained: u64,
+    /// Over its border.
+    pub(crate) escaped: u64,
+}
+
+/// Leaves no pixel with more than `well` electrons.
+pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64, anti_blooming: f64) -> Spill {
+    let mut spill = Spill::default();
+    if charge.iter().all(|&c| c <= well) {
+        return spill;
+    }
+    let mut sideways = vec![0; width + 2];
+    for row in charge.chunks_exact_mut(width) {
+        if row.iter().any(|&c| c > well) {
+            sideways.fill(0);
+            for (x, charge) in row.iter_mut().enumerate().filter(|(_, charge)| **charge > well) {
+                let excess = *charge - well;
+                let drained = share(excess, anti_blooming);
+                let aside = share(excess - drained, 1.0 - vertical);
+                *charge -= drained + aside;
+                spill.drained += u64::from(drained);
+                // Of an odd number, the last goes to the left in every other column.
+                let left = (aside + u32::from(x.is_multiple_of(2))) / 2;
+                sideways[x] += left;
+                sideways[x + 2] += aside - left;
+            }
+            spill.escaped += u64::from(sideways[0]) + u64::from(sideways[width + 1]);
+            for (charge, aside) in row.iter_mut().zip(&sideways[1..]) {
+                *charge += aside;
+            }
+        }
+    }
+    // Half of it goes down, and what remains goes up.
+    let mut carried = vec![0; width];
+    for row in charge.chunks_exact_mut(width) {
+        carry(row, &mut carried, well, |excess| excess / 2);
+    }
+    spill.escaped += carried.iter().sum::<u64>();
+    carried.fill(0);
+    for row in charge.chunks_exact_mut(width).rev() {
+        carry(row, &mut carried, well, |excess| excess);
+    }
+    spill.escaped += carried.iter().sum::<u64>();
+    spill
+}
+
+/// Takes `part` of what a row has above `well` along, and leaves as much in it as it has room for.
+#[inline(always)]
+fn carry(row: &mut [u32], carried: &mut [u64], well: u32, part: impl Fn(u32) -> u32) {
+    for (charge, carried) in row.iter_mut().zip(carried) {
+        let taken = part(charge.saturating_sub(well));
+        let room = u64::from(well.saturating_sub(*charge));
+        let left = room.min(*carried);
+        *carried = *carried - left + u64::from(taken);
+        *charge = *charge - taken + narrow(left);
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not more than the whole")]
+fn share(whole: u32, of: f64) -> u32 {
+    (f64::from(whole) * of) as u32
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the room of a pixel")]
+fn narrow(charge: u64) -> u32 {
+    charge as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hash::SplitMix;
+
+    fn sum(charge: &[u32]) -> u64 {
+        charge.iter().map(|&c| u64::from(c)).sum()
+    }
+
+    #[test]
+    fn charge_is_conserved_to_the_electron() {
+        let (width, well) = (37, 18_000);
+        let mut words = SplitMix(20);
+        for vertical in [0.0, 0.3, 0.9, 1.0] {
+            for anti_blooming in [0.0, 0.2, 1.0] {
+                let mut charge: Vec<u32> =
+                    (0..width * 23).map(|_| u32::try_from(words.next() >> 51).unwrap()).collect();
+                for bright in [0, 36, 37 * 11 + 20, 37 * 12 + 20, 37 * 22, 37 * 23 - 1] {
+                    charge[bright] = 16_777_216;
+                }
+                let before = sum(&charge);
+                let excess: u64 = charge.iter().map(|&c| u64::from(c.saturating_sub(well))).sum();
+                let spill = spread(&mut charge, width, well, vertical, anti_blooming);
+                assert_eq!(sum(&charge) + spill.drained + spill.escaped, before);
+                assert!(charge.iter().all(|&c| c <= well));
+                assert!(spill.drained.abs_diff(share(u32::try_from(excess).unwrap(), anti_blooming).into()) < 10);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bright_pixel_fills_its_column() {
+        let (width, height, well) = (9, 101, 100);
+        let mut charge = vec![40; width * height];
+        charge[50 * width + 4] = 100 + 2 * 20 * 60;
+        let before = sum(&charge);
+        assert_eq!(spread(&mut charge, width, well, 1.0, 0.0), Spill::default());
+        assert_eq!(sum(&charge), before);
+        for y in 0..height {
+            for x in 0..width {
+                let full = x == 4 && y.abs_diff(50) <= 20;
+                assert_eq!(charge[y * width + x], if full { 100 } else { 40 }, "{x} {y}");
+            }
+        }
+        // Sideways it is as even: the streak is a cross with its neighbours' columns.
+        let mut charge = vec![0; width * height];
+        charge[50 * width + 4] = 100 + 1000;
+        spread(&mut charge, width, well, 0.5, 0.0);
+        let column = |x: usize| (0..height).map(|y| charge[y * width + x]).sum::<u32>();
+        assert_eq!([column(3), column(4), column(5)], [250, 600, 250]);
+        let full = vec![18_000; 60];
+        let mut untouched = full.clone();
+        assert_eq!(spread(&mut untouched, 6, 18_000, 0.5, 0.5), Spill::default());
+        assert_eq!(untouched, full);
+    }
+
+    #[test]
+    fn everything_can_leave() {
+        let mut charge = vec![1000; 50];
+        let spill = spread(&mut charge, 5, 10, 0.9, 0.0);
+        assert_eq!((spill.escaped, spill.drained), (50 * 990, 0));
+        assert_eq!(charge, vec![10; 50]);
+        let mut charge = vec![1000; 50];
+        assert_eq!(spread(&mut charge, 5, 10, 0.9, 1.0), Spill { drained: 50 * 990, escaped: 0 });
+        assert_eq!(charge, vec![10; 50]);
+    }
+}

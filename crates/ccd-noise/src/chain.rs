@@ -1,0 +1,312 @@
+//! The camera as its pixels see it, a row at a time.
+
+use crate::field::{blocks, padded};
+use crate::hash::{BLOCK, Block, RowWords};
+use crate::pattern::{Pattern, PatternRow, Traits};
+use crate::poisson::{at_least_nothing, poisson};
+use crate::{CameraParams, PhotonNoise, ReadNoise, SaturatedRun};
+
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Chain {
+    pub(crate) full_well: f32,
+    gain: f32,
+    offset: f32,
+    read_noise: f32,
+    /// Mean dark electrons.
+    dark: f32,
+    highest: f32,
+    photon_noise: PhotonNoise,
+    /// Where one normal deviate serves for both noises.
+    normal_from: f32,
+    pub(crate) pattern: Option<Pattern>,
+}
+
+/// Where saturated pixels of a row are noted, if anywhere.
+pub(crate) struct Marker<'a> {
+    pub(crate) y: u32,
+    pub(crate) runs: Option<&'a mut Vec<SaturatedRun>>,
+}
+
+impl Marker<'_> {
+    /// Notes the pixels of a block at `x` that are not 0, one run for those side by side.
+    #[cold]
+    #[inline(never)]
+    fn mark(&mut self, x: u32, full: &[u32; BLOCK]) {
+        let Some(runs) = &mut self.runs else { return };
+        for (x, _) in (0..).map(|i| x.wrapping_add(i)).zip(full).filter(|(_, full)| **full != 0) {
+            let x1 = x.wrapping_add(1);
+            match runs.last_mut() {
+                Some(last) if last.y == self.y && last.x1 == x => last.x1 = x1,
+                _ => runs.push(SaturatedRun { y: self.y, x0: x, x1 }),
+            }
+        }
+    }
+}
+
+impl Chain {
+    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    pub(crate) fn new(params: &CameraParams) -> Self {
+        let read_noise = match params.read_noise {
+            ReadNoise::Same { e } => e,
+            ReadNoise::PerPixel { median_e, .. } => median_e,
+        } as f32;
+        Self {
+            full_well: params.full_well_e as f32,
+            gain: params.gain_dn_per_e as f32,
+            offset: params.offset_dn as f32,
+            read_noise,
+            dark: params.dark_e() as f32,
+            highest: f32::from(params.max_dn()),
+            photon_noise: params.photon_noise,
+            normal_from: match params.photon_noise {
+                PhotonNoise::NormalAbove { mean_e } => mean_e as f32,
+                PhotonNoise::Exact | PhotonNoise::Off => f32::INFINITY,
+            },
+            pattern: Pattern::new(params, read_noise),
+        }
+    }
+
+    /// y before rounding: K·charge + offset
+    #[inline(always)]
+    fn level(&self, charge: f32) -> f32 {
+        self.gain * charge + self.offset
+    }
+
+    /// ⌊y + ½⌋ within the range of the converter.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
+    pub(crate) fn code(&self, dn: f32) -> u16 {
+        /// Added to an integer below it, it leaves the integer in the lowest bits.
+        const UNIT: f32 = 8_388_608.0;
+        ((dn + 0.5).floor().max(0.0).min(self.highest) + UNIT).to_bits() as u16
+    }
+
+    /// Mean electrons of a block of pixels, light and dark.
+    #[inline(always)]
+    fn means(&self, electrons: &[f32; BLOCK], traits: Option<&Traits>) -> [f32; BLOCK] {
+        let mut means = *electrons;
+        for (i, mean) in means.iter_mut().enumerate() {
+            let light = at_least_nothing(*mean);
+            *mean = traits.map_or(light, |traits| light * traits.response[i]) + self.dark;
+        }
+        means
+    }
+
+    /// Charges before and after reading, of a block of pixels.
+    #[inline(always)]
+    fn charges(
+        &self,
+        electrons: &[f32; BLOCK],
+        block: &Block<'_>,
+        traits: Option<&Traits>,
+    ) -> ([f32; BLOCK], [f32; BLOCK]) {
+        let [shot, read] = block.normal_pairs();
+        let means = self.means(electrons, traits);
+        // g_po and the standard deviation of g_g of Eq. 13
+        let mut noise = traits.map_or([self.read_noise; BLOCK], |traits| traits.read_noise);
+        let mut charge = match self.photon_noise {
+            PhotonNoise::Exact => poisson(&means, &shot, block),
+            PhotonNoise::Off => means,
+            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, traits, &mut noise, &shot, block),
+        };
+        for charge in &mut charge {
+            *charge = charge.min(self.full_well);
+        }
+        (charge, with_read_noise(&charge, &noise, &read, traits))
+    }
+
+    /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
+    #[inline(always)]
+    fn one_normal(
+        &self,
+        means: &[f32; BLOCK],
+        traits: Option<&Traits>,
+        noise: &mut [f32; BLOCK],
+        shot: &[f32; BLOCK],
+        block: &Block<'_>,
+    ) -> [f32; BLOCK] {
+        let mut everywhere = true;
+        for mean in means {
+            everywhere &= *mean >= self.normal_from;
+        }
+        let mut charge = if everywhere { *means } else { poisson(means, shot, block) };
+        for i in 0..BLOCK {
+            let read = traits.map_or(self.read_noise, |traits| traits.read_noise[i]);
+            let both = (means[i].min(self.full_well) + read * read).sqrt();
+            let normal = means[i] >= self.normal_from;
+            noise[i] = if normal { both } else { read };
+            charge[i] = if normal { means[i] } else { charge[i] };
+        }
+        charge
+    }
+
+    /// Whole electrons that a block of pixels gathers, as if they had room for them.
+    #[inline(always)]
+    fn gathered(&self, electrons: &[f32; BLOCK], block: &Block<'_>, traits: Option<&Traits>) -> [f32; BLOCK] {
+        let means = self.means(electrons, traits);
+        let [shot, _] = block.normal_pairs();
+        match self.photon_noise {
+            PhotonNoise::Exact => poisson(&means, &shot, block),
+            PhotonNoise::Off => means.map(f32::round),
+            PhotonNoise::NormalAbove { .. } => {
+                let mut charge = poisson(&means, &shot, block);
+                for i in 0..BLOCK {
+                    let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
+                    charge[i] = if means[i] >= self.normal_from { normal } else { charge[i] };
+                }
+                charge
+            }
+        }
+    }
+
+    /// Grey levels of a block and its saturated pixels, from the charges before and after reading.
+    #[inline(always)]
+    fn convert(&self, full_well: f32, before: &[f32; BLOCK], after: &[f32; BLOCK]) -> ([u16; BLOCK], [u32; BLOCK]) {
+        let mut codes = [0; BLOCK];
+        let mut full = [0; BLOCK];
+        for i in 0..BLOCK {
+            let dn = self.level(after[i]);
+            codes[i] = self.code(dn);
+            let saturated = (before[i] >= full_well) | (dn + 0.5 >= self.highest);
+            full[i] = u32::from(saturated);
+        }
+        (codes, full)
+    }
+}
+
+/// N + d + σ·n, where d is 0 without a fixed pattern.
+#[inline(always)]
+fn with_read_noise(
+    charge: &[f32; BLOCK],
+    noise: &[f32; BLOCK],
+    read: &[f32; BLOCK],
+    traits: Option<&Traits>,
+) -> [f32; BLOCK] {
+    let mut after = [0.0; BLOCK];
+    for i in 0..BLOCK {
+        let offset = traits.map_or(charge[i], |traits| charge[i] + traits.offset[i]);
+        after[i] = offset + noise[i] * read[i];
+    }
+    after
+}
+
+/// Puts the block at `x` out and returns the number of its saturated pixels.
+#[inline(always)]
+fn finish(codes: [u16; BLOCK], mut full: [u32; BLOCK], x: u32, out: &mut [u16], marker: &mut Marker<'_>) -> usize {
+    if let Some(out) = out.first_chunk_mut() {
+        *out = codes;
+    } else {
+        full[out.len()..].fill(0);
+        out.copy_from_slice(&codes[..out.len()]);
+    }
+    let saturated = full.iter().sum::<u32>();
+    if saturated != 0 {
+        marker.mark(x, &full);
+    }
+    saturated as usize
+}
+
+#[multiversion::multiversion(targets = "simd")]
+pub(crate) fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
+    for (dn, &mean) in out.iter_mut().zip(electrons) {
+        let charge = (at_least_nothing(mean) + chain.dark).min(chain.full_well);
+        *dn = chain.level(charge).max(0.0).min(chain.highest);
+    }
+}
+
+#[inline(always)]
+fn expose(
+    chain: &Chain,
+    row: &RowWords,
+    pattern: Option<&PatternRow<'_>>,
+    x: u32,
+    electrons: &[f32],
+    out: &mut [u16],
+    marker: &mut Marker<'_>,
+) -> usize {
+    let mut saturated = 0;
+    let both = electrons.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
+    for (x, (electrons, out)) in blocks(x).zip(both) {
+        // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
+        let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
+        let traits = pattern.map(|pattern| pattern.block(x));
+        let (before, after) = chain.charges(&electrons, &row.block(x), traits.as_ref());
+        let (codes, full) = chain.convert(chain.full_well, &before, &after);
+        saturated += finish(codes, full, x, out, marker);
+    }
+    saturated
+}
+
+/// A row of a camera whose pixels are alike.
+#[multiversion::multiversion(targets = "simd")]
+pub(crate) fn expose_row(
+    chain: &Chain,
+    row: &RowWords,
+    x: u32,
+    electrons: &[f32],
+    out: &mut [u16],
+    marker: &mut Marker<'_>,
+) -> usize {
+    expose(chain, row, None, x, electrons, out, marker)
+}
+
+/// A row of a camera with a fixed pattern.
+#[multiversion::multiversion(targets = "simd")]
+pub(crate) fn expose_uneven_row(
+    chain: &Chain,
+    row: &RowWords,
+    pattern: &PatternRow<'_>,
+    x: u32,
+    electrons: &[f32],
+    out: &mut [u16],
+    marker: &mut Marker<'_>,
+) -> usize {
+    expose(chain, row, Some(pattern), x, electrons, out, marker)
+}
+
+/// The whole electrons that a row gathers.
+#[multiversion::multiversion(targets = "simd")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts from 0 to 2²⁵")]
+pub(crate) fn gather_row(
+    chain: &Chain,
+    row: &RowWords,
+    pattern: Option<&PatternRow<'_>>,
+    electrons: &[f32],
+    charge: &mut [u32],
+) {
+    let both = electrons.chunks(BLOCK).zip(charge.chunks_mut(BLOCK));
+    for (x, (electrons, charge)) in blocks(0).zip(both) {
+        let traits = pattern.map(|pattern| pattern.block(x));
+        let gathered = chain.gathered(&padded(electrons), &row.block(x), traits.as_ref());
+        for (charge, gathered) in charge.iter_mut().zip(gathered) {
+            *charge = gathered as u32;
+        }
+    }
+}
+
+/// A row read out of whole electrons, at most `full_well` of them.
+#[multiversion::multiversion(targets = "simd")]
+pub(crate) fn read_row(
+    chain: &Chain,
+    row: &RowWords,
+    pattern: Option<&PatternRow<'_>>,
+    full_well: u32,
+    charge: &[u32],
+    out: &mut [u16],
+    marker: &mut Marker<'_>,
+) -> usize {
+    let mut saturated = 0;
+    for (x, (charge, out)) in blocks(0).zip(charge.chunks(BLOCK).zip(out.chunks_mut(BLOCK))) {
+        let traits = pattern.map(|pattern| pattern.block(x));
+        let noise = traits.as_ref().map_or([chain.read_noise; BLOCK], |traits| traits.read_noise);
+        let [_, read] = row.block(x).normal_pairs();
+        let mut before = [0.0; BLOCK];
+        for (before, &charge) in before.iter_mut().zip(charge) {
+            *before = charge as f32;
+        }
+        let after = with_read_noise(&before, &noise, &read, traits.as_ref());
+        let (codes, full) = chain.convert(full_well as f32, &before, &after);
+        saturated += finish(codes, full, x, out, marker);
+    }
+    saturated
+}

@@ -1,0 +1,98 @@
+//! How slides, fields and cells took up the stain: its strength, and the balance of its dyes.
+
+use dye_spectra::{Amounts, DYES};
+use rand_core::Rng;
+
+use crate::key::Key;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number, Recipe, TintMix};
+
+use super::draw::FieldNumbers;
+use super::{SceneDyes, Tint};
+
+/// The number of the slide that an image shows.
+pub(super) fn slide_of(recipe: &Recipe, key: Key) -> u64 {
+    key.index / recipe.slide.fields.max(1) as u64
+}
+
+/// The stain of a field.
+pub(super) struct FieldStain<'a> {
+    recipe: &'a Recipe,
+    /// Factor on the absorbance of cytoplasm.
+    pub(super) cytoplasm: f64,
+    /// Factor on the absorbance of nuclei.
+    pub(super) nucleus: f64,
+    /// Factor on the contrast of the texture inside nuclei.
+    pub(super) texture: f64,
+    /// Factors on the amounts of dyes.
+    balance: Amounts,
+}
+
+impl<'a> FieldStain<'a> {
+    pub(super) fn draw(recipe: &'a Recipe, field: &FieldNumbers) -> Self {
+        let stain = &recipe.stain;
+        let slide = FieldNumbers { key: Key { index: slide_of(recipe, field.key), ..field.key } };
+        let of_slide = |name: &str, number: &Number| number.draw(&mut slide.key.stream("slide", 0, name));
+        let of_field = |name: &str, number: &Number| field.draw(name, number);
+        let mut balance = [1.0; DYES];
+        let mut shift = |sd: f64, rng: &mut crate::key::Stream| {
+            for factor in &mut balance {
+                *factor *= libm::exp(sd * random::normal(rng));
+            }
+        };
+        shift(
+            of_slide("stain.slide_balance", &stain.slide_balance),
+            &mut slide.key.stream("slide", 0, "stain.balance"),
+        );
+        shift(
+            of_field("stain.field_balance", &stain.field_balance),
+            &mut field.key.stream("field", 0, "stain.balance"),
+        );
+        Self {
+            recipe,
+            cytoplasm: of_slide("stain.slide_cytoplasm", &stain.slide_cytoplasm)
+                * of_field("stain.field_cytoplasm", &stain.field_cytoplasm),
+            nucleus: of_slide("stain.slide_nucleus", &stain.slide_nucleus)
+                * of_field("stain.field_nucleus", &stain.field_nucleus),
+            texture: of_field("stain.field_texture", &stain.field_texture),
+            balance,
+        }
+    }
+
+    /// The dyes of what is no epithelial cell.
+    pub(super) fn debris(&self) -> SceneDyes {
+        let stain = &self.recipe.stain;
+        SceneDyes {
+            nucleus: self.balanced(&stain.nucleus),
+            bacillus: self.balanced(&stain.bacillus),
+            // What is grey did not come with the stain.
+            speckle: stain.speckle.amounts(),
+        }
+    }
+
+    /// The tint of a cell, and the dyes of its cytoplasm and its nucleus.
+    pub(super) fn cell<R: Rng + ?Sized>(&self, tints: &TintMix, rng: &mut R) -> (Tint, Amounts, Amounts) {
+        let stain = &self.recipe.stain;
+        let weights = [&tints.cyanophilic, &tints.eosinophilic, &tints.orangeophilic].map(|weight| weight.draw(rng));
+        let at = random::uniform(rng) * weights.iter().sum::<f64>();
+        let (tint, dyes) = if at < weights[0] || weights[1] + weights[2] == 0.0 {
+            (Tint::Cyanophilic, &stain.cyanophilic)
+        } else if at < weights[0] + weights[1] || weights[2] == 0.0 {
+            (Tint::Eosinophilic, &stain.eosinophilic)
+        } else {
+            (Tint::Orangeophilic, &stain.orangeophilic)
+        };
+        let sd = stain.cell_balance.draw(rng);
+        let mut shifted =
+            |dyes: &DyeAmounts| self.balanced(dyes).map(|amount| amount * libm::exp(sd * random::normal(rng)));
+        (tint, shifted(dyes), shifted(&stain.nucleus))
+    }
+
+    fn balanced(&self, dyes: &DyeAmounts) -> Amounts {
+        let mut amounts = dyes.amounts();
+        for (amount, factor) in amounts.iter_mut().zip(&self.balance) {
+            *amount *= factor;
+        }
+        amounts
+    }
+}

@@ -1,0 +1,171 @@
+//! What one object lets through of each channel's light, and how late, on its own rectangle of the slide's grid.
+
+use dye_spectra::{Amounts, Colour, DYES};
+use multiversion::multiversion;
+
+use crate::exp10::exp10_from;
+use crate::phantom::tile::{Tile, lay_at};
+use crate::phantom::{Phantom, Piece};
+use crate::truth::COVERED;
+
+/// How dyes become absorbance.
+pub(super) enum Mixer {
+    /// At one wavelength, µm.
+    Monochrome(f64),
+    /// Over the bands of three channels.
+    Colour(Box<Colour>),
+}
+
+/// A rectangle of the slide's grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) origin: [i64; 2],
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// An object on its rectangle.
+#[derive(Debug, Default)]
+pub(super) struct Canvas {
+    /// Light that comes through, 0 to 1, channel by channel.
+    pub(super) transmittance: Vec<Vec<f32>>,
+    /// How late it comes, radians; empty if it does not.
+    pub(super) phase_rad: Vec<f32>,
+    /// Absorbance, or the amounts of dyes, on the way there.
+    amounts: [Vec<f32>; DYES],
+    zeros: Vec<f32>,
+}
+
+impl Window {
+    /// The smallest rectangle of whole pixels, of `n` grid points a side, that holds the tiles within `limits`; nothing if
+    /// there is none.
+    pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, limits: Self, n: usize) -> Option<Self> {
+        let mut low = [i64::MAX; 2];
+        let mut high = [i64::MIN; 2];
+        for tile in tiles {
+            for (axis, length) in [tile.width, tile.height()].into_iter().enumerate() {
+                low[axis] = low[axis].min(tile.origin[axis]);
+                high[axis] = high[axis].max(tile.origin[axis] + length as i64);
+            }
+        }
+        let n = n as i64;
+        let limit = [limits.width, limits.height];
+        let mut sides = [0; 2];
+        for axis in 0..2 {
+            low[axis] = low[axis].max(limits.origin[axis]).div_euclid(n) * n;
+            high[axis] = -(-high[axis].min(limits.origin[axis] + limit[axis] as i64)).div_euclid(n) * n;
+            sides[axis] = usize::try_from(high[axis] - low[axis]).unwrap_or(0);
+        }
+        (sides[0] > 0 && sides[1] > 0).then_some(Self { origin: low, width: sides[0], height: sides[1] })
+    }
+
+    fn samples(self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl Mixer {
+    pub(super) fn channels(&self) -> usize {
+        match self {
+            Self::Monochrome(_) => 1,
+            Self::Colour(_) => 3,
+        }
+    }
+
+    /// Absorbance of dyes in the middle of a channel's band.
+    fn absorbance(&self, dyes: &Amounts, channel: usize) -> f64 {
+        let wavelength = match self {
+            Self::Monochrome(wavelength) => *wavelength,
+            Self::Colour(colour) => colour.channels()[channel].wavelength_um,
+        };
+        dye_spectra::absorbance(dyes, wavelength)
+    }
+
+    /// The share that each piece has, over what it covers, in what the whole object absorbs of each channel's light.
+    pub(super) fn shares(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
+        let pieces = &phantom.pieces;
+        let share = |piece: &Piece, strengths: &[f32], own: f32| {
+            if pieces.len() == 1 {
+                return 1.0;
+            }
+            let tile = &piece.absorbance;
+            let window = Window { origin: tile.origin, width: tile.width, height: tile.height() };
+            let mut whole = vec![0.0; window.samples()];
+            for (other, strength) in pieces.iter().zip(strengths) {
+                add(&mut whole, window, &other.absorbance, *strength);
+            }
+            let mut sums = [0.0; 2];
+            for ((cover, value), whole) in piece.coverage.values.iter().zip(&tile.values).zip(&whole) {
+                if *cover >= COVERED {
+                    sums[0] += f64::from(own * value);
+                    sums[1] += f64::from(*whole);
+                }
+            }
+            if sums[1] > 0.0 { sums[0] / sums[1] } else { 0.0 }
+        };
+        let of_channel = |channel: usize| {
+            let strengths: Vec<f32> = pieces.iter().map(|piece| self.absorbance(&piece.dyes, channel) as f32).collect();
+            pieces.iter().zip(&strengths).map(|(piece, own)| share(piece, &strengths, *own)).collect()
+        };
+        (0..self.channels()).map(of_channel).collect()
+    }
+
+    /// Lets light through the pieces of an object.
+    pub(super) fn compose(&self, pieces: &[Piece], window: Window, canvas: &mut Canvas) {
+        let samples = window.samples();
+        let Canvas { transmittance, phase_rad, amounts, zeros } = canvas;
+        transmittance.resize(self.channels(), Vec::new());
+        match self {
+            Self::Monochrome(wavelength) => {
+                let [absorbance, ..] = amounts;
+                clear(absorbance, samples);
+                for piece in pieces {
+                    let strength = dye_spectra::absorbance(&piece.dyes, *wavelength) as f32;
+                    add(absorbance, window, &piece.absorbance, strength);
+                }
+                clear(zeros, samples);
+                // Beer and Lambert: T = 10^(−A).
+                exp10_from(zeros, absorbance);
+                core::mem::swap(absorbance, &mut transmittance[0]);
+            }
+            Self::Colour(colour) => {
+                for (dye, amount) in amounts.iter_mut().enumerate() {
+                    amount.clear();
+                    // A dye that is nowhere needs no plane.
+                    if pieces.iter().any(|piece| piece.dyes[dye] > 0.0) {
+                        amount.resize(samples, 0.0);
+                    }
+                    for piece in pieces.iter().filter(|piece| piece.dyes[dye] > 0.0) {
+                        add(amount, window, &piece.absorbance, piece.dyes[dye] as f32);
+                    }
+                }
+                for channel in transmittance.iter_mut() {
+                    channel.resize(samples, 0.0);
+                }
+                let [r, g, b] = &mut transmittance[..] else { return };
+                let [h, e, l, o, n] = &*amounts;
+                colour.transmittance_into([h, e, l, o, n], [r, g, b]);
+            }
+        }
+        phase_rad.clear();
+        if pieces.iter().any(|piece| piece.phase_rad != 0.0) {
+            phase_rad.resize(samples, 0.0);
+            for piece in pieces.iter().filter(|piece| piece.phase_rad != 0.0) {
+                add(phase_rad, window, &piece.absorbance, piece.phase_rad as f32);
+            }
+        }
+    }
+}
+
+fn clear(values: &mut Vec<f32>, samples: usize) {
+    values.clear();
+    values.resize(samples, 0.0);
+}
+
+/// Adds a tile, so many times as strong, to a rectangle.
+#[multiversion(targets = "simd")]
+pub(super) fn add(values: &mut [f32], window: Window, tile: &Tile, strength: f32) {
+    lay_at(values, window.width, window.origin, tile.as_ref(), |row, tile| {
+        row.iter_mut().zip(tile).for_each(|(value, tile)| *value += strength * tile);
+    });
+}

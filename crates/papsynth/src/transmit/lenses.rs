@@ -1,0 +1,48 @@
+//! Microscopes that were met before, with everything that was computed for them.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use optics_psf::{Fft, Microscope, MicroscopeParams, PatchImager};
+
+/// Microscopes that are remembered: a colour image needs three, one of single wavelengths sixteen.
+const REMEMBERED: usize = 20;
+
+/// All microscopes of an engine.
+#[derive(Debug)]
+pub(crate) struct Lenses {
+    fft: Fft,
+    known: Mutex<Vec<Arc<Lens>>>,
+}
+
+/// One microscope in the light of one channel.
+#[derive(Debug)]
+pub(crate) struct Lens {
+    params: MicroscopeParams,
+    pub(crate) fft: Fft,
+    pub(crate) imager: PatchImager,
+}
+
+impl Lenses {
+    pub(crate) fn new(fft: Fft) -> Self {
+        Self { fft, known: Mutex::default() }
+    }
+
+    /// The microscope of these parameters.
+    pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, String> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = known.iter().position(|lens| lens.params == *params) {
+            // Those used last stand last.
+            let lens = known.remove(at);
+            known.push(Arc::clone(&lens));
+            return Ok(lens);
+        }
+        let microscope = Microscope::new(params).map_err(|e| format!("optics: {e}"))?;
+        let imager = PatchImager::new(&microscope, self.fft);
+        let lens = Arc::new(Lens { params: params.clone(), fft: self.fft, imager });
+        if known.len() == REMEMBERED {
+            known.remove(0);
+        }
+        known.push(Arc::clone(&lens));
+        Ok(lens)
+    }
+}

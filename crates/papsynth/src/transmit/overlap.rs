@@ -1,0 +1,194 @@
+//! Colours where stained things lie over each other.
+//!
+//! Of each object the mean light of a channel's band is filtered, and the means of several objects are multiplied. That
+//! is too dark where they absorb the same wavelengths: the first leaves less to absorb for the second. What is wrong is
+//! the ratio of the light behind all dyes together to the product of the lights behind each object's, and by that the
+//! picture is multiplied. It is computed on the camera's pixels from amounts of dye blurred as far as each object is
+//! out of focus.
+
+use dye_spectra::{Colour, DYES};
+use multiversion::multiversion;
+use optics_psf::{Gaussian, Method, Scratch};
+
+use super::canvas::{Window, add};
+use crate::phantom::Phantom;
+use crate::phantom::tile::{Tile, TileRef, lay};
+use crate::threads::{self, Threads};
+
+/// Absorbance below which an object changes no colour behind it.
+const FAINT: f32 = 0.01;
+
+/// Blur that is not worth the while, px.
+const SHARP_PX: f64 = 0.5;
+
+/// Share of a blurred amount that is left out.
+const LOST_TAIL: f64 = 1e-3;
+
+/// What overlaps in a scene: for each object that meets another its pieces' absorbances, on the camera's pixels.
+pub(super) struct Overlaps {
+    width: usize,
+    height: usize,
+    objects: Vec<Overlapping>,
+}
+
+struct Overlapping {
+    index: usize,
+    /// The absorbance of each piece.
+    pieces: Vec<Tile>,
+}
+
+/// An object's amounts of dye, and what they let through.
+struct Stained {
+    window: Window,
+    amounts: [Vec<f32>; DYES],
+    transmittance: [Vec<f32>; 3],
+}
+
+impl Overlaps {
+    pub(super) fn new(phantoms: &[Phantom], width: usize, height: usize, n: usize, threads: Threads) -> Self {
+        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained(phantom, width, height, n)).collect();
+        // Sorted by their left edges, only neighbours can meet.
+        let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
+        order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
+        let mut meets = vec![false; boxes.len()];
+        for (at, &i) in order.iter().enumerate() {
+            let Some(a) = boxes[i] else { continue };
+            for &j in &order[at + 1..] {
+                let Some(b) = boxes[j] else { continue };
+                if b.origin[0] >= a.origin[0] + a.width as i64 {
+                    break;
+                }
+                if b.origin[1] < a.origin[1] + a.height as i64 && a.origin[1] < b.origin[1] + b.height as i64 {
+                    (meets[i], meets[j]) = (true, true);
+                }
+            }
+        }
+        let indices: Vec<usize> = (0..boxes.len()).filter(|&i| meets[i]).collect();
+        let objects = threads::map(threads, &indices, |&index| Overlapping {
+            index,
+            pieces: phantoms[index].pieces.iter().map(|piece| piece.absorbance.coarsened(n)).collect(),
+        });
+        Self { width, height, objects }
+    }
+
+    /// Corrects three channels. `blur_px` says how widely each object is blurred, as a standard deviation.
+    pub(super) fn correct(
+        &self,
+        colour: &Colour,
+        phantoms: &[Phantom],
+        blur_px: impl Fn(usize) -> f64 + Sync + Send,
+        channels: &mut [Vec<f32>],
+        threads: Threads,
+    ) -> Result<(), String> {
+        if self.objects.len() < 2 {
+            return Ok(());
+        }
+        let pixels = self.width * self.height;
+        let mut layers = vec![0.0_f32; pixels];
+        let mut totals: [Vec<f32>; DYES] = core::array::from_fn(|_| vec![0.0; pixels]);
+        let mut products: [Vec<f32>; 3] = core::array::from_fn(|_| vec![1.0; pixels]);
+        let stained = threads::map(threads, &self.objects, |object| {
+            object.stain(colour, &phantoms[object.index], blur_px(object.index))
+        });
+        for stained in stained {
+            let stained = stained?;
+            let tile = |values| TileRef { origin: stained.window.origin, width: stained.window.width, values };
+            for (total, amounts) in totals.iter_mut().zip(&stained.amounts).filter(|(_, amounts)| !amounts.is_empty()) {
+                sum(total, self.width, tile(amounts));
+            }
+            for (product, transmittance) in products.iter_mut().zip(&stained.transmittance) {
+                multiply(product, self.width, tile(transmittance));
+            }
+            count(&mut layers, self.width, tile(&stained.transmittance[1]));
+        }
+        let [h, e, l, o, n] = &totals;
+        let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; self.width]);
+        for y in 0..self.height {
+            let row = y * self.width..(y + 1) * self.width;
+            if layers[row.clone()].iter().all(|layers| *layers < 2.0) {
+                continue;
+            }
+            let [r, g, b] = &mut together;
+            colour.transmittance_into([h, e, l, o, n].map(|dye| &dye[row.clone()]), [r, g, b]);
+            for ((channel, product), together) in channels.iter_mut().zip(&products).zip(&together) {
+                scale(&mut channel[row.clone()], together, &product[row.clone()], &layers[row.clone()]);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Overlapping {
+    fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, String> {
+        let blurred;
+        let pieces = if blur_px > SHARP_PX {
+            let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL).map_err(|e| e.to_string())?;
+            blurred = self.pieces.iter().map(|tile| spread(&gaussian, tile)).collect::<Vec<_>>();
+            &blurred
+        } else {
+            &self.pieces
+        };
+        let everywhere = Window { origin: [i64::MIN / 4; 2], width: usize::MAX / 4, height: usize::MAX / 4 };
+        let Some(window) = Window::around(pieces.iter(), everywhere, 1) else {
+            return Err("an object has no pixel".to_owned());
+        };
+        let samples = window.width * window.height;
+        let mut amounts: [Vec<f32>; DYES] = Default::default();
+        for (dye, amounts) in amounts.iter_mut().enumerate() {
+            for (piece, tile) in phantom.pieces.iter().zip(pieces).filter(|(piece, _)| piece.dyes[dye] > 0.0) {
+                amounts.resize(samples, 0.0);
+                add(amounts, window, tile, piece.dyes[dye] as f32);
+            }
+        }
+        let mut transmittance: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; samples]);
+        let ([h, e, l, o, n], [r, g, b]) = (&amounts, &mut transmittance);
+        colour.transmittance_into([h, e, l, o, n], [r, g, b]);
+        Ok(Stained { window, amounts, transmittance })
+    }
+}
+
+/// The camera's pixels over which an object is stained enough to matter.
+fn stained(phantom: &Phantom, width: usize, height: usize, n: usize) -> Option<Window> {
+    let frame = Window { origin: [0, 0], width: width * n, height: height * n };
+    let strong = phantom.pieces.iter().filter(|piece| {
+        let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
+        piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
+    });
+    let window = Window::around(strong.map(|piece| &piece.absorbance), frame, n)?;
+    Some(Window { origin: window.origin.map(|at| at / n as i64), width: window.width / n, height: window.height / n })
+}
+
+fn spread(gaussian: &Gaussian, tile: &Tile) -> Tile {
+    let margin = gaussian.radius();
+    let width = tile.width + 2 * margin;
+    let mut values = vec![0.0; width * (tile.height() + 2 * margin)];
+    gaussian.spread_into(&tile.values, tile.width, &mut values, &mut Scratch::default());
+    Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
+}
+
+#[multiversion(targets = "simd")]
+fn sum(image: &mut [f32], width: usize, tile: TileRef<'_>) {
+    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value));
+}
+
+#[multiversion(targets = "simd")]
+fn multiply(image: &mut [f32], width: usize, tile: TileRef<'_>) {
+    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
+}
+
+/// Counts what is not empty.
+#[multiversion(targets = "simd")]
+fn count(image: &mut [f32], width: usize, tile: TileRef<'_>) {
+    lay(image, width, 0, tile, |row, values| {
+        row.iter_mut().zip(values).for_each(|(layers, value)| *layers += if *value < 1.0 { 1.0 } else { 0.0 });
+    });
+}
+
+/// Multiplies by the ratio of what dyes let through together to what they would one by one, where there are several.
+#[multiversion(targets = "simd")]
+fn scale(channel: &mut [f32], together: &[f32], product: &[f32], layers: &[f32]) {
+    for (((light, together), product), layers) in channel.iter_mut().zip(together).zip(product).zip(layers) {
+        let ratio = together / product.max(f32::MIN_POSITIVE);
+        *light *= if *layers >= 2.0 { ratio } else { 1.0 };
+    }
+}

@@ -1,0 +1,449 @@
+//! Light: what the engine makes of the optics and of the stain, held against laws and against its own slower ways.
+
+#![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
+
+use papsynth::key::Key;
+use papsynth::model::Model;
+use papsynth::recipe::{DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe};
+use papsynth::recipe::{Rendition, Restore};
+use papsynth::scene::{Body, Kind};
+use papsynth::truth::Part;
+use papsynth::{Engine, Error, Frame, Inputs};
+
+/// A small field under an even lamp, without noise to speak of.
+fn small() -> Recipe {
+    let mut recipe = Preset::Lbc.recipe();
+    recipe.field.width_px = 160.0.into();
+    recipe.field.height_px = 128.0.into();
+    recipe.layout = Layout::Uniform {};
+    recipe.slide.spacing_um = 2.0.into();
+    for mix in recipe.cells.values_mut() {
+        mix.count = 2.0.into();
+    }
+    recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
+    recipe.background.scatter = 0.0.into();
+    recipe.camera.bits = 16.0.into();
+    recipe
+}
+
+/// Nothing on the slide.
+fn empty() -> Recipe {
+    let mut recipe = small();
+    recipe.cells.clear();
+    recipe.debris.leukocytes.clusters = 0.0.into();
+    recipe.debris.bacilli.clusters = 0.0.into();
+    recipe.debris.speckles.count = 0.0.into();
+    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe
+}
+
+fn set(recipe: &mut Recipe, change: impl FnOnce(Fields<'_>)) {
+    let Optics::BrightField { condenser_na, stray_light, extra_blur_um, imaging, mount_index, .. } = &mut recipe.optics
+    else {
+        panic!("the default is bright field")
+    };
+    change(Fields { condenser_na, stray_light, extra_blur_um, imaging, mount_index });
+}
+
+struct Fields<'a> {
+    condenser_na: &'a mut Number,
+    stray_light: &'a mut Number,
+    extra_blur_um: &'a mut Number,
+    imaging: &'a mut Imaging,
+    mount_index: &'a mut Number,
+}
+
+fn engine(recipe: &Recipe) -> Engine {
+    Engine::new(recipe, &Model::builtin(), &Inputs::default()).unwrap()
+}
+
+fn frame(recipe: &Recipe, index: u64) -> Frame {
+    engine(recipe).frame(Key { seed: 11, index }).unwrap()
+}
+
+fn light(recipe: &Recipe) -> Vec<f32> {
+    frame(recipe, 0).planes.swap_remove(0).noise_free
+}
+
+/// ‖a − b‖ / ‖white − b‖: the error relative to the contrast.
+fn error(a: &[f32], b: &[f32]) -> f64 {
+    let white = f64::from(b.iter().copied().fold(0.0, f32::max));
+    let square = |x: f64| x * x;
+    let off: f64 = a.iter().zip(b).map(|(a, b)| square(f64::from(a - b))).sum();
+    let contrast: f64 = b.iter().map(|b| square(white - f64::from(*b))).sum();
+    (off / contrast).sqrt()
+}
+
+fn colour(recipe: &mut Recipe, mixing: Mixing, rendition: Rendition) {
+    recipe.light = Light::Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.3.into(), rendition };
+}
+
+#[test]
+fn an_empty_slide_is_as_bright_as_the_lamp_whatever_the_optics() {
+    let mut recipe = empty();
+    recipe.background.level = 0.8.into();
+    let mut gaussian = recipe.clone();
+    gaussian.optics = Optics::gaussian();
+    let mut rgb = recipe.clone();
+    colour(&mut rgb, Mixing::Spectral, Rendition::Raw);
+    for (name, recipe) in [("bright field", &recipe), ("gaussian", &gaussian), ("colour", &rgb)] {
+        let light = light(recipe);
+        assert!(light.iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4), "{name}: {:?}", &light[..3]);
+    }
+    set(&mut recipe, |optics| *optics.stray_light = 0.2.into());
+    assert!(light(&recipe).iter().all(|v| (v / 65_535.0 - 0.8).abs() < 1e-4), "glare is light of the empty field");
+}
+
+#[test]
+fn products_come_near_to_light_carried_from_slab_to_slab_and_gaussians_do_not() {
+    let mut recipe = small();
+    recipe.debris.bacilli.clusters = 3.0.into();
+    recipe.focus.centre_um = 1.5.into();
+    let product = light(&recipe);
+    set(&mut recipe, |optics| *optics.imaging = Imaging::Abbe);
+    let abbe = light(&recipe);
+    let off = error(&product, &abbe);
+    assert!(off < 0.02, "{off}");
+    for (sigma_z, least) in [(0.25, 0.02), (1.0, 0.08)] {
+        // The paper's stage and depth are one; the same focus in the mountant.
+        recipe.focus.centre_um = (1.5 * 1.515).into();
+        recipe.optics = Optics::Gaussian { sigma_xy_um: 0.175.into(), sigma_z_um_per_um: sigma_z.into() };
+        let off = error(&light(&recipe), &abbe);
+        assert!(off > least, "{sigma_z}: {off}");
+    }
+}
+
+#[test]
+fn adding_planes_never_changes_a_plane() {
+    for rgb in [false, true] {
+        let mut recipe = small();
+        if rgb {
+            colour(&mut recipe, Mixing::Spectral, Rendition::Raw);
+        }
+        let alone = frame(&recipe, 0);
+        recipe.focus.planes = 5.0.into();
+        recipe.focus.step_um = 3.0.into();
+        let stack = frame(&recipe, 0);
+        assert_eq!(stack.planes[2].noise_free, alone.planes[0].noise_free, "the middle plane is the single one");
+        recipe.focus.planes = 9.0.into();
+        let more = frame(&recipe, 0);
+        for (few, many) in stack.planes.iter().zip(&more.planes[2..7]) {
+            assert_eq!(few.noise_free, many.noise_free);
+        }
+    }
+}
+
+#[test]
+fn the_focus_goes_deeper_than_the_stage_by_the_mountants_index() {
+    let mut recipe = small();
+    recipe.focus.planes = 21.0.into();
+    recipe.focus.step_um = 0.4.into();
+    recipe.slide.depth_um = 0.0.into();
+    recipe.slide.stacking_um = 0.0.into();
+    recipe.debris = empty().debris;
+    recipe.cytoplasm.phase_rad = 0.0.into();
+    let engine = engine(&recipe);
+    let mut scene = engine.scene(Key { seed: 11, index: 0 }).unwrap();
+    for object in &mut scene.objects {
+        object.depth_um = 3.03;
+    }
+    let width = scene.view.width;
+    let mut roughness = Vec::new();
+    let finished = engine
+        .image::<Error>(scene, papsynth::Threads::One, |plane| {
+            let rows = plane.noise_free.chunks_exact(width).flat_map(|row| row.windows(2));
+            roughness.push(rows.map(|w| f64::from(w[1] - w[0]) * f64::from(w[1] - w[0])).sum::<f64>());
+            Ok(())
+        })
+        .unwrap();
+    let sharpest = (0..21).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();
+    // 3.03 µm of mountant are 2 µm of the stage for rays near the axis, five steps above the middle, and less for the rest.
+    assert!((14..=15).contains(&sharpest), "{roughness:?}");
+    assert!(finished.truth.objects.iter().all(|object| object.defocus_um[15].abs() < 1e-9));
+}
+
+#[test]
+fn a_refracting_speck_is_bright_on_one_side_of_the_focus_and_dark_on_the_other() {
+    let mut recipe = empty();
+    recipe.debris.speckles.count = 1.0.into();
+    recipe.debris.speckles.absorbance = 0.0.into();
+    recipe.debris.speckles.phase_rad = 0.4.into();
+    recipe.debris.speckles.dilations = 3.0.into();
+    recipe.focus.planes = 3.0.into();
+    recipe.focus.step_um = 2.0.into();
+    recipe.background.level = 0.6.into();
+    set(&mut recipe, |optics| *optics.stray_light = 0.0.into());
+    let engine = engine(&recipe);
+    let mut scene = engine.scene(Key { seed: 11, index: 0 }).unwrap();
+    (scene.objects[0].depth_um, scene.objects[0].centre_um) = (0.0, [20.0, 16.0]);
+    let mut middles = Vec::new();
+    let width = scene.view.width;
+    let image = |plane: &papsynth::Plane| {
+        let white = plane.noise_free[0];
+        middles.push(plane.noise_free[64 * width + 80] / white - 1.0);
+        Ok(())
+    };
+    engine.image::<Error>(scene, papsynth::Threads::One, image).unwrap();
+    assert!(middles[0] * middles[2] < 0.0 && middles[0].abs() > 0.03, "{middles:?}");
+    assert!((middles[0] + middles[2]).abs() < 0.3 * middles[0].abs(), "{middles:?}");
+    assert!(middles[1].abs() < 0.01, "nothing is seen in focus: {middles:?}");
+}
+
+#[test]
+fn a_black_thing_is_floored_and_counted() {
+    let mut recipe = empty();
+    recipe.debris.speckles.count = 1.0.into();
+    recipe.debris.speckles.absorbance = 3.0.into();
+    recipe.debris.speckles.dilations = 14.0.into();
+    recipe.debris.speckles.phase_rad = 0.0.into();
+    recipe.focus.centre_um = 1.5.into();
+    let frame = frame(&recipe, 0);
+    assert!(frame.planes[0].floored > 0);
+    assert!(frame.planes[0].noise_free.iter().all(|v| *v > 0.0 && v.is_finite()));
+    assert_eq!(self::frame(&small(), 0).planes[0].floored, 0, "cells are not so dark");
+}
+
+#[test]
+fn colour_is_what_sixteen_wavelengths_make() {
+    let mut recipe = small();
+    recipe.debris = empty().debris;
+    colour(&mut recipe, Mixing::PerWavelength, Rendition::Raw);
+    let reference = light(&recipe);
+    for (mixing, least, most) in [(Mixing::Spectral, 0.0, 0.005), (Mixing::ThreeVectors, 0.01, 0.2)] {
+        colour(&mut recipe, mixing, Rendition::Raw);
+        let off = error(&light(&recipe), &reference);
+        assert!((least..most).contains(&off), "{mixing:?}: {off}");
+    }
+}
+
+#[test]
+fn one_wavelength_of_the_sixteen_is_the_monochrome_image() {
+    // The weighted sum over the lamp's and the sensor's nodes, one monochrome image each.
+    let mut recipe = small();
+    recipe.debris = empty().debris;
+    recipe.light = Light::Colour {
+        lamp_k: 3200.0.into(),
+        mixing: Mixing::PerWavelength,
+        chromatic_um: 0.0.into(),
+        rendition: Rendition::Raw,
+    };
+    let colours = light(&recipe);
+    let sensor = dye_spectra::Colour::new(&dye_spectra::ColourParams::default()).unwrap();
+    let mut sums = vec![0.0_f64; colours.len()];
+    for node in 0..16 {
+        let nodes = sensor.channels().each_ref().map(|channel| channel.nodes[node]);
+        recipe.light = Light::Monochrome { wavelength_um: nodes[0].wavelength_um.into(), bandwidth_um: 0.0.into() };
+        let grey = light(&recipe);
+        for (pixel, value) in sums.chunks_exact_mut(3).zip(&grey) {
+            pixel.iter_mut().zip(&nodes).for_each(|(sum, node)| *sum += node.weight * f64::from(*value));
+        }
+    }
+    let sums: Vec<f32> = sums.iter().map(|v| *v as f32).collect();
+    assert!(error(&colours, &sums) < 1e-4, "{}", error(&colours, &sums));
+}
+
+#[test]
+fn cytoplasm_takes_the_tint_of_its_dyes() {
+    let mut recipe = empty();
+    let mut mix = small().cells["intermediate"].clone();
+    mix.count = 1.0.into();
+    recipe.stain.cell_balance = 0.0.into();
+    colour(&mut recipe, Mixing::Spectral, Rendition::Display);
+    for (tint, bright, dark) in [("cyanophilic", 2, 0), ("eosinophilic", 0, 1), ("orangeophilic", 0, 2)] {
+        let weight = |name: &str| if name == tint { Number::Fixed(1.0) } else { Number::Fixed(0.0) };
+        mix.tints.cyanophilic = weight("cyanophilic");
+        mix.tints.eosinophilic = weight("eosinophilic");
+        mix.tints.orangeophilic = weight("orangeophilic");
+        recipe.cells = [("intermediate".to_owned(), mix.clone())].into();
+        let frame = frame(&recipe, 0);
+        let cell = frame.finished.truth.objects.iter().find(|o| o.part == Part::Cytoplasm).unwrap();
+        assert_eq!(cell.tint, tint);
+        let width = frame.finished.scene.view.width;
+        let mut sums = [0.0_f64; 3];
+        for run in cell.amodal.runs() {
+            for x in run.x0..run.x1 {
+                let pixel = &frame.planes[0].noise_free[(run.y as usize * width + x as usize) * 3..][..3];
+                sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
+            }
+        }
+        assert!(sums[bright] > 1.05 * sums[dark], "{tint}: {sums:?}");
+    }
+}
+
+#[test]
+fn fields_of_one_slide_share_its_stain() {
+    let mut recipe = small();
+    recipe.slide.fields = 4;
+    recipe.stain.field_balance = 0.0.into();
+    recipe.stain.slide_balance = 0.5.into();
+    let engine = engine(&recipe);
+    let scene = |index| engine.scene(Key { seed: 3, index }).unwrap();
+    let (a, b, c) = (scene(0), scene(3), scene(4));
+    assert_eq!((a.slide, b.slide, c.slide), (0, 0, 1));
+    assert_eq!(a.dyes, b.dyes);
+    assert_ne!(a.dyes, c.dyes);
+}
+
+#[test]
+fn a_grey_stain_is_the_same_at_every_wavelength() {
+    let mut recipe = small();
+    recipe.optics = Optics::gaussian();
+    let grey = DyeAmounts::grey();
+    recipe.stain.cyanophilic = grey;
+    recipe.stain.eosinophilic = grey;
+    recipe.stain.orangeophilic = grey;
+    recipe.stain.nucleus = grey;
+    recipe.stain.bacillus = grey;
+    recipe.stain.speckle = grey;
+    recipe.stain.slide_balance = 0.0.into();
+    recipe.stain.field_balance = 0.0.into();
+    recipe.stain.cell_balance = 0.0.into();
+    let mut at = |wavelength_um: f64| {
+        recipe.light = Light::Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() };
+        light(&recipe)
+    };
+    assert_eq!(at(0.45), at(0.65));
+}
+
+#[test]
+fn nuclei_stand_out_most_near_the_papers_filter() {
+    let mut recipe = empty();
+    let mut mix = small().cells["intermediate"].clone();
+    mix.count = 1.0.into();
+    recipe.cells = [("intermediate".to_owned(), mix)].into();
+    let mut contrast = |wavelength_um: f64| {
+        recipe.light = Light::Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() };
+        let frame = frame(&recipe, 0);
+        let objects = &frame.finished.truth.objects;
+        objects.iter().find(|o| o.part == Part::Nucleus).unwrap().detectability[0]
+    };
+    let [blue, filter, red] = [0.48, 0.57, 0.66].map(&mut contrast);
+    assert!(filter > blue && filter > red, "{blue} {filter} {red}");
+}
+
+#[test]
+fn further_spread_and_a_wider_condenser_do_what_they_say() {
+    let roughness = |recipe: &Recipe| {
+        let light = light(recipe);
+        light.windows(2).map(|w| f64::from(w[1] - w[0]) * f64::from(w[1] - w[0])).sum::<f64>()
+    };
+    let recipe = small();
+    let mut softer = recipe.clone();
+    set(&mut softer, |optics| *optics.extra_blur_um = 0.4.into());
+    assert!(roughness(&softer) < 0.8 * roughness(&recipe));
+    // Out of focus, the cone of the condenser is the blur.
+    let mut out = recipe;
+    out.focus.centre_um = 6.0.into();
+    let mut wide = out.clone();
+    set(&mut wide, |optics| *optics.condenser_na = 0.9.into());
+    assert!(roughness(&wide) < 0.8 * roughness(&out));
+}
+
+#[test]
+fn apertures_beyond_their_medium_are_refused_by_name() {
+    let problems = |change: &dyn Fn(&mut Recipe)| {
+        let mut recipe = small();
+        change(&mut recipe);
+        Engine::new(&recipe, &Model::builtin(), &Inputs::default()).unwrap_err().to_string()
+    };
+    let na = |value: f64| {
+        move |recipe: &mut Recipe| {
+            if let Optics::BrightField { na, .. } = &mut recipe.optics {
+                *na = value.into();
+            }
+        }
+    };
+    let text = problems(&na(1.2));
+    assert!(text.contains("optics.na: 1.2 is above `optics.immersion_index` = 1; expected at most 1"), "{text}");
+    let text = problems(&|recipe| set(recipe, |optics| *optics.condenser_na = 1.55.into()));
+    assert!(text.contains("optics.condenser_na") && text.contains("less than 1.515"), "{text}");
+    let text = problems(&|recipe| {
+        recipe.light = Light::Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() };
+    });
+    assert!(text.contains("light.wavelength_um: 0 is outside 0.4 to 0.7"), "{text}");
+    let text = problems(&|recipe| {
+        recipe.optics = Optics::gaussian();
+        colour(recipe, Mixing::Spectral, Rendition::Raw);
+    });
+    assert!(text.contains("light.kind") && text.contains("bright-field"), "{text}");
+    let text = problems(&|recipe| set(recipe, |optics| *optics.mount_index = 0.9.into()));
+    assert!(text.contains("optics.mount_index"), "{text}");
+    // A condenser wider than the objective is legitimate, and it is said.
+    let mut recipe = small();
+    assert!(recipe.notes().is_empty());
+    set(&mut recipe, |optics| *optics.condenser_na = 1.2.into());
+    assert!(recipe.problems().is_empty());
+    assert!(recipe.notes()[0].to_string().contains("37 % of the light"), "{:?}", recipe.notes());
+    let text = problems(&|recipe| recipe.field.magnification = 0.5.into());
+    assert!(text.contains("field.magnification: 0.5 does not make pixels of 0.05 to 4 µm"), "{text}");
+}
+
+#[test]
+fn magnification_and_sensor_make_the_pixel() {
+    let mut recipe = empty();
+    recipe.field.magnification = (40.0 * 0.645).into();
+    let pixel = |recipe: &Recipe| engine(recipe).scene(Key { seed: 1, index: 0 }).unwrap().view.pixel_um;
+    assert!((pixel(&recipe) - 0.25).abs() < 1e-12);
+    recipe.camera.binning_px = 2.0.into();
+    assert!((pixel(&recipe) - 0.5).abs() < 1e-12);
+}
+
+#[test]
+fn specks_of_either_form_have_the_size_they_were_given() {
+    let mut recipe = empty();
+    recipe.debris.speckles.count = 30.0.into();
+    recipe.debris.speckles.dilations =
+        Number::Drawn { law: Law::Choice(vec![2.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
+    for form in [papsynth::recipe::SpeckForm::Round, papsynth::recipe::SpeckForm::Dilated] {
+        recipe.debris.speckles.form = form;
+        let frame = frame(&recipe, 0);
+        let inside = frame.finished.truth.objects.iter().filter(|o| o.kind == Kind::Speckle && !o.truncated);
+        for speck in inside {
+            // A capsule of radius 2.5 px and length 1, or two diamonds of 13 px side by side.
+            let expected = match form {
+                papsynth::recipe::SpeckForm::Round => 24.6,
+                papsynth::recipe::SpeckForm::Dilated => 18.0,
+            };
+            assert!((speck.area_um2 * 16.0 - expected).abs() < 0.1 * expected, "{form:?}: {}", speck.area_um2 * 16.0);
+        }
+        assert!(frame.finished.scene.objects.iter().all(|o| matches!(o.body, Body::Speckle { dilations: 2, .. })));
+    }
+}
+
+#[test]
+fn nuclei_from_images_are_not_blurred_twice() {
+    let mut model = Model::builtin();
+    let class = model.classes.get_mut("intermediate").unwrap();
+    // A donor of fine stripes, as a microscope has shown them.
+    let width = 48;
+    let stripes = |i: usize| 300 + if i % width % 4 < 2 { 60 } else { 0 };
+    class.nucleus.donors = vec![papsynth::model::Donor {
+        pixel_um: 0.25,
+        width,
+        absorbance_milli: (0..width * width).map(stripes).collect(),
+    }];
+    let mut recipe = small();
+    recipe.debris = empty().debris;
+    recipe.cells.remove("superficial");
+    recipe.nucleus.pyknotic = 0.0.into();
+    recipe.slide.depth_um = 0.0.into();
+    recipe.slide.stacking_um = 0.0.into();
+    let mut contrast = |restore: Restore| {
+        recipe.nucleus.restore = restore;
+        let engine = Engine::new(&recipe, &model, &Inputs::default()).unwrap();
+        let frame = engine.frame(Key { seed: 11, index: 0 }).unwrap();
+        let nuclei = frame.finished.truth.objects.iter().filter(|o| o.part == Part::Nucleus);
+        let nucleus = nuclei.max_by_key(|nucleus| nucleus.amodal.area()).unwrap();
+        let width = frame.finished.scene.view.width;
+        let light = |at: usize| f64::from(frame.planes[0].noise_free[at]);
+        let runs = nucleus.amodal.runs().iter();
+        let inside =
+            runs.flat_map(|run| (run.x0 + 3..run.x1.max(6) - 3).map(move |x| run.y as usize * width + x as usize));
+        let steps: Vec<f64> = inside.map(|at| (light(at + 1) - light(at)) / light(at)).collect();
+        (steps.iter().map(|step| step * step).sum::<f64>() / steps.len() as f64).sqrt()
+    };
+    let (off, before, after) =
+        (contrast(Restore::Off), contrast(Restore::BeforeDetection), contrast(Restore::AfterDetection));
+    assert!(before > 1.05 * off, "{off} {before}");
+    assert!((before - after).abs() < 1e-3 * before, "{before} {after}");
+}
