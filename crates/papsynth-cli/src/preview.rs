@@ -47,15 +47,11 @@ pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
 
 /// A plane on the left, the same with its truth drawn over it on the right.
 fn beside(plane: &Plane, finished: &Finished) -> Picture {
-    let truth = Picture::overlay(plane, finished);
+    let (plain, truth) = (Picture::plain(plane, finished), Picture::overlay(plane, finished));
     let width = finished.scene.view.width;
-    let white = (1_u32 << finished.scene.camera.bits) - 1;
     let mut rgb = Vec::with_capacity(truth.rgb.len() * 2);
-    for (grey, drawn) in plane.grey.chunks(width).zip(truth.rgb.chunks(3 * width)) {
-        for &value in grey {
-            let byte = u8::try_from((u32::from(value) * 255 + white / 2) / white).unwrap_or(u8::MAX);
-            rgb.extend([byte; 3]);
-        }
+    for (plain, drawn) in plain.rgb.chunks(3 * width).zip(truth.rgb.chunks(3 * width)) {
+        rgb.extend_from_slice(plain);
         rgb.extend([GAP_GREY; 3 * GAP]);
         rgb.extend_from_slice(drawn);
     }

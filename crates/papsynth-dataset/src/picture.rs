@@ -19,17 +19,27 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// A plane as it is, in 8 bits.
+    #[must_use]
+    pub fn plain(plane: &Plane, finished: &Finished) -> Self {
+        Self::of(plane, finished, &[])
+    }
+
     /// A plane with the outlines of all objects: cytoplasm green, nuclei orange, everything else blue.
     #[must_use]
     pub fn overlay(plane: &Plane, finished: &Finished) -> Self {
+        let objects = &finished.truth.objects;
+        let masks: Vec<_> = objects.iter().map(|object| (object.group(), object.amodal.clone())).collect();
+        Self::of(plane, finished, &masks)
+    }
+
+    fn of(plane: &Plane, finished: &Finished, masks: &[(Group, Mask)]) -> Self {
         let (view, camera) = (&finished.scene.view, &finished.scene.camera);
         let mut picture = Self::blank(view.width, view.height, BACKGROUND);
         let levels = plane.grey.clone();
         let image = LevelImage { width: view.width, channels: plane.channels, levels, white: white(camera.bits) };
-        let objects = &finished.truth.objects;
-        let masks: Vec<_> = objects.iter().map(|object| (object.group(), object.amodal.clone())).collect();
         let place = Place { x: 0, y: 0, width: view.width, height: view.height };
-        picture.draw(&image, image.white, &masks, place);
+        picture.draw(&image, image.white, masks, place);
         picture
     }
 

@@ -125,10 +125,13 @@ fn adding_planes_never_changes_a_plane() {
         recipe.focus.step_um = 3.0.into();
         let stack = frame(&recipe, 0);
         assert_eq!(stack.planes[2].noise_free, alone.planes[0].noise_free, "the middle plane is the single one");
+        assert_eq!(stack.planes[2].grey, alone.planes[0].grey, "noise and all");
+        assert_ne!(stack.planes[1].grey, stack.planes[2].grey);
         recipe.focus.planes = 9.0.into();
         let more = frame(&recipe, 0);
         for (few, many) in stack.planes.iter().zip(&more.planes[2..7]) {
             assert_eq!(few.noise_free, many.noise_free);
+            assert_eq!(few.grey, many.grey);
         }
     }
 }
@@ -214,6 +217,21 @@ fn colour_is_what_sixteen_wavelengths_make() {
         let off = error(&light(&recipe), &reference);
         assert!((least..most).contains(&off), "{mixing:?}: {off}");
     }
+}
+
+#[test]
+fn what_is_black_stays_black_in_colour() {
+    let mut recipe = small();
+    recipe.stain.nucleus.haematein = 100.0;
+    recipe.debris.leukocytes.clusters = 6.0.into();
+    colour(&mut recipe, Mixing::Spectral, Rendition::Raw);
+    let light = light(&recipe);
+    let background = f64::from(light.iter().copied().fold(0.0, f32::max));
+    let neon = light.chunks_exact(3).filter(|pixel| {
+        let [low, high] = [pixel.iter().copied().fold(f32::MAX, f32::min), pixel.iter().copied().fold(0.0, f32::max)];
+        f64::from(high - low) > 0.8 * background
+    });
+    assert_eq!(neon.count(), 0);
 }
 
 #[test]

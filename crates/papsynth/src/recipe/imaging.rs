@@ -16,7 +16,7 @@ pub struct Field {
     pub height_px: Number,
     /// Size of a pixel in the object, µm, 0.05 to 4 (the paper's: 0.25). Not looked at where `magnification` is given.
     pub pixel_um: Number,
-    /// Magnification between slide and sensor, relay optics included, 1 to 400, or 0 if `pixel_um` says it all. A pixel is then
+    /// Magnification between slide and sensor, relay optics included, up to 400, or 0 if `pixel_um` says it all. A pixel is then
     /// `camera.pixel_um` times `camera.binning_px`, divided by this: 6.45 µm at 40 · 0.645 are 0.25 µm.
     pub magnification: Number,
 }
@@ -36,7 +36,7 @@ pub struct Focus {
     pub planes: Number,
     /// Travel of the stage between planes, µm, 0.001 to 100.
     pub step_um: Number,
-    /// Travel of the stage to the middle plane, µm, -500 to 500; at 0 the middle of the slide is in focus, at more what
+    /// Travel of the stage to the middle plane, µm, -100 to 100; at 0 the middle of the slide is in focus, at more what
     /// lies nearer to the objective.
     pub centre_um: Number,
 }
@@ -265,10 +265,10 @@ pub enum Rendition {
 pub enum Optics {
     /// Partially coherent bright field: what every slab transmits, filtered by the weak-object transfer function.
     BrightField {
-        /// Numerical aperture of the objective, 0.02 to 1.6, at most `immersion_index` and below `mount_index`.
+        /// Numerical aperture of the objective, 0.05 to 1.6, at most `immersion_index` and below `mount_index`.
         #[serde(default = "defaults::na")]
         na: Number,
-        /// Numerical aperture to which the condenser is opened, 0.02 to 1.6 and below `mount_index`; what exceeds `na` is
+        /// Numerical aperture to which the condenser is opened, 0.05 to 1.6 and below `mount_index`; what exceeds `na` is
         /// lost light. 0.41 gives 0.25 µm of blur for each µm of stage travel, the paper's Fig. 10.
         #[serde(default = "defaults::condenser_na")]
         condenser_na: Number,
@@ -409,8 +409,7 @@ pub struct Camera {
     pub full_well_e: Number,
     /// Standard deviation of the read noise, electrons, 0 to 100000; where pixels differ, its median.
     pub read_noise_e: Number,
-    /// Root of the mean square of the read noises of pixels that differ, as in CMOS: more than `read_noise_e`, to 20 times
-    /// that. 0 where all pixels are alike.
+    /// Root of the mean square of the read noises of pixels that differ, as in CMOS: from `read_noise_e` to 20 times that. 0 where all pixels are alike.
     pub read_noise_rms_e: Number,
     /// Grey level of a dark pixel, 0 to 4096.
     pub offset_dn: Number,

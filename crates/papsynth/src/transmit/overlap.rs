@@ -184,11 +184,14 @@ fn count(image: &mut [f32], width: usize, tile: TileRef<'_>) {
     });
 }
 
+/// Light below which ratios of lights mean nothing: what is as dark is left as it is.
+const DARK: f32 = 1e-3;
+
 /// Multiplies by the ratio of what dyes let through together to what they would one by one, where there are several.
 #[multiversion(targets = "simd")]
 fn scale(channel: &mut [f32], together: &[f32], product: &[f32], layers: &[f32]) {
     for (((light, together), product), layers) in channel.iter_mut().zip(together).zip(product).zip(layers) {
-        let ratio = together / product.max(f32::MIN_POSITIVE);
+        let ratio = (together + DARK) / (product + DARK);
         *light *= if *layers >= 2.0 { ratio } else { 1.0 };
     }
 }

@@ -33,7 +33,7 @@ pub(super) fn check(recipe: &Recipe, check: &mut Check) {
         &[
             ("planes", &focus.planes, 1.0, 1024.0),
             ("step_um", &focus.step_um, 1e-3, 100.0),
-            ("centre_um", &focus.centre_um, -500.0, 500.0),
+            ("centre_um", &focus.centre_um, -100.0, 100.0),
         ],
     );
     check.numbers(
@@ -188,8 +188,8 @@ fn optics(recipe: &Recipe, check: &mut Check) {
             check.numbers(
                 "optics",
                 &[
-                    ("na", na, 0.02, 1.6),
-                    ("condenser_na", condenser_na, 0.02, 1.6),
+                    ("na", na, 0.05, 1.6),
+                    ("condenser_na", condenser_na, 0.05, 1.6),
                     ("mount_index", mount_index, 1.0, 2.0),
                     ("immersion_index", immersion_index, 1.0, 2.0),
                     ("cover_error_um", cover_error_um, -50.0, 50.0),
