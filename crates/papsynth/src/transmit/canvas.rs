@@ -48,6 +48,9 @@ impl Window {
                 high[axis] = high[axis].max(tile.origin[axis] + length as i64);
             }
         }
+        if low[0] > high[0] {
+            return None;
+        }
         let n = n as i64;
         let limit = [limits.width, limits.height];
         let mut sides = [0; 2];
