@@ -1,6 +1,6 @@
 //! Whether every crate could be published.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use anyhow::{Context, Result};
@@ -21,6 +21,7 @@ pub(crate) const CHORE: Chore = Chore {
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     forget_unpacked(workspace)?;
+    forget_built(workspace)?;
     shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))?;
     Ok(Outcome::Done)
 }
@@ -45,10 +46,28 @@ fn forget_unpacked(workspace: &Workspace) -> Result<()> {
                 version.is_some_and(|version| version.starts_with(|c: char| c.is_ascii_digit()))
             };
             if workspace.packages.iter().any(|package| ours(&package.name)) {
-                let path = unpacked.path();
-                fs::remove_dir_all(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+                remove(&unpacked.path())?;
             }
         }
     }
     Ok(())
+}
+
+/// Has our own crates built anew: what was built of an earlier package counts as that of this one, as long as the version is.
+fn forget_built(workspace: &Workspace) -> Result<()> {
+    let Ok(fingerprints) = fs::read_dir(workspace.target.join("debug/.fingerprint")) else { return Ok(()) };
+    for fingerprint in fingerprints {
+        let fingerprint = fingerprint?;
+        let name = fingerprint.file_name().to_string_lossy().into_owned();
+        // A name, a dash, a hash.
+        let package = name.rsplit_once('-').map_or(name.as_str(), |(package, _)| package);
+        if workspace.packages.iter().any(|own| own.name == package) {
+            remove(&fingerprint.path())?;
+        }
+    }
+    Ok(())
+}
+
+fn remove(folder: &Path) -> Result<()> {
+    fs::remove_dir_all(folder).with_context(|| format!("cannot remove {}", folder.display()))
 }
