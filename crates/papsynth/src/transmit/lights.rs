@@ -52,7 +52,8 @@ pub(super) fn groups(
         },
         pixel_um: scene.view.pixel_um,
         oversampling: optics.oversampling,
-        stray_light: optics.stray_light,
+        // Glare is added to the finished light: a microscope is remembered whatever the glare of a field.
+        stray_light: 0.0,
     };
     let group = |mixer: Mixer, lights: Vec<ColouredLight>| {
         let shares = threads::map(threads, slide.phantoms, |phantom| mixer.shares(phantom));
