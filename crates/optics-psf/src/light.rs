@@ -3,7 +3,7 @@ use crate::{Factor, Lattice, Microscope};
 /// The light of a picture, as the product of what many things let through.
 ///
 /// Factors on the object's lattice are multiplied there, and those on the camera's with the mean over each pixel.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Light {
     oversampling: usize,
     width_px: usize,
@@ -16,14 +16,21 @@ impl Light {
     /// The light of empty slide.
     #[must_use]
     pub fn new(microscope: &Microscope, width_px: usize, height_px: usize) -> Self {
-        let oversampling = microscope.params().oversampling;
+        let mut light = Self::default();
+        light.reset(microscope, width_px, height_px);
+        light
+    }
+
+    /// Makes it the light of empty slide, perhaps of another microscope and size, in the memory it has.
+    pub fn reset(&mut self, microscope: &Microscope, width_px: usize, height_px: usize) {
+        let params = microscope.params();
+        (self.oversampling, self.width_px, self.stray_light) = (params.oversampling, width_px, params.stray_light);
         let pixels = width_px * height_px;
-        Self {
-            oversampling,
-            width_px,
-            stray_light: microscope.params().stray_light,
-            object: vec![1.0; pixels * oversampling * oversampling],
-            camera: vec![1.0; pixels],
+        for (lattice, samples) in
+            [(&mut self.object, pixels * params.oversampling * params.oversampling), (&mut self.camera, pixels)]
+        {
+            lattice.clear();
+            lattice.resize(samples, 1.0);
         }
     }
 

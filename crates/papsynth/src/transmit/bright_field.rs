@@ -1,22 +1,20 @@
 //! Partially coherent bright field: what each object lets through, filtered by the microscope's transfer functions, and
 //! the product over all objects.
 
-use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
 
-use super::abbe::Exact;
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
 use super::lights::{ColouredLight, Group, groups};
 use super::overlap::Overlaps;
-use super::{BAND, Band, FocusAt, Light, Passage, Slide};
+use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
 use crate::detect::sum_over;
 use crate::exp10::exp10_from;
 use crate::phantom::Phantom;
-use crate::phantom::tile::{Tile, TileRef, lay};
+use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{SceneLight, SceneMicroscope, View};
 use crate::threads::{self, Threads};
@@ -31,29 +29,21 @@ const LOST_TAIL: f64 = 1e-5;
 /// What all planes of one scene share.
 pub(crate) struct BrightFieldPath {
     view: View,
-    /// Grid points along the side of a pixel.
-    oversampling: usize,
-    slab_um: f64,
-    /// Directions of light, if it is to be carried from slab to slab.
-    directions: Option<usize>,
-    grid: View,
-    stray_light: f32,
+    optics: SceneMicroscope,
     further: Option<Gaussian>,
     restoration: Option<Gaussian>,
     groups: Vec<Group>,
     /// Where colours mix, if the light has any.
     overlaps: Option<Overlaps>,
     threads: Threads,
-    /// Spectra of each object by margin, where several planes share them.
-    spectra: Vec<Mutex<BTreeMap<usize, Spectra>>>,
-    keeps: bool,
+    /// What each object lets through, where several planes share it.
+    kept: Option<Vec<Mutex<Option<Loaded>>>>,
     spare: Mutex<Vec<Bench>>,
 }
 
-/// What is on the slide of one object.
+/// What an object lets through, ready to be imaged at any focus.
 #[derive(Debug, Default)]
-struct Spectra {
-    window: Option<Window>,
+struct Loaded {
     /// Light by light.
     patches: Vec<Patch>,
     /// The share of each grid point that is restored, if the object was taken from an image.
@@ -64,7 +54,7 @@ struct Spectra {
 #[derive(Debug, Default)]
 struct Bench {
     canvas: Canvas,
-    spectra: Spectra,
+    loaded: Loaded,
     scratch: PatchScratch,
     factors: Vec<Factor>,
     again: Factor,
@@ -73,8 +63,7 @@ struct Bench {
 /// What an object lets through of a group's lights, in a plane.
 struct Passed {
     bench: Bench,
-    /// Upper left grid point of the patch without its margin.
-    origin: [i64; 2],
+    window: Window,
     /// Mean absorbance over the masks of its pieces, light by light.
     absorbances: Vec<Vec<f64>>,
 }
@@ -98,17 +87,13 @@ impl BrightFieldPath {
         let restoration = restores.then(feather).transpose().map_err(|e| e.to_string())?;
         Ok(Self {
             view: scene.view,
-            oversampling: scene.oversampling(),
-            slab_um: optics.slab_um,
-            directions: (optics.imaging == Imaging::Abbe).then_some(optics.directions),
-            grid: scene.grid(),
-            stray_light: optics.stray_light as f32,
+            optics: *optics,
             further,
             restoration,
             threads,
-            spectra: slide.phantoms.iter().map(|_| Mutex::default()).collect(),
             // Light of many single wavelengths would need too much memory.
-            keeps: scene.planes_um.len() > 1 && groups.len() == 1,
+            kept: (scene.planes_um.len() > 1 && groups.len() == 1)
+                .then(|| slide.phantoms.iter().map(|_| Mutex::default()).collect()),
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. }).then(|| {
                 let view = scene.view;
                 Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), threads)
@@ -120,38 +105,39 @@ impl BrightFieldPath {
 
     /// The channels of `light` become what the objects let through.
     pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
-        let (pixels, n) = (self.view.width * self.view.height, self.oversampling);
-        let Light { channels, lights, fine, .. } = light;
+        let View { width, height, .. } = self.view;
+        let Light { channels, lights, pictures, .. } = light;
         for channel in channels.iter_mut() {
             channel.clear();
-            channel.resize(pixels, 0.0);
+            channel.resize(width * height, 0.0);
         }
         let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
         for group in &self.groups {
-            lights.resize(lights.len().max(group.lights.len()), Vec::new());
-            let lights = &mut lights[..group.lights.len()];
-            for coarse in lights.iter_mut() {
-                coarse.clear();
-                coarse.resize(pixels, 1.0);
+            lights.resize_with(group.lights.len(), optics_psf::Light::default);
+            pictures.resize(group.lights.len(), Vec::new());
+            for (light, of) in lights.iter_mut().zip(&group.lights) {
+                light.reset(of.lens.imager.microscope(), width, height);
             }
-            // The finer grids of all lights, one behind the other.
-            fine.clear();
-            fine.resize(lights.len() * pixels * n * n, 1.0);
-            let absorbances = self.pass_group(slide, focus, group, lights, fine, &mut passage.floored)?;
-            if let (Some(directions), FocusAt::Stage(stage_um)) = (self.directions, focus) {
+            let absorbances = self.pass_group(slide, focus, group, lights, &mut passage.floored)?;
+            let exact = self.optics.imaging == Imaging::Abbe;
+            if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
                 passage.floored = 0;
-                self.replace(slide, stage_um, group, directions, lights, fine)?;
-            } else if let (Some(overlaps), Mixer::Colour(colour)) = (&self.overlaps, &group.mixer) {
-                let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
-                overlaps.correct(colour, slide.phantoms, blur_px, lights, self.threads)?;
+                self.replace(slide, stage_um, group, lights)?;
             }
-            for (index, (of, coarse)) in group.lights.iter().zip(lights).enumerate() {
-                mean_of_pixels(&fine[index * pixels * n * n..][..pixels * n * n], self.view.width, n, coarse);
+            for (light, picture) in lights.iter().zip(pictures.iter_mut()) {
+                picture.resize(width * height, 0.0);
+                light.picture_into(picture);
+            }
+            if let (false, Some(overlaps), Mixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
+                let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
+                overlaps.correct(colour, slide.phantoms, blur_px, pictures, self.threads)?;
+            }
+            for ((of, picture), absorbances) in group.lights.iter().zip(&*pictures).zip(&absorbances) {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    add_light(&mut channels[channel], coarse, weight as f32);
+                    add_light(&mut channels[channel], picture, weight as f32);
                     let sums = &mut passage.absorbances[channel];
-                    sums.resize(absorbances[index].len(), 0.0);
-                    sums.iter_mut().zip(&absorbances[index]).for_each(|(sum, value)| *sum += weight * value);
+                    sums.resize(absorbances.len(), 0.0);
+                    sums.iter_mut().zip(absorbances).for_each(|(sum, value)| *sum += weight * value);
                 }
             }
         }
@@ -164,29 +150,16 @@ impl BrightFieldPath {
         slide: Slide<'_>,
         stage_um: f64,
         group: &Group,
-        directions: usize,
-        lights: &mut [Vec<f32>],
-        fine: &mut [f32],
+        lights: &mut [optics_psf::Light],
     ) -> Result<(), String> {
-        let samples = self.grid.width * self.grid.height;
         let indices: Vec<usize> = (0..lights.len()).collect();
         let images = threads::map(self.threads, &indices, |&light| {
             let ColouredLight { lens, shift_um, .. } = &group.lights[light];
-            let exact = Exact {
-                microscope: lens.imager.microscope(),
-                mixer: &group.mixer,
-                light,
-                directions,
-                slab_um: self.slab_um,
-                grid: self.grid,
-                oversampling: self.oversampling,
-                fft: lens.fft,
-            };
-            exact.image(slide, stage_um - shift_um)
+            abbe::image(slide, &self.optics, lens, (&group.mixer, light), stage_um - shift_um)
         });
-        for ((image, coarse), fine) in images.into_iter().zip(lights).zip(fine.chunks_exact_mut(samples)) {
-            coarse.fill(1.0);
-            fine.copy_from_slice(&image?);
+        for (light, image) in lights.iter_mut().zip(images) {
+            light.clear();
+            light.multiply(&image?, [0, 0]);
         }
         Ok(())
     }
@@ -206,11 +179,9 @@ impl BrightFieldPath {
         slide: Slide<'_>,
         focus: FocusAt,
         group: &Group,
-        lights: &mut [Vec<f32>],
-        fine: &mut [f32],
+        lights: &mut [optics_psf::Light],
         floored: &mut usize,
     ) -> Result<Vec<Vec<f64>>, String> {
-        let n = self.oversampling;
         let mut absorbances = vec![Vec::new(); lights.len()];
         let indices: Vec<usize> = (0..slide.phantoms.len()).collect();
         // One thread multiplies a patch while it is still in the cache.
@@ -227,15 +198,12 @@ impl BrightFieldPath {
                     }
                     continue;
                 };
-                let both = lights.iter_mut().zip(fine.chunks_exact_mut(self.view.width * self.view.height * n * n));
-                for (light, (coarse, fine)) in both.enumerate() {
-                    let tile = self.tile(&passed, light);
-                    match passed.bench.factors[light].lattice {
-                        Lattice::Object => multiply(fine, self.view.width * n, tile),
-                        Lattice::Camera => multiply(coarse, self.view.width, tile),
-                    }
-                    *floored += passed.bench.factors[light].floored;
-                    absorbances[light].extend(&passed.absorbances[light]);
+                let at_px = passed.window.origin.map(|at| at / self.optics.oversampling as i64);
+                let factors = passed.bench.factors.iter().zip(&passed.absorbances);
+                for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
+                    light.multiply(factor, at_px);
+                    *floored += factor.floored;
+                    absorbances.extend(own);
                 }
                 self.spare().push(passed.bench);
             }
@@ -259,7 +227,7 @@ impl BrightFieldPath {
                 empty.resize(rows.len(), 0.0);
                 exp10_from(&empty_log10[rows.clone()], empty);
                 for channel in channels.iter_mut() {
-                    illuminate(&mut channel[rows.clone()], empty, self.stray_light);
+                    illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
                 }
                 lit = needed;
             }
@@ -294,105 +262,67 @@ impl BrightFieldPath {
             light.lens.imager.focus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
-        // The widest margin of all lights decides what is too far outside to be seen.
-        let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
-        let mut bench = self.spare().pop().unwrap_or_default();
-        let mut kept = self.spectra[index].lock().unwrap_or_else(PoisonError::into_inner);
-        let Bench { canvas, spectra, scratch, factors, again } = &mut bench;
-        let spectra = if self.keeps {
-            kept.entry(margin_px).or_insert_with(|| {
-                let mut fresh = Spectra::default();
-                self.load(phantom, group, margin_px, canvas, &mut fresh);
-                fresh
-            })
-        } else {
-            self.load(phantom, group, margin_px, canvas, spectra);
-            spectra
-        };
-        let Some(window) = spectra.window else {
-            drop(kept);
-            self.spare().push(bench);
+        let n = self.optics.oversampling;
+        let Some(window) = Window::around(phantom.pieces.iter().map(|piece| &piece.absorbance), n) else {
             return Ok(None);
         };
+        let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
+        if !window.meets(self.view.width * n, self.view.height * n, margin_px * n) {
+            return Ok(None);
+        }
+        let mut bench = self.spare().pop().unwrap_or_default();
+        let Bench { canvas, loaded, scratch, factors, again } = &mut bench;
+        let mut kept = self.kept.as_ref().map(|kept| kept[index].lock().unwrap_or_else(PoisonError::into_inner));
+        let loaded = match &mut kept {
+            Some(kept) => kept.get_or_insert_with(|| {
+                let mut fresh = Loaded::default();
+                self.load(phantom, group, window, canvas, &mut fresh);
+                fresh
+            }),
+            None => {
+                self.load(phantom, group, window, canvas, loaded);
+                loaded
+            }
+        };
         factors.resize_with(group.lights.len(), Factor::default);
-        let lights = group.lights.iter().zip(&mut spectra.patches);
+        let lights = group.lights.iter().zip(&mut loaded.patches);
         for (factor, (focus, (light, patch))) in factors.iter_mut().zip(focuses.iter().zip(lights)) {
             let imager = &light.lens.imager;
             imager.expose(patch, focus, scratch, factor);
-            if !spectra.restored.is_empty() {
+            if !loaded.restored.is_empty() {
                 let [depth_um, stage_um] = Self::place(object.depth_um, at, light);
                 let focus = imager.refocus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))?;
                 imager.expose(patch, &focus, scratch, again);
-                restore(factor, again, &spectra.restored, window, self.oversampling);
+                restore(factor, again, &loaded.restored, window, n);
             }
         }
         drop(kept);
-        let origin = window.origin;
-        let mut passed = Passed { bench, origin, absorbances: Vec::new() };
-        passed.absorbances = (0..group.lights.len())
-            .map(|light| {
-                let shares = &group.shares[index][light];
-                let tile = self.tile(&passed, light);
-                let fine = passed.bench.factors[light].lattice == Lattice::Object;
-                let n = if fine { self.oversampling } else { 1 };
-                slide.masks[index]
-                    .iter()
-                    .zip(shares)
-                    .map(|(mask, share)| share * mean_absorbance(mask, tile, n))
-                    .collect()
-            })
-            .collect();
-        Ok(Some(passed))
+        let absorbances = factors.iter().enumerate().map(|(light, factor)| {
+            let of_piece = |(mask, share): (&Mask, &f64)| share * mean_absorbance(mask, factor, window, n);
+            slide.masks[index].iter().zip(&group.shares[index][light]).map(of_piece).collect()
+        });
+        let absorbances = absorbances.collect();
+        Ok(Some(Passed { bench, window, absorbances }))
     }
 
-    /// Puts what an object lets through into spectra.
-    fn load(&self, phantom: &Phantom, group: &Group, margin_px: usize, canvas: &mut Canvas, spectra: &mut Spectra) {
-        let n = self.oversampling;
-        // What lies farther outside than light spreads is not seen.
-        let reach = (2 * margin_px * n) as i64;
-        let limits = Window {
-            origin: [-reach; 2],
-            width: self.view.width * n + 4 * margin_px * n,
-            height: self.view.height * n + 4 * margin_px * n,
-        };
-        spectra.window = Window::around(phantom.pieces.iter().map(|piece| &piece.absorbance), limits, n);
-        let Some(window) = spectra.window else { return };
+    /// Makes an object ready to be imaged.
+    fn load(&self, phantom: &Phantom, group: &Group, window: Window, canvas: &mut Canvas, loaded: &mut Loaded) {
         group.mixer.compose(&phantom.pieces, window, canvas);
-        spectra.patches.resize_with(group.lights.len(), Patch::default);
-        for ((light, transmittance), patch) in group.lights.iter().zip(&canvas.transmittance).zip(&mut spectra.patches)
-        {
+        loaded.patches.resize_with(group.lights.len(), Patch::default);
+        let lights = group.lights.iter().zip(&canvas.transmittance);
+        for ((light, transmittance), patch) in lights.zip(&mut loaded.patches) {
             light.lens.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
         }
-        spectra.restored.clear();
-        if let Some(feather) = &self.restoration {
-            let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);
+        loaded.restored.clear();
+        let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);
+        if let (Some(feather), true) = (&self.restoration, imaged.clone().count() > 0) {
             let mut mask = vec![0.0; window.width * window.height];
-            for piece in imaged.clone() {
+            for piece in imaged {
                 add(&mut mask, window, &binary(&piece.coverage), 1.0);
             }
-            if imaged.count() > 0 {
-                // Eq. 16: C′ = C ∗ G_σ.
-                spectra.restored = mask.clone();
-                feather.blur_into(
-                    &mask,
-                    window.width,
-                    Border::Zero,
-                    &mut spectra.restored,
-                    &mut optics_psf::Scratch::default(),
-                );
-            }
+            // Eq. 16: C′ = C ∗ G_σ.
+            loaded.restored = feather.blur(&mask, window.width, Border::Zero);
         }
-    }
-
-    /// Where a factor lies, on the grid that it is on.
-    fn tile<'a>(&self, passed: &'a Passed, light: usize) -> TileRef<'a> {
-        let factor = &passed.bench.factors[light];
-        let (n, margin) = (self.oversampling as i64, factor.margin_px as i64);
-        let origin = match factor.lattice {
-            Lattice::Object => passed.origin.map(|at| at - margin * n),
-            Lattice::Camera => passed.origin.map(|at| at / n - margin),
-        };
-        TileRef { origin, width: factor.width, values: &factor.values }
     }
 
     fn spare(&self) -> MutexGuard<'_, Vec<Bench>> {
@@ -410,49 +340,18 @@ fn binary(coverage: &Tile) -> Tile {
     Tile { values, ..coverage.clone() }
 }
 
-/// Eq. 15 on one object: I′ = I_again · C′ + I · (1 − C′).
+/// Eq. 15 on one object: I′ = I_again · C′ + I · (1 − C′). Both factors are those of one patch at one focus.
 fn restore(factor: &mut Factor, again: &Factor, shares: &[f32], window: Window, n: usize) {
-    let fine = factor.lattice == Lattice::Object;
-    if again.lattice != factor.lattice || again.values.len() != factor.values.len() {
-        return;
-    }
-    let step = if fine { 1 } else { n };
-    let margin = if fine { factor.margin_px * n } else { factor.margin_px };
-    let width = window.width / step;
-    for y in 0..window.height / step {
+    let (step, margin) = match factor.lattice {
+        Lattice::Object => (1, factor.margin_px * n),
+        Lattice::Camera => (n, factor.margin_px),
+    };
+    for (y, shares) in shares.chunks_exact(window.width * step).enumerate() {
         let at = (y + margin) * factor.width + margin;
-        for x in 0..width {
-            let share = shares[y * step * window.width + x * step];
-            let (old, new) = (factor.values[at + x], again.values[at + x]);
-            factor.values[at + x] = old + share * (new - old);
+        let values = factor.values[at..].iter_mut().zip(&again.values[at..]);
+        for ((old, new), share) in values.zip(shares[..window.width].iter().step_by(step)) {
+            *old += share * (new - *old);
         }
-    }
-}
-
-#[multiversion(targets = "simd")]
-fn multiply(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel *= value));
-}
-
-/// Multiplies by the mean over each pixel of a grid of `n` points a pixel's side.
-#[multiversion(targets = "simd")]
-fn mean_of_pixels(fine: &[f32], width: usize, n: usize, coarse: &mut [f32]) {
-    let weight = 1.0 / (n * n) as f32;
-    let mut sums = vec![0.0_f32; width];
-    for (coarse, fine) in coarse.chunks_exact_mut(width).zip(fine.chunks_exact(width * n * n)) {
-        sums.fill(0.0);
-        for line in fine.chunks_exact(width * n) {
-            if n == 2 {
-                for (sum, pair) in sums.iter_mut().zip(line.chunks_exact(2)) {
-                    *sum += pair[0] + pair[1];
-                }
-            } else {
-                for (sum, samples) in sums.iter_mut().zip(line.chunks_exact(n)) {
-                    *sum += samples.iter().sum::<f32>();
-                }
-            }
-        }
-        coarse.iter_mut().zip(&sums).for_each(|(coarse, sum)| *coarse *= weight * sum);
     }
 }
 
@@ -467,22 +366,23 @@ fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));
 }
 
-/// Absorbance of the mean light over a mask, on a grid of `n` points a pixel's side.
-fn mean_absorbance(mask: &Mask, tile: TileRef<'_>, n: usize) -> f64 {
+/// Absorbance of the mean light over a mask, of the factor of a patch that was made on a grid of `n` points a pixel's side.
+fn mean_absorbance(mask: &Mask, factor: &Factor, window: Window, n: usize) -> f64 {
+    let (n, origin) = match factor.lattice {
+        Lattice::Object => (n, window.origin),
+        Lattice::Camera => (1, window.origin.map(|at| at / n as i64)),
+    };
+    let origin = origin.map(|at| at - (factor.margin_px * n) as i64);
     let area = mask.area() * (n * n) as u64;
     if area == 0 {
         return 0.0;
     }
-    let sum = if n == 1 {
-        sum_over(mask.runs(), tile.values, tile.width, tile.origin)
-    } else {
-        let n = n as u32;
-        let scaled: Vec<Run> = mask
-            .runs()
-            .iter()
-            .flat_map(|run| (0..n).map(move |line| Run { y: run.y * n + line, x0: run.x0 * n, x1: run.x1 * n }))
-            .collect();
-        sum_over(&scaled, tile.values, tile.width, tile.origin)
+    let n = n as u32;
+    let scaled = |run: &Run| {
+        let Run { y, x0, x1 } = *run;
+        (0..n).map(move |line| Run { y: y * n + line, x0: x0 * n, x1: x1 * n })
     };
+    let runs: Vec<Run> = mask.runs().iter().flat_map(scaled).collect();
+    let sum = sum_over(&runs, &factor.values, factor.width, origin);
     -libm::log10((sum / area as f64).max(f64::MIN_POSITIVE))
 }

@@ -37,29 +37,27 @@ pub(super) struct Canvas {
 }
 
 impl Window {
-    /// The smallest rectangle of whole pixels, of `n` grid points a side, that holds the tiles within `limits`; nothing if
-    /// there is none.
-    pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, limits: Self, n: usize) -> Option<Self> {
-        let mut low = [i64::MAX; 2];
-        let mut high = [i64::MIN; 2];
+    /// The smallest rectangle of whole pixels, of `n` grid points a side, that holds the tiles; nothing if there are none.
+    pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, n: usize) -> Option<Self> {
+        let n = n as i64;
+        let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
         for tile in tiles {
             for (axis, length) in [tile.width, tile.height()].into_iter().enumerate() {
-                low[axis] = low[axis].min(tile.origin[axis]);
-                high[axis] = high[axis].max(tile.origin[axis] + length as i64);
+                low[axis] = low[axis].min(tile.origin[axis].div_euclid(n) * n);
+                high[axis] = high[axis].max((tile.origin[axis] + length as i64 + n - 1).div_euclid(n) * n);
             }
         }
-        if low[0] > high[0] {
-            return None;
-        }
-        let n = n as i64;
-        let limit = [limits.width, limits.height];
-        let mut sides = [0; 2];
-        for axis in 0..2 {
-            low[axis] = low[axis].max(limits.origin[axis]).div_euclid(n) * n;
-            high[axis] = -(-high[axis].min(limits.origin[axis] + limit[axis] as i64)).div_euclid(n) * n;
-            sides[axis] = usize::try_from(high[axis] - low[axis]).unwrap_or(0);
-        }
-        (sides[0] > 0 && sides[1] > 0).then_some(Self { origin: low, width: sides[0], height: sides[1] })
+        let side = |axis: usize| usize::try_from(high[axis].checked_sub(low[axis])?).ok().filter(|side| *side > 0);
+        Some(Self { origin: low, width: side(0)?, height: side(1)? })
+    }
+
+    /// Whether it has a point in a grid of that size, or within a margin of it.
+    pub(super) fn meets(self, width: usize, height: usize, margin: usize) -> bool {
+        let margin = margin as i64;
+        let inside = |axis: usize, length: usize, whole: usize| {
+            self.origin[axis] - margin < whole as i64 && self.origin[axis] + length as i64 + margin > 0
+        };
+        inside(0, self.width, width) && inside(1, self.height, height)
     }
 
     fn samples(self) -> usize {

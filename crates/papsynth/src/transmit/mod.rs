@@ -66,10 +66,9 @@ pub(crate) struct Light {
     empty_log10: Vec<f32>,
     /// Of each channel of the picture: the absorbance, or what the objects let through; then the light.
     channels: Vec<Vec<f32>>,
-    /// What the objects let through of light that is imaged by itself.
-    lights: Vec<Vec<f32>>,
-    /// What the objects let through, on a grid finer than the image's.
-    fine: Vec<f32>,
+    /// What the objects let through of light that is imaged by itself, and pictures of it.
+    lights: Vec<optics_psf::Light>,
+    pictures: Vec<Vec<f32>>,
     /// Rows of the empty slide's light.
     empty: Vec<f32>,
     bands: Vec<Vec<f32>>,

@@ -128,8 +128,7 @@ impl Overlapping {
         } else {
             &self.pieces
         };
-        let everywhere = Window { origin: [i64::MIN / 4; 2], width: usize::MAX / 4, height: usize::MAX / 4 };
-        let Some(window) = Window::around(pieces.iter(), everywhere, 1) else {
+        let Some(window) = Window::around(pieces.iter(), 1) else {
             return Err("an object has no pixel".to_owned());
         };
         let samples = window.width * window.height;
@@ -149,13 +148,16 @@ impl Overlapping {
 
 /// The camera's pixels over which an object is stained enough to matter.
 fn stained(phantom: &Phantom, width: usize, height: usize, n: usize) -> Option<Window> {
-    let frame = Window { origin: [0, 0], width: width * n, height: height * n };
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
-    let window = Window::around(strong.map(|piece| &piece.absorbance), frame, n)?;
-    Some(Window { origin: window.origin.map(|at| at / n as i64), width: window.width / n, height: window.height / n })
+    let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
+    window.meets(width * n, height * n, 0).then_some(Window {
+        origin: window.origin.map(|at| at / n as i64),
+        width: window.width / n,
+        height: window.height / n,
+    })
 }
 
 fn spread(gaussian: &Gaussian, tile: &Tile) -> Tile {
