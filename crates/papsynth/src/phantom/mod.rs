@@ -5,6 +5,7 @@
 mod bacillus;
 mod cell;
 mod chromatin;
+mod form;
 mod leukocyte;
 mod nucleus;
 mod out_of_focus;

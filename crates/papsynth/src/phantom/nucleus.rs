@@ -1,9 +1,9 @@
 //! The nucleus of a cell: outline, chromatin, rim.
 
-use super::Piece;
+use super::{Piece, form};
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area};
-use super::wobble::placed;
+use super::wobble::{placed, wobbled_circle};
 use crate::random;
 use crate::recipe::Chromatin;
 use crate::scene::{CellBody, Object, Scene};
@@ -38,7 +38,7 @@ pub(super) fn make(
     let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
-    let mut outline = drawn.descriptors.outline(POINTS);
+    let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }
@@ -74,6 +74,10 @@ pub(super) fn make(
         let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
+    let mut own = scene.key.stream("cell", object.number, "nucleoli");
+    for _ in 0..nucleus.nucleoli {
+        add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
+    }
     Ok(Piece {
         part: Part::Nucleus,
         absorbance,
@@ -83,6 +87,32 @@ pub(super) fn make(
         dyes: nucleus.dyes,
         phase_rad: 0.0,
     })
+}
+
+/// Radius of a nucleolus, µm: from, to.
+const NUCLEOLUS_UM: [f64; 2] = [0.5, 1.1];
+
+/// Its absorbance relative to the nucleus's.
+const NUCLEOLUS: f64 = 0.8;
+
+/// A round, even, dark body inside a nucleus.
+fn add_nucleolus(
+    absorbance: &mut Tile,
+    outline: &[Point],
+    centre: Point,
+    strength: f64,
+    pixel_um: f64,
+    rng: &mut crate::key::Stream,
+) {
+    let radius = random::between(NUCLEOLUS_UM[0], NUCLEOLUS_UM[1], rng) / pixel_um;
+    let rim = outline[random::below(outline.len(), rng)];
+    let share = random::between(0.0, 0.6, rng);
+    let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
+    let mut cover = absorbance.blank();
+    cover.cover(&wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
+    for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
+        *value += cover * (NUCLEOLUS * strength) as f32;
+    }
 }
 
 /// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.

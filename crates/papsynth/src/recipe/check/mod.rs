@@ -126,6 +126,11 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ],
         );
         check.whole(&format!("cells.{class}"), &[("count", &mix.count)]);
+        check.numbers(
+            &format!("cells.{class}.group"),
+            &[("size", &mix.group.size, 1.0, 1000.0), ("distance", &mix.group.distance, 0.2, 3.0)],
+        );
+        check.whole(&format!("cells.{class}.group"), &[("size", &mix.group.size)]);
         let tints = &mix.tints;
         let weights = [
             ("cyanophilic", &tints.cyanophilic, 0.0, 1000.0),
@@ -142,6 +147,13 @@ fn cells(recipe: &Recipe, check: &mut Check) {
         "cytoplasm",
         &[
             ("excess", &cytoplasm.excess, 1.0, 2.0),
+            ("corners", &cytoplasm.corners, 0.0, 1.0),
+            ("notches", &cytoplasm.notches, 0.0, 20.0),
+            ("tongues", &cytoplasm.tongues, 0.0, 20.0),
+            ("wrinkles", &cytoplasm.wrinkles, 0.0, 100.0),
+            ("wrinkle", &cytoplasm.wrinkle, 0.0, 5.0),
+            ("wrinkle_um", &cytoplasm.wrinkle_um, 0.05, 5.0),
+            ("endoplasm", &cytoplasm.endoplasm, 0.0, 2.0),
             ("clouds", &cytoplasm.clouds, 0.0, 2.0),
             ("clouds_um", &cytoplasm.clouds_um, 0.1, 100.0),
             ("flecks", &cytoplasm.flecks, 0.0, 5.0),
