@@ -68,10 +68,17 @@ pub(super) fn make(
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
     // An imaged donor shows the rim of its own nucleus.
     let rim_strength = if imaged { 0.0 } else { nucleus.rim as f32 };
+    let mut thickness = coverage.blank();
+    if imaged {
+        // A donor has its own.
+        thickness.values.fill(1.0);
+    } else {
+        dome(&mut thickness, &outline, nucleus.dome);
+    }
     let mut absorbance = coverage.clone();
     for (i, value) in absorbance.values.iter_mut().enumerate() {
         let rim = (coverage.values[i] - inner.values[i]).max(0.0) * rim_strength;
-        let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
+        let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
     let mut own = scene.key.stream("cell", object.number, "nucleoli");
@@ -87,6 +94,25 @@ pub(super) fn make(
         dyes: nucleus.dyes,
         phase_rad: 0.0,
     })
+}
+
+/// Thickness of a nucleus relative to its mean, a plate of even thickness and an ellipsoid mixed: `share` is the latter's.
+fn dome(thickness: &mut Tile, outline: &[Point], share: f64) {
+    /// Mean over a disc of the chord √(1 − ρ²) through a ball.
+    const MEAN_CHORD: f64 = 2.0 / 3.0;
+    // The ellipse of the outline's second moments: those of a curve's points about a circle of radius r are r²/2.
+    let centre = fsd_shape::centroid(outline);
+    let moment = |a: usize, b: usize| {
+        2.0 * outline.iter().map(|p| (p[a] - centre[a]) * (p[b] - centre[b])).sum::<f64>() / outline.len() as f64
+    };
+    let (xx, xy, yy) = (moment(0, 0), moment(0, 1), moment(1, 1));
+    let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+    thickness.for_each(|p, value| {
+        let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+        let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+        let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
+        *value = (1.0 - share + share * chord) as f32;
+    });
 }
 
 /// Radius of a nucleolus, µm: from, to.

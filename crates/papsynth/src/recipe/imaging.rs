@@ -41,9 +41,9 @@ pub struct Focus {
     pub centre_um: Number,
     /// What becomes of the planes.
     pub picture: Picture,
-    /// How much of its noise a fused picture shares with the next pixel of the row, 0 to 0.7.
+    /// How much of its noise a fused picture shares with the next pixel of the row, 0 to 0.5.
     pub fused_noise_across: Number,
-    /// The same with the next pixel of the column, 0 to 0.7.
+    /// The same with the next pixel of the column, 0 to 0.5.
     pub fused_noise_down: Number,
 }
 

@@ -198,6 +198,7 @@ fn paper() -> Recipe {
         pyknotic: 0.0.into(),
         wrinkled: 0.0.into(),
         rim: 0.0.into(),
+        dome: 0.0.into(),
         ..Nucleus::default()
     };
     // The paper's stain is a grey value.

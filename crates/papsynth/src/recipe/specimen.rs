@@ -310,10 +310,10 @@ impl Default for Cytoplasm {
             corners: Number::uniform(0.35, 0.9),
             notches: Number::uniform(0.0, 1.4),
             tongues: Number::uniform(0.0, 1.2),
-            wrinkles: Number::log_normal(6.0, 0.6),
-            wrinkle: Number::log_normal(0.7, 0.45),
-            wrinkle_um: Number::uniform(0.22, 0.55),
-            endoplasm: Number::log_normal(0.12, 0.7),
+            wrinkles: Number::log_normal(7.0, 0.6),
+            wrinkle: Number::log_normal(0.5, 0.45),
+            wrinkle_um: Number::uniform(0.18, 0.42),
+            endoplasm: Number::log_normal(0.22, 0.6),
             clouds: Number::uniform(0.03, 0.10),
             clouds_um: 3.0.into(),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
@@ -401,6 +401,8 @@ pub struct Nucleus {
     pub wrinkled: Number,
     /// Absorbance of the rim (the nuclear membrane) relative to the nucleus, 0 to 2.
     pub rim: Number,
+    /// Share of a nucleus's thickness that is domed, 0 (a plate) to 1 (an ellipsoid).
+    pub dome: Number,
 }
 
 impl Default for Nucleus {
@@ -418,7 +420,8 @@ impl Default for Nucleus {
             restore_feather_um: 0.3.into(),
             pyknotic: 0.05.into(),
             wrinkled: 0.15.into(),
-            rim: Number::uniform(0.0, 0.25),
+            rim: Number::uniform(0.0, 0.2),
+            dome: Number::uniform(0.15, 0.55),
         }
     }
 }
@@ -464,7 +467,7 @@ impl Default for Stain {
             slide_nucleus: Number::log_normal(1.0, 0.08),
             field_cytoplasm: Number::log_normal(1.0, 0.2),
             field_nucleus: Number::log_normal(1.0, 0.09),
-            field_texture: Number::log_normal(1.0, 0.25),
+            field_texture: Number::log_normal(0.8, 0.28),
             slide_balance: 0.15.into(),
             field_balance: 0.05.into(),
             cell_balance: 0.12.into(),

@@ -135,6 +135,7 @@ fn draw_body(
         dyes: [0.0; dye_spectra::DYES],
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
+        dome: recipe.nucleus.dome.draw(&mut own("nucleus.dome")),
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
         // About as many as there are on average, one more or less.

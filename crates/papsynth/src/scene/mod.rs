@@ -580,6 +580,8 @@ pub struct NucleusBody {
     pub texture: f64,
     /// Absorbance of the rim relative to the nucleus.
     pub rim: f64,
+    /// Share of its thickness that is domed: 0 of a plate, 1 of an ellipsoid.
+    pub dome: f64,
     /// Small, dark, without structure.
     pub pyknotic: bool,
     /// Strength of wrinkles, 0 if it has none.

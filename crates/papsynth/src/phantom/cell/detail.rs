@@ -169,7 +169,7 @@ pub(super) fn add_endoplasm(
     let softness = random::between(0.08, 0.3, rng);
     let zone = ramp(absorbance, outline, nucleus, share - softness, share + softness);
     let grain = Look::fine(pixel_um, rng);
-    let (density, grainy) = (0.5 * body.detail.endoplasm as f32, body.detail.endoplasm as f32);
+    let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
     let width = absorbance.width;
     let mut field = vec![0.0_f32; width];
     let mut texels: Texels = [0.0; SIDE + 1];

@@ -54,7 +54,7 @@ pub(super) fn add(
 
 /// Random factors of mean 1 or so that change over a few micrometres, some of them 0.
 fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
-    let mut walk = Walk::new(0.75, rng);
+    let mut walk = Walk::new(0.45, rng);
     (0..count).map(|_| (0.9 + walk.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
@@ -62,7 +62,7 @@ fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
 fn along_rim(outline: &[Point], step: f64, rng: &mut Stream) -> Vec<Point> {
     let fine = fsd_shape::resample(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
     let middle = fsd_shape::centroid(outline);
-    let length = random::count(fine.len() as f64 * random::between(0.05, 0.28, rng)).max(4);
+    let length = random::count(fine.len() as f64 * random::between(0.06, 0.35, rng)).max(4);
     let first = random::below(fine.len(), rng);
     // Most lie near the rim: it is there that a thin sheet is free to fold.
     let depth = random::uniform(rng);
@@ -102,7 +102,7 @@ fn radius_of(outline: &[Point]) -> f64 {
 
 /// A line of slowly changing curvature.
 fn wander(start: Point, direction: f64, radius: f64, step: f64, rng: &mut Stream) -> Vec<Point> {
-    let steps = random::count(random::between(0.25, 1.1, rng) * radius / step).max(4);
+    let steps = random::count(random::between(0.35, 1.5, rng) * radius / step).max(4);
     let mean = random::normal(rng) * 0.5 / radius;
     let mut curvature = Walk::new(1.2 / radius, rng);
     let (mut at, mut heading) = (start, direction);

@@ -34,8 +34,8 @@ pub(super) fn check(recipe: &Recipe, check: &mut Check) {
             ("planes", &focus.planes, 1.0, 1024.0),
             ("step_um", &focus.step_um, 1e-3, 100.0),
             ("centre_um", &focus.centre_um, -100.0, 100.0),
-            ("fused_noise_across", &focus.fused_noise_across, 0.0, 0.7),
-            ("fused_noise_down", &focus.fused_noise_down, 0.0, 0.7),
+            ("fused_noise_across", &focus.fused_noise_across, 0.0, 0.5),
+            ("fused_noise_down", &focus.fused_noise_down, 0.0, 0.5),
         ],
     );
     let exact = matches!(recipe.optics, Optics::BrightField { imaging: Imaging::Abbe, .. });
