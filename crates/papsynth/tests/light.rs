@@ -4,7 +4,9 @@
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe};
+use papsynth::recipe::{
+    Debris, DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe,
+};
 use papsynth::recipe::{Rendition, Restore};
 use papsynth::scene::{Body, Kind};
 use papsynth::truth::Part;
@@ -30,10 +32,7 @@ fn small() -> Recipe {
 fn empty() -> Recipe {
     let mut recipe = small();
     recipe.cells.clear();
-    recipe.debris.leukocytes.clusters = 0.0.into();
-    recipe.debris.bacilli.clusters = 0.0.into();
-    recipe.debris.speckles.count = 0.0.into();
-    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe.debris = Debris::none();
     recipe
 }
 

@@ -445,6 +445,17 @@ impl DyeAmounts {
         Self { neutral: 1.0, ..Self::none() }
     }
 
+    /// Every amount with the name of its field.
+    pub(crate) fn named(&self) -> [(&'static str, f64); 5] {
+        [
+            ("haematein", self.haematein),
+            ("eosin_y", self.eosin_y),
+            ("light_green", self.light_green),
+            ("orange_g", self.orange_g),
+            ("neutral", self.neutral),
+        ]
+    }
+
     /// In the order of [`dye_spectra::Dye::ALL`].
     #[must_use]
     pub fn amounts(&self) -> dye_spectra::Amounts {
