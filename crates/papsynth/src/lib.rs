@@ -5,6 +5,7 @@
     reason = "pixels are f32, and the recipe's check bounds every size and place far below what an integer holds"
 )]
 
+mod debris;
 mod detect;
 mod engine;
 mod error;

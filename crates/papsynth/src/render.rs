@@ -201,18 +201,15 @@ impl Rendering {
             _ => "",
         };
         let (class, stain) = match &object.body {
-            Body::Cell(body) if piece.part == Part::Nucleus => (body.class.clone(), body.nucleus.absorbance),
-            Body::Cell(body) => (body.class.clone(), body.cytoplasm_absorbance),
-            Body::Leukocyte { absorbance, .. }
-            | Body::Bacillus { absorbance, .. }
-            | Body::Speckle { absorbance, .. }
-            | Body::OutOfFocus { absorbance, .. } => (kind.name().to_owned(), *absorbance),
+            Body::Cell(body) if piece.part == Part::Nucleus => (body.class.as_str(), body.nucleus.absorbance),
+            Body::Cell(body) => (body.class.as_str(), body.cytoplasm_absorbance),
+            other => (kind.name(), other.absorbance()),
         };
         ObjectTruth {
             id: object.id,
             part: piece.part,
             kind,
-            class,
+            class: class.to_owned(),
             bethesda: object.bethesda.clone(),
             traits: phantom.traits.join(";"),
             cluster: object.cluster,

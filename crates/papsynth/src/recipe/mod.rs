@@ -5,7 +5,6 @@
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
 mod check;
-mod debris;
 mod imaging;
 mod number;
 mod presets;
@@ -17,8 +16,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::debris::{Bacilli, Debris, Dirt, Leukocytes, NucleusForm, OutOfFocus, Smudges, SpeckForm, Speckles};
 pub use check::Problem;
-pub use debris::{Bacilli, Debris, Leukocytes, NucleusForm, OutOfFocus, SpeckForm, Speckles};
 pub use imaging::{
     Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,
     Picture, Rendition, Subsampling,

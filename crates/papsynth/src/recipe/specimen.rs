@@ -313,7 +313,7 @@ impl Default for Cytoplasm {
             wrinkles: Number::log_normal(7.0, 0.6),
             wrinkle: Number::log_normal(0.5, 0.45),
             wrinkle_um: Number::uniform(0.18, 0.42),
-            endoplasm: Number::log_normal(0.22, 0.6),
+            endoplasm: Number::log_normal(0.22, 0.5),
             clouds: Number::uniform(0.03, 0.10),
             clouds_um: 3.0.into(),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
@@ -510,6 +510,17 @@ impl DyeAmounts {
     #[must_use]
     pub const fn grey() -> Self {
         Self { neutral: 1.0, ..Self::none() }
+    }
+
+    /// Every amount with the name of its field.
+    pub(crate) fn named(&self) -> [(&'static str, f64); 5] {
+        [
+            ("haematein", self.haematein),
+            ("eosin_y", self.eosin_y),
+            ("light_green", self.light_green),
+            ("orange_g", self.orange_g),
+            ("neutral", self.neutral),
+        ]
     }
 
     /// In the order of [`dye_spectra::Dye::ALL`].

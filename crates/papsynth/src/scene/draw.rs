@@ -1,5 +1,6 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
+use crate::debris::Ground;
 use crate::error::Error;
 use crate::key::{Key, Stream};
 use crate::model::Model;
@@ -7,7 +8,6 @@ use crate::random;
 use crate::recipe::{Illumination, Light, Number, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
-use super::debris::draw_debris;
 use super::stain::{FieldStain, slide_of};
 use super::{
     Fusion, Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
@@ -16,8 +16,8 @@ use super::{
 
 /// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of
 /// them a distribution changes none of the others.
-pub(super) struct FieldNumbers {
-    pub(super) key: Key,
+pub(crate) struct FieldNumbers {
+    pub(crate) key: Key,
 }
 
 impl FieldNumbers {
@@ -29,7 +29,7 @@ impl FieldNumbers {
         number.draw(&mut self.stream(path))
     }
 
-    pub(super) fn count(&self, path: &str, number: &Number) -> usize {
+    pub(crate) fn count(&self, path: &str, number: &Number) -> usize {
         number.draw_count(&mut self.stream(path))
     }
 }
@@ -50,7 +50,10 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     let fail = |message: String| Error::Image { index: key.index, message };
     let stain = FieldStain::draw(recipe, &field);
     let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
-    draw_debris(recipe, view, &field, &mut objects).map_err(fail)?;
+    recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects));
+    if u32::try_from(objects.len()).is_err() {
+        return Err(fail(format!("{} objects are more than labels can number; ask for fewer", objects.len())));
+    }
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }

@@ -3,7 +3,6 @@
 //! The scene is the hinge between recipe and picture: nothing after it decides what exists.
 
 mod cells;
-mod debris;
 mod depth;
 mod draw;
 mod groups;
@@ -15,45 +14,15 @@ use dye_spectra::Amounts;
 use serde::Serialize;
 
 use crate::key::Key;
-use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, SpeckForm, Subsampling};
+use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, Subsampling};
 
+pub use crate::debris::{Bacillus, Blob, Body, Fleck, Kind, Leukocyte, Smudge, Speckle};
 pub(crate) use cells::unknown_class;
+pub(crate) use draw::FieldNumbers;
 pub use draw::draw;
 pub(crate) use layout::check_layout;
+pub(crate) use stain::FieldStain;
 pub use weight::WeightMap;
-
-/// What kind of thing an object is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// An epithelial cell: cytoplasm and nucleus.
-    Cell,
-    /// A white blood cell.
-    Leukocyte,
-    /// A rod-shaped bacterium.
-    Bacillus,
-    /// A speck of dust or stain.
-    Speckle,
-    /// An object far outside the depth of the slide.
-    OutOfFocus,
-}
-
-impl Kind {
-    /// All kinds, in the order in which their objects are numbered.
-    pub const ALL: [Self; 5] = [Self::Cell, Self::Leukocyte, Self::Bacillus, Self::Speckle, Self::OutOfFocus];
-
-    /// The name of the kind, which is also the class of what has no class of its own.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cell => "cell",
-            Self::Leukocyte => "leukocyte",
-            Self::Bacillus => "bacillus",
-            Self::Speckle => "speckle",
-            Self::OutOfFocus => "out-of-focus",
-        }
-    }
-}
 
 /// One field of view: how it is imaged and what lies in it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -391,78 +360,6 @@ pub struct Object {
     pub bethesda: String,
     /// What it is.
     pub body: Body,
-}
-
-/// What an object is, its numbers drawn.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Body {
-    /// An epithelial cell.
-    Cell(Box<CellBody>),
-    /// A white blood cell.
-    Leukocyte {
-        /// Radius of the nucleus, µm.
-        radius_um: f64,
-        /// Number of lobes of the nucleus.
-        lobes: usize,
-        /// Range of the radial perturbation (α of Eq. 7).
-        alpha: f64,
-        /// Range of the angular perturbation (β of Eq. 7).
-        beta: f64,
-        /// Absorbance of the nucleus.
-        absorbance: f64,
-        /// Absorbance of the cytoplasm round it.
-        halo: f64,
-    },
-    /// A rod-shaped bacterium.
-    Bacillus {
-        /// Length, µm.
-        length_um: f64,
-        /// Width, µm.
-        width_um: f64,
-        /// Bend between its ends, degrees.
-        bend_deg: f64,
-        /// Absorbance.
-        absorbance: f64,
-        /// How late light comes through it, radians.
-        phase_rad: f64,
-    },
-    /// A speck of dust or stain.
-    Speckle {
-        /// How it was grown.
-        form: SpeckForm,
-        /// How often it was grown by a pixel.
-        dilations: usize,
-        /// Absorbance.
-        absorbance: f64,
-        /// How late light comes through it, radians.
-        phase_rad: f64,
-    },
-    /// An object far outside the depth of the slide.
-    OutOfFocus {
-        /// Radius, µm.
-        radius_um: f64,
-        /// Range of the radial perturbation (α of Eq. 7).
-        alpha: f64,
-        /// Range of the angular perturbation (β of Eq. 7).
-        beta: f64,
-        /// Absorbance.
-        absorbance: f64,
-    },
-}
-
-impl Body {
-    /// The kind of the object.
-    #[must_use]
-    pub fn kind(&self) -> Kind {
-        match self {
-            Self::Cell(_) => Kind::Cell,
-            Self::Leukocyte { .. } => Kind::Leukocyte,
-            Self::Bacillus { .. } => Kind::Bacillus,
-            Self::Speckle { .. } => Kind::Speckle,
-            Self::OutOfFocus { .. } => Kind::OutOfFocus,
-        }
-    }
 }
 
 /// An epithelial cell, its numbers drawn.
