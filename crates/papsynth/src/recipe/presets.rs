@@ -186,6 +186,7 @@ fn paper() -> Recipe {
         granular: 0.0.into(),
         granules: 0.0.into(),
         fray_um: 0.0.into(),
+        rim_um: 0.0.into(),
         phase_rad: 0.0.into(),
     };
     recipe.nucleus = Nucleus {

@@ -295,6 +295,8 @@ pub struct Cytoplasm {
     pub granules: Number,
     /// Roughness of the rim, µm, 0 to 5: the edge is frayed over about this distance.
     pub fray_um: Number,
+    /// Distance over which the sheet thins out towards its rim, µm, 0 to 10.
+    pub rim_um: Number,
     /// How late light comes through a flat sheet, radians of phase, -3 to 3: thicker parts and folds in proportion. It shows
     /// as bright and dark rims that change places when the focus passes.
     pub phase_rad: Number,
@@ -322,7 +324,8 @@ impl Default for Cytoplasm {
             grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::uniform(0.1, 0.6),
+            fray_um: Number::log_normal(0.35, 0.6),
+            rim_um: Number::uniform(0.3, 1.5),
             phase_rad: Number::uniform(0.05, 0.15),
         }
     }
@@ -421,7 +424,7 @@ impl Default for Nucleus {
             pyknotic: 0.05.into(),
             wrinkled: 0.15.into(),
             rim: Number::uniform(0.0, 0.2),
-            dome: Number::uniform(0.15, 0.55),
+            dome: Number::uniform(0.2, 0.9),
         }
     }
 }

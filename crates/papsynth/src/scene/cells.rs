@@ -195,6 +195,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         grain: cytoplasm.grain.draw(rng),
         granules: if granular { granules } else { 0.0 },
         fray_um: cytoplasm.fray_um.draw(rng),
+        rim_um: own("cytoplasm.rim_um", &cytoplasm.rim_um),
     }
 }
 

@@ -422,6 +422,8 @@ pub struct CellDetail {
     pub granules: f64,
     /// Roughness of the rim, µm.
     pub fray_um: f64,
+    /// Distance over which it thins out towards its rim, µm.
+    pub rim_um: f64,
 }
 
 /// The cleared space round the nucleus of a koilocyte.

@@ -134,6 +134,47 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     }
 }
 
+/// A sheet thins out towards its rim: thickness falls to nothing over about this distance, px.
+pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, reach_px: f64) {
+    let radius = random::count(reach_px);
+    if radius == 0 {
+        return;
+    }
+    // Along a straight rim the mean of the cover over a box is a half at the rim and 1 a radius inside it.
+    let mut cover = coverage.clone();
+    let (width, height) = (cover.width, cover.height());
+    let mut line = Vec::new();
+    for row in cover.values.chunks_exact_mut(width) {
+        box_mean(row, radius, &mut line);
+    }
+    let mut column = vec![0.0; height];
+    for x in 0..width {
+        column.iter_mut().zip(cover.values[x..].iter().step_by(width)).for_each(|(to, from)| *to = *from);
+        box_mean(&mut column, radius, &mut line);
+        cover.values[x..].iter_mut().step_by(width).zip(&column).for_each(|(to, from)| *to = *from);
+    }
+    for (value, share) in absorbance.values.iter_mut().zip(&cover.values) {
+        let inside = (2.0 * share - 1.0).clamp(0.0, 1.0);
+        *value *= inside * (2.0 - inside);
+    }
+}
+
+/// The mean over so many values to either side, those beyond the ends 0.
+fn box_mean(values: &mut [f32], radius: usize, before: &mut Vec<f32>) {
+    before.clear();
+    before.extend_from_slice(values);
+    let weight = 1.0 / (2 * radius + 1) as f32;
+    let mut sum: f32 = before.iter().take(radius).sum();
+    for (i, value) in values.iter_mut().enumerate() {
+        sum += before.get(i + radius).copied().unwrap_or(0.0);
+        *value = sum * weight;
+        sum -= i.checked_sub(radius).map_or(0.0, |out| before[out]);
+    }
+}
+
+/// How far from the nucleus the sheet is lifted by it, relative to its radius.
+const LIFTED: f64 = 2.4;
+
 /// Steps from none to all of what changes towards the middle of a cell.
 const STEPS: usize = 6;
 
@@ -168,6 +209,12 @@ pub(super) fn add_endoplasm(
     let share = random::between(0.45, 0.75, rng);
     let softness = random::between(0.08, 0.3, rng);
     let zone = ramp(absorbance, outline, nucleus, share - softness, share + softness);
+    // Densest where the nucleus lifts the sheet.
+    let radius = body.nucleus.radius_um / pixel_um;
+    let round = wobbled_circle(radius, 0.15, 0.15, rng);
+    let round: Vec<Point> = round.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
+    let lifted = ramp(absorbance, &round, nucleus, 1.0, LIFTED);
+    absorbance.values.iter_mut().zip(&lifted.values).for_each(|(value, share)| *value *= 1.0 + 0.9 * share * body.detail.endoplasm as f32);
     let grain = Look::fine(pixel_um, rng);
     let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
     let width = absorbance.width;

@@ -155,6 +155,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("granular", &cytoplasm.granular, 0.0, 1.0),
             ("granules", &cytoplasm.granules, 0.0, 1000.0),
             ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
+            ("rim_um", &cytoplasm.rim_um, 0.0, 10.0),
             ("phase_rad", &cytoplasm.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
