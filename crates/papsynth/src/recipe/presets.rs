@@ -22,13 +22,29 @@ pub enum Preset {
     Dense,
     /// A field with cells of a high-grade lesion (HSIL), as in the paper's Fig. 13.
     HighGrade,
-    /// Many leukocytes and bacteria.
+    /// Many leukocytes, bacteria and debris.
     Inflamed,
+    /// Bacterial vaginosis: clue cells and clouds of cocci, no lactobacilli.
+    BacterialVaginosis,
+    /// *Candida*: pseudohyphae and yeasts among inflamed cells.
+    Candida,
+    /// Trichomonads among inflamed cells.
+    Trichomonas,
 }
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 6] = [Self::Lbc, Self::Paper2015, Self::Sparse, Self::Dense, Self::HighGrade, Self::Inflamed];
+    pub const ALL: [Self; 9] = [
+        Self::Lbc,
+        Self::Paper2015,
+        Self::Sparse,
+        Self::Dense,
+        Self::HighGrade,
+        Self::Inflamed,
+        Self::BacterialVaginosis,
+        Self::Candida,
+        Self::Trichomonas,
+    ];
 
     /// The name of the preset, as the command line knows it.
     #[must_use]
@@ -40,6 +56,9 @@ impl Preset {
             Self::Dense => "dense",
             Self::HighGrade => "high-grade",
             Self::Inflamed => "inflamed",
+            Self::BacterialVaginosis => "bacterial-vaginosis",
+            Self::Candida => "candida",
+            Self::Trichomonas => "trichomonas",
         }
     }
 
@@ -52,7 +71,10 @@ impl Preset {
             Self::Sparse => "few cells, hardly any debris",
             Self::Dense => "covered with cells, several layers deep",
             Self::HighGrade => "cells of a high-grade lesion among normal ones",
-            Self::Inflamed => "many leukocytes and bacteria",
+            Self::Inflamed => "many leukocytes, bacteria and debris",
+            Self::BacterialVaginosis => "bacterial vaginosis: clue cells and clouds of cocci",
+            Self::Candida => "Candida: pseudohyphae and budding yeasts",
+            Self::Trichomonas => "trichomonads among leukocytes",
         }
     }
 
@@ -72,6 +94,9 @@ impl Preset {
             Self::Dense => dense(),
             Self::HighGrade => high_grade(),
             Self::Inflamed => inflamed(),
+            Self::BacterialVaginosis => bacterial_vaginosis(),
+            Self::Candida => candida(),
+            Self::Trichomonas => trichomonas(),
         }
     }
 }
@@ -144,11 +169,48 @@ fn high_grade() -> Recipe {
 
 fn inflamed() -> Recipe {
     let mut recipe = lbc();
-    recipe.debris.leukocytes.clusters = Number::uniform(20.0, 60.0);
-    recipe.debris.leukocytes.per_cluster = Number::log_normal(5.0, 0.9).at_least(1.0);
-    recipe.debris.leukocytes.cluster_um = Number::uniform(4.0, 14.0);
-    recipe.debris.bacilli.clusters = Number::uniform(20.0, 50.0);
-    recipe.debris.bacilli.per_cluster = Number::log_normal(25.0, 0.7).at_least(1.0);
+    let debris = &mut recipe.debris;
+    debris.leukocytes.clusters = Number::uniform(15.0, 40.0);
+    debris.leukocytes.per_cluster = Number::log_normal(4.0, 0.9).at_least(1.0);
+    debris.leukocytes.degenerated = 0.3.into();
+    debris.bacilli.clusters = Number::uniform(4.0, 15.0);
+    debris.cocci.colonies = Number::log_normal(4.0, 0.6);
+    debris.smudges.count = Number::log_normal(25.0, 0.5);
+    debris.mucus.strands = Number::log_normal(1.5, 0.6);
+    debris.red_cells.clusters = Number::log_normal(1.5, 0.8);
+    debris.bare_nuclei.count = Number::log_normal(2.0, 0.7);
+    recipe
+}
+
+fn bacterial_vaginosis() -> Recipe {
+    let mut recipe = lbc();
+    let debris = &mut recipe.debris;
+    debris.clue_cells.share = Number::uniform(0.3, 0.7);
+    debris.clue_cells.density = Number::uniform(1.0, 3.0);
+    debris.cocci.colonies = Number::log_normal(14.0, 0.5);
+    debris.cocci.per_colony = Number::log_normal(60.0, 0.9).at_least(2.0);
+    debris.bacilli.clusters = 0.0.into();
+    debris.smudges.count = Number::log_normal(18.0, 0.5);
+    recipe
+}
+
+fn candida() -> Recipe {
+    let mut recipe = lbc();
+    let debris = &mut recipe.debris;
+    debris.candida.colonies = Number::uniform(1.0, 5.0);
+    debris.leukocytes.clusters = Number::uniform(4.0, 15.0);
+    debris.smudges.count = Number::log_normal(12.0, 0.5);
+    recipe
+}
+
+fn trichomonas() -> Recipe {
+    let mut recipe = lbc();
+    let debris = &mut recipe.debris;
+    debris.trichomonads.groups = Number::uniform(2.0, 7.0);
+    debris.leukocytes.clusters = Number::uniform(10.0, 30.0);
+    debris.leukocytes.per_cluster = Number::log_normal(4.0, 0.9).at_least(1.0);
+    debris.cocci.colonies = Number::log_normal(3.0, 0.6);
+    debris.smudges.count = Number::log_normal(15.0, 0.5);
     recipe
 }
 
