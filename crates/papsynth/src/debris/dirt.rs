@@ -60,9 +60,9 @@ impl Default for Dirt {
             length_um: Number::log_normal(2.0, 0.45),
             width_um: Number::log_normal(1.1, 0.35),
             aligned: 0.6.into(),
-            absorbance: Number::Drawn { law: crate::recipe::Law::LogNormal(0.045, 0.6), min: 0.01, max: 0.2 },
+            absorbance: Number::log_normal(0.045, 0.6).at_least(0.01).at_most(0.2),
             phase_rad: Number::uniform(0.0, 0.12),
-            dyes: DyeAmounts { light_green: 1.4, haematein: 0.4, neutral: 0.2, ..DyeAmounts::none() },
+            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
         }
     }
 }

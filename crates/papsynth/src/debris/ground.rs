@@ -1,5 +1,6 @@
 //! The slide on which debris is strewn: where its cells lie, and the clusters that lie among them.
 
+use super::ClueCells;
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
@@ -60,6 +61,11 @@ impl<'a> Ground<'a> {
         };
         let cells = objects.iter().filter_map(place).collect();
         Self { field, stain, size_um: view.size_um(), cells, kind: "", section: "", objects }
+    }
+
+    /// Gives cells their coats.
+    pub(super) fn dress(&mut self, clue_cells: &ClueCells) {
+        clue_cells.draw(self.field, self.objects);
     }
 
     pub(super) fn begin(&mut self, kind: &'static str, section: &'static str) {
@@ -133,6 +139,7 @@ impl<'a> Ground<'a> {
             depth_um,
             rotation_deg,
             bethesda: String::new(),
+            coat: None,
             body,
         });
     }

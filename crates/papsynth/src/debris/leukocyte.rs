@@ -95,11 +95,7 @@ impl Default for Leukocytes {
             radius_um: Number::normal(3.15, 0.28),
             alpha: 0.10.into(),
             beta: 0.10.into(),
-            lobes: Number::Drawn {
-                law: crate::recipe::Law::Choice(vec![1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
-                min: f64::NEG_INFINITY,
-                max: f64::INFINITY,
-            },
+            lobes: Number::choice([1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
             cell_um: Number::normal(10.0, 0.7),
             degenerated: 0.2.into(),
             absorbance: Number::normal(0.42, 0.06),
