@@ -120,7 +120,7 @@ fn found(absorbance: &[f32], width: usize, pixel_um: f64, points: Option<&[[f64;
         for &p in &region.pixels {
             seen[p as usize] = false;
         }
-        let region = filled(&region, smooth.len() / width);
+        let region = region.filled(smooth.len() / width);
         let free = region.pixels.iter().all(|p| !taken[*p as usize]);
         let shape = region.shape();
         let good = free
@@ -152,22 +152,6 @@ fn nearest_mark(points: &[[f64; 2]], marked: &[bool], blob: &Blob, pixel_um: f64
     let far = |i: usize| crate::region::distance(points[i], blob.centre);
     let near = (0..points.len()).filter(|&i| !marked[i] && far(i) <= reach);
     near.min_by(|&a, &b| far(a).total_cmp(&far(b)))
-}
-
-/// A region with its holes.
-fn filled(region: &Region, height: usize) -> Region {
-    let (inside, wide, [left, top]) = region.tile(1);
-    let mut seen = vec![false; inside.len()];
-    flood(0, wide, inside.len(), &mut seen, |p| !inside[p]);
-    if seen.iter().zip(&inside).all(|(outside, i)| *outside != *i) {
-        return region.clone();
-    }
-    let place = |i: usize| {
-        let (x, y) = (i64::try_from(i % wide).ok()? + left, i64::try_from(i / wide).ok()? + top);
-        let (x, y) = (usize::try_from(x).ok()?, usize::try_from(y).ok()?);
-        (x < region.width && y < height).then(|| crate::number::id(y * region.width + x))
-    };
-    Region { pixels: (0..inside.len()).filter(|&i| !seen[i]).filter_map(place).collect(), width: region.width }
 }
 
 /// Mean absorbance inside above the median of what lies around.

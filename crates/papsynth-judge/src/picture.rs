@@ -33,7 +33,7 @@ pub struct Picture {
 }
 
 /// Smallest picture that is measured, pixels a side.
-pub(crate) const LEAST_SIDE: usize = 16;
+pub(crate) const LEAST_SIDE: usize = 32;
 
 /// A row or column at the border whose mean is below this part of the picture's is no image.
 const DEAD: f64 = 0.1;

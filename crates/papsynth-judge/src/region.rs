@@ -63,6 +63,24 @@ impl Region {
         (inside, wide, [left as i64 - margin as i64, top as i64 - margin as i64])
     }
 
+    /// The same without holes.
+    pub(crate) fn filled(&self, height: usize) -> Self {
+        let (inside, wide, [left, top]) = self.tile(1);
+        if wide == 0 {
+            return self.clone();
+        }
+        let mut outside = vec![false; inside.len()];
+        flood(0, wide, inside.len(), &mut outside, |p| !inside[p]);
+        if outside.iter().zip(&inside).all(|(o, i)| *o != *i) {
+            return self.clone();
+        }
+        let place = |i: usize| {
+            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            (x < self.width && y < height).then(|| id(y * self.width + x))
+        };
+        Self { pixels: (0..inside.len()).filter(|&i| !outside[i]).filter_map(place).collect(), width: self.width }
+    }
+
     pub(crate) fn shape(&self) -> Shape {
         let area = self.pixels.len() as f64;
         if area == 0.0 {

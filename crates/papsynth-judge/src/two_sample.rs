@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::forest::{Forest, Rows};
 use crate::number::single;
 use crate::statistics::{auc, below, mean, of_sorted, median, shuffle, weighted_auc};
-use crate::table::{Family, Table};
+use crate::table::{Family, Feature, Table};
 
 /// How the classifier is tried.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -49,12 +49,21 @@ pub struct TwoSample {
     /// Rows of a half, at the median.
     pub null_rows: usize,
     /// The AUC with the features of one family alone, the most telling first: what would be left if all others were right.
-    pub families: Vec<(Family, f64)>,
+    pub families: Vec<FamilyAlone>,
     /// What gives the synthetic side away, most telling first.
     pub giveaways: Vec<Giveaway>,
     /// How synthetic each row looked, real rows first, 0 to 1.
     #[serde(skip)]
     pub scores: [Vec<f64>; 2],
+}
+
+/// What the features of one family can tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FamilyAlone {
+    /// The family.
+    pub family: Family,
+    /// The AUC with its features alone.
+    pub auc: f64,
 }
 
 /// A feature, and how it differs.
@@ -174,8 +183,8 @@ fn area(sample: &Sample, scores: &[f64]) -> f64 {
 }
 
 /// Tries to tell two sets of fields apart by their tables; none if a side has fewer than two fields with rows.
-pub fn two_sample(real: &[&Table], synthetic: &[&Table], params: &TwoSampleParams, seed: u64) -> Option<TwoSample> {
-    let tables: Vec<(&Table, bool)> = real.iter().map(|t| (*t, false)).chain(synthetic.iter().map(|t| (*t, true))).collect();
+pub fn two_sample(real: &[Table], synthetic: &[Table], params: &TwoSampleParams, seed: u64) -> Option<TwoSample> {
+    let tables: Vec<(&Table, bool)> = real.iter().map(|t| (t, false)).chain(synthetic.iter().map(|t| (t, true))).collect();
     let sample = Sample::new(&tables)?;
     let round = round(&sample, params.folds, params.trees, seed)?;
     let halves: Vec<Option<(f64, usize)>> = (0..params.halvings as u64).into_par_iter().map(|i| halving(real, params, seed.wrapping_add(i + 1))).collect();
@@ -197,8 +206,8 @@ pub fn two_sample(real: &[&Table], synthetic: &[&Table], params: &TwoSampleParam
 }
 
 /// The same test between two random halves of the real fields, and the rows of one.
-fn halving(real: &[&Table], params: &TwoSampleParams, seed: u64) -> Option<(f64, usize)> {
-    let mut fields: Vec<&Table> = real.iter().copied().filter(|t| !t.is_empty()).collect();
+fn halving(real: &[Table], params: &TwoSampleParams, seed: u64) -> Option<(f64, usize)> {
+    let mut fields: Vec<&Table> = real.iter().filter(|t| !t.is_empty()).collect();
     shuffle(&mut fields, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
     let half = fields.len() / 2;
     let tables: Vec<(&Table, bool)> = fields.iter().enumerate().map(|(i, t)| (*t, i < half)).collect();
@@ -230,7 +239,7 @@ fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2
 }
 
 /// The test with the features of each family alone.
-fn families<'a>(sample: &Sample, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<(Family, f64)> {
+fn families<'a>(sample: &Sample, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<FamilyAlone> {
     let Some(features) = tables.find(|t| !t.is_empty()).map(|t| &t.features) else { return Vec::new() };
     let names: BTreeSet<Family> = features.iter().map(|f| f.family).collect();
     let names: Vec<Family> = names.into_iter().collect();
@@ -238,10 +247,10 @@ fn families<'a>(sample: &Sample, mut tables: impl Iterator<Item = &'a Table>, pa
         let columns = sample.rows.columns.iter().zip(features).filter(|(_, f)| f.family == family).map(|(c, _)| c.clone());
         let rows = Rows { columns: columns.collect(), synthetic: sample.rows.synthetic.clone() };
         let part = Sample { rows, fields: sample.fields.clone(), sides: sample.sides.clone() };
-        round(&part, params.folds, params.trees, seed).map(|r| (family, area(&part, &r.scores)))
+        round(&part, params.folds, params.trees, seed).map(|r| FamilyAlone { family, auc: area(&part, &r.scores) })
     };
-    let mut areas: Vec<(Family, f64)> = names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
-    areas.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut areas: Vec<FamilyAlone> = names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
+    areas.sort_by(|a, b| b.auc.total_cmp(&a.auc));
     areas
 }
 
@@ -288,5 +297,3 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
     list.sort_by(|a, b| b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs())));
     list
 }
-
-use crate::table::Feature;

@@ -110,12 +110,12 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
     let rest = deviation(&rests);
     row.put(Family::Texture, "core sd without trend", rest);
     for (band, name) in [(0, "1"), (1, "2"), (2, "4")] {
-        row.put(Family::Texture, format!("core power at {name} px"), power(maps, &core, band));
+        row.put(Family::Texture, format!("core power at {name} px"), maps.power(core.iter().map(|p| p.index), band));
     }
     let slope_inside = mean_of(core.iter().map(|p| f64::from(maps.slope[p.index])));
     row.put(Family::Texture, "core slope", slope_inside);
     row.put(Family::Texture, "core slope over sd", slope_inside / rest.max(1e-3));
-    let [spots, holes] = extrema(maps, &core);
+    let [spots, holes] = maps.extrema(core.iter().map(|p| p.index));
     row.put(Family::Texture, "dark spots, um-2", spots / um2);
     row.put(Family::Texture, "pale spots, um-2", holes / um2);
 
@@ -125,17 +125,6 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
     }
     row.put(Family::Texture, "entropy, bits", histogram.entropy());
     row
-}
-
-/// The histogram of grey levels of the core of a nucleus.
-pub(crate) fn histogram(maps: &Maps, region: &Region) -> Histogram {
-    let (inside, wide, [left, top]) = region.tile(1);
-    let depths = distance_inside(&inside, wide);
-    let deepest = depths.iter().fold(0.0_f32, |a, d| a.max(*d));
-    let rim = RIM_PX.min(0.4 * f64::from(deepest));
-    let place = |i: usize| usize::try_from((i / wide) as i64 + top).ok().zip(usize::try_from((i % wide) as i64 + left).ok());
-    let core = (0..depths.len()).filter(|&i| f64::from(depths[i]) > rim).filter_map(place);
-    Histogram::new(core.map(|(y, x)| maps.grey[y * maps.width + x]))
 }
 
 fn pixels(maps: &Maps, region: &Region, others: &[bool], centre: [f64; 2], margin: usize) -> Vec<Pixel> {
@@ -235,28 +224,4 @@ impl Tile {
         }
         if a.len() < 8 { f64::NAN } else { correlation(&a, &b) }
     }
-}
-
-/// Root mean square of a band over the core.
-fn power(maps: &Maps, core: &[&Pixel], band: usize) -> f64 {
-    let (values, width) = &maps.bands[band];
-    let at = |p: &&Pixel| f64::from(values[(whole(p.y) >> band) * width + (whole(p.x) >> band)]);
-    mean_of(core.iter().map(|p| at(p) * at(p))).sqrt()
-}
-
-/// Local maxima and minima of absorbance a pixel of the core.
-fn extrema(maps: &Maps, core: &[&Pixel]) -> [f64; 2] {
-    let count = |darker: fn(&f32, &f32) -> bool| {
-        let is = |p: &&&Pixel| {
-            let (x, y) = (p.index % maps.width, p.index / maps.width);
-            if x == 0 || y == 0 || x + 1 == maps.width || y + 1 == maps.height {
-                return false;
-            }
-            let own = maps.smooth[p.index];
-            let around = [p.index - maps.width - 1, p.index - maps.width, p.index - maps.width + 1, p.index - 1, p.index + 1, p.index + maps.width - 1, p.index + maps.width, p.index + maps.width + 1];
-            around.iter().all(|q| darker(&own, &maps.smooth[*q]))
-        };
-        core.iter().filter(is).count() as f64 / core.len().max(1) as f64
-    };
-    [count(|a, b| a > b), count(|a, b| a < b)]
 }

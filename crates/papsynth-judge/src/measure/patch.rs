@@ -1,13 +1,14 @@
 //! What a patch of a field looks like.
 
 use super::maps::{BANDS, Maps};
+use super::noise::{BLOCK, Noise};
 use crate::filter::{blur, gradient};
 use crate::number::whole;
 use crate::statistics::{of_sorted, quantile};
 use crate::table::{Family, Row, Table};
 
 /// Side of a patch, pixels; smaller fields are one patch.
-pub(crate) const SIDE: usize = 200;
+pub(crate) const PATCH_PX: usize = 200;
 
 /// Darker than this is an object, absorbance.
 pub(crate) const OBJECT: f32 = 0.04;
@@ -33,14 +34,8 @@ const TOLERANCE: f32 = 0.004;
 /// Patterns of eight neighbours with at most two changes have 0 to 8 of them darker; all others are one class more.
 const CLASSES: usize = 10;
 
-/// Blocks in which noise is measured, pixels a side: the flattest ones.
-const BLOCK: usize = 16;
-
 /// Part of a patch's blocks that count as flat.
 const FLAT: f64 = 0.2;
-
-/// Edges are at least so steep, absorbance a pixel after a Gaussian of 1 pixel.
-pub(crate) const EDGE: f32 = 0.02;
 
 /// Maps that patches alone need.
 struct Fine<'a> {
@@ -64,7 +59,7 @@ pub(crate) fn patches(maps: &Maps) -> Table {
         patterns: PATTERNS.iter().map(|(radius, s)| pattern(maps, *radius, *s)).collect(),
     };
     let mut table = Table::default();
-    let (wide, high) = (SIDE.min(maps.width), SIDE.min(maps.height));
+    let (wide, high) = (PATCH_PX.min(maps.width), PATCH_PX.min(maps.height));
     for top in (0..=maps.height - high).step_by(high) {
         for left in (0..=maps.width - wide).step_by(wide) {
             let window = Window { left, top, wide, high };
@@ -168,16 +163,6 @@ fn features(fine: &Fine, window: Window) -> Row {
 /// Fewer pixels of objects in a patch tell nothing of their texture.
 const MIN_OBJECT: usize = 400;
 
-/// Fewer pixels of edges tell nothing of their width.
-const MIN_EDGE: usize = 50;
-
-/// The standard deviation of the Gaussian that blurred an edge, from its slopes after Gaussians of 1 and 2 pixels: they are as
-/// 1/√(s² + 1) to 1/√(s² + 4).
-pub(crate) fn edge_sigma(slope: f64, wide_slope: f64) -> f64 {
-    let ratio = (slope / wide_slope.max(1e-9)) * (slope / wide_slope.max(1e-9));
-    if ratio <= 1.0 { f64::NAN } else { ((4.0 - ratio) / (ratio - 1.0)).max(0.0).sqrt() }
-}
-
 fn edges(row: &mut Row, fine: &Fine, window: Window) {
     let maps = fine.maps;
     let mut slopes: Vec<f64> = window.of(&maps.slope, maps.width, 0).map(f64::from).collect();
@@ -187,63 +172,29 @@ fn edges(row: &mut Row, fine: &Fine, window: Window) {
     }
     let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
     row.put(Family::Edges, "log slope across over down", libm::log10(sum(&fine.gradient[0]).max(1e-9) / sum(&fine.gradient[1]).max(1e-9)));
-    let pairs = window.of(&maps.slope, maps.width, 0).zip(window.of(&maps.wide_slope, maps.width, 0));
-    let mut widths: Vec<f64> = pairs.filter(|(s, _)| *s > EDGE).map(|(s, w)| edge_sigma(f64::from(s), f64::from(w))).filter(|s| s.is_finite()).collect();
+    let within = |p: usize| {
+        let (x, y) = (p % maps.width, p / maps.width);
+        (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
+    };
+    let mut widths: Vec<f64> = maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma).collect();
     for q in [0.1, 0.5, 0.9] {
-        let value = if widths.len() < MIN_EDGE { f64::NAN } else { quantile(&mut widths, q) };
+        let value = if widths.len() < super::edges::LEAST { f64::NAN } else { quantile(&mut widths, q) };
         row.put(Family::Edges, format!("edge sigma, px, quantile {q}"), value);
     }
 }
 
 /// Noise of the flattest blocks: its size, and how much neighbours are alike.
 fn noise(row: &mut Row, maps: &Maps, window: Window) {
-    let mut blocks: Vec<Noise> = Vec::new();
-    for top in (window.top..(window.top + window.high).saturating_sub(BLOCK - 1)).step_by(BLOCK) {
-        for left in (window.left..(window.left + window.wide).saturating_sub(BLOCK - 1)).step_by(BLOCK) {
-            blocks.push(Noise::of(&maps.grey, maps.width, left, top, BLOCK));
-        }
-    }
+    let along = |from: usize, length: usize| (from..(from + length).saturating_sub(BLOCK - 1)).step_by(BLOCK);
+    let places = along(window.top, window.high).flat_map(|y| along(window.left, window.wide).map(move |x| (x, y)));
+    let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&maps.grey, maps.width, x, y)).collect();
     blocks.sort_by(|a, b| a.variance.total_cmp(&b.variance));
     blocks.truncate(whole((FLAT * blocks.len() as f64).ceil()));
-    let mean = |f: &dyn Fn(&Noise) -> f64| blocks.iter().map(f).sum::<f64>() / blocks.len() as f64;
-    let variance = mean(&|b| b.variance);
-    row.put(Family::Noise, "log noise, dn", 0.5 * libm::log10(variance.max(1e-4)));
-    for (i, name) in Noise::LAGS.iter().enumerate() {
-        row.put(Family::Noise, format!("noise correlation {name}"), mean(&|b| b.products[i]) / variance.max(1e-4));
-    }
-}
-
-/// Noise in a block, without its quadratic surface.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Noise {
-    pub(crate) variance: f64,
-    /// Covariances at [`LAGS`](Self::LAGS).
-    pub(crate) products: [f64; 5],
-}
-
-impl Noise {
-    pub(crate) const LAGS: [&'static str; 5] = ["1 across", "1 down", "1 diagonally", "2 across", "2 down"];
-    const OFFSETS: [[usize; 2]; 5] = [[1, 0], [0, 1], [1, 1], [2, 0], [0, 2]];
-
-    /// Terms of a surface that is taken off.
-    const TERMS: f64 = 6.0;
-
-    pub(crate) fn of(grey: &[f32], width: usize, left: usize, top: usize, side: usize) -> Self {
-        let half = side as f64 / 2.0;
-        let place = |i: usize| (i as f64 + 0.5) / half - 1.0;
-        let cells = || (0..side).flat_map(|y| (0..side).map(move |x| (x, y)));
-        let points: Vec<([f64; 2], f64)> =
-            cells().map(|(x, y)| ([place(x), place(y)], f64::from(grey[(top + y) * width + left + x]))).collect();
-        let surface = crate::background::Surface::fit(&points, 0.0);
-        let rests: Vec<f64> = points.iter().map(|(p, v)| v - surface.at(*p)).collect();
-        let n = rests.len() as f64;
-        let variance = rests.iter().map(|r| r * r).sum::<f64>() / (n - Self::TERMS).max(1.0);
-        let product = |[dx, dy]: [usize; 2]| {
-            let pairs = cells().filter(|(x, y)| x + dx < side && y + dy < side);
-            let (sum, count) = pairs.fold((0.0, 0.0), |(s, c), (x, y)| (s + rests[y * side + x] * rests[(y + dy) * side + x + dx], c + 1.0));
-            sum / f64::max(count, 1.0)
-        };
-        Self { variance, products: Self::OFFSETS.map(product) }
+    let noise = Noise::mean(&mut blocks);
+    let known = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
+    row.put(Family::Noise, "log noise, dn", known(&|n| 0.5 * libm::log10(n.variance.max(1e-4))));
+    for (lag, name) in Noise::LAGS.iter().enumerate() {
+        row.put(Family::Noise, format!("noise correlation {name}"), known(&|n| n.correlation(lag)));
     }
 }
 
