@@ -88,7 +88,7 @@ pub(crate) struct RecipeArgs {
 pub(crate) struct EngineArgs {
     #[command(flatten)]
     pub(crate) recipe: RecipeArgs,
-    /// Model that `papsynth learn` wrote [default: the one that ships]
+    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
     #[arg(long, value_name = "FILE")]
     pub(crate) model: Option<PathBuf>,
     /// Seed of the whole data set; recipes that differ share what they have in common under the same seed

@@ -129,6 +129,18 @@ impl Number {
         random::count(self.draw(rng))
     }
 
+    /// What is wrong with this number where something is counted: what is written out must be whole, what is drawn from a
+    /// range is rounded.
+    pub(crate) fn fraction(&self) -> Option<String> {
+        let written: &[f64] = match self {
+            Self::Fixed(value) => &[*value],
+            Self::Drawn { law: Law::Choice(values), .. } => values,
+            Self::Drawn { .. } => &[],
+        };
+        let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
+        Some(format!("{value} is not a whole number"))
+    }
+
     /// What is wrong with this number, if it must lie within `low..=high`.
     pub(crate) fn problem(&self, low: f64, high: f64) -> Option<String> {
         if let Self::Drawn { law, min, max } = self {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::specimen::defaults;
 use super::{
-    Acceptance, Background, Camera, CameraPreset, CellMix, Chromatin, Cytoplasm, Debris, DyeAmounts, Field, Focus,
-    Folds, Illumination, Layout, Light, Nucleus, NucleusForm, Number, Optics, RECIPE_VERSION, Recipe, Restore, Seam,
-    ShapeSpread, Sheet, Slide, SpeckForm, Stain, TintMix,
+    Acceptance, Bacilli, Background, Camera, CameraPreset, CellMix, Chromatin, Cytoplasm, Debris, DyeAmounts, Field,
+    Focus, Folds, Illumination, Layout, Leukocytes, Light, Nucleus, NucleusForm, Number, Optics, OutOfFocus,
+    RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, SpeckForm, Speckles, Stain, TintMix,
 };
 
 /// A named recipe.
@@ -170,6 +170,13 @@ fn paper() -> Recipe {
         sheet: Sheet::Verlet,
         excess: 1.0.into(),
         folds: Folds { flap: 0.0.into(), roll: 0.0.into(), cigar: 0.0.into(), ..Folds::default() },
+        corners: 0.0.into(),
+        notches: 0.0.into(),
+        tongues: 0.0.into(),
+        wrinkles: 0.0.into(),
+        wrinkle: 0.0.into(),
+        wrinkle_um: 0.3.into(),
+        endoplasm: 0.0.into(),
         clouds: 0.2.into(),
         clouds_um: 1.75.into(),
         flecks: 0.7.into(),
@@ -179,6 +186,7 @@ fn paper() -> Recipe {
         granular: 0.0.into(),
         granules: 0.0.into(),
         fray_um: 0.0.into(),
+        rim_um: 0.0.into(),
         phase_rad: 0.0.into(),
     };
     recipe.nucleus = Nucleus {
@@ -191,6 +199,7 @@ fn paper() -> Recipe {
         pyknotic: 0.0.into(),
         wrinkled: 0.0.into(),
         rim: 0.0.into(),
+        dome: 0.0.into(),
         ..Nucleus::default()
     };
     // The paper's stain is a grey value.
@@ -210,24 +219,7 @@ fn paper() -> Recipe {
         bacillus: DyeAmounts::grey(),
         speckle: DyeAmounts::grey(),
     };
-    recipe.debris.leukocytes.form = NucleusForm::Round;
-    recipe.debris.leukocytes.absorbance = 0.70.into();
-    recipe.debris.leukocytes.halo = 0.0.into();
-    recipe.debris.leukocytes.clusters = 8.0.into();
-    recipe.debris.leukocytes.per_cluster = Number::uniform(3.0, 6.0);
-    recipe.debris.bacilli.absorbance = 0.15.into();
-    recipe.debris.bacilli.bend_deg = 0.0.into();
-    recipe.debris.bacilli.phase_rad = 0.0.into();
-    recipe.debris.bacilli.clusters = 8.0.into();
-    recipe.debris.bacilli.per_cluster = Number::uniform(8.0, 20.0);
-    recipe.debris.speckles.absorbance = 0.25.into();
-    recipe.debris.speckles.count = 120.0.into();
-    recipe.debris.speckles.form = SpeckForm::Dilated;
-    recipe.debris.speckles.phase_rad = 0.0.into();
-    recipe.debris.speckles.dilations =
-        Number::Drawn { law: super::Law::Choice(vec![0.0, 0.0, 1.0]), min: f64::NEG_INFINITY, max: f64::INFINITY };
-    recipe.debris.out_of_focus.absorbance = 0.35.into();
-    recipe.debris.out_of_focus.count = 5.0.into();
+    recipe.debris = paper_debris();
     recipe.background = Background {
         level: (235.0 / 255.0).into(),
         illumination: Illumination::Border { exponent: 0.02.into() },
@@ -238,6 +230,56 @@ fn paper() -> Recipe {
     recipe.camera = CameraPreset::Paper.camera();
     recipe.optics = Optics::gaussian();
     recipe
+}
+
+/// The paper's four kinds of debris.
+fn paper_debris() -> Debris {
+    let mut debris = Debris::none();
+    debris.leukocytes = Leukocytes {
+        clusters: 8.0.into(),
+        per_cluster: Number::uniform(3.0, 6.0),
+        cluster_um: Number::uniform(2.5, 6.0),
+        on_cells: 0.5.into(),
+        form: NucleusForm::Round,
+        radius_um: Number::normal(2.6, 0.25),
+        alpha: 0.10.into(),
+        beta: 0.10.into(),
+        absorbance: 0.70.into(),
+        halo: 0.0.into(),
+        ..Leukocytes::default()
+    };
+    debris.bacilli = Bacilli {
+        clusters: 8.0.into(),
+        per_cluster: Number::uniform(8.0, 20.0),
+        cluster_um: Number::uniform(6.0, 22.0),
+        on_cells: 0.75.into(),
+        length_um: Number::log_normal(2.4, 0.35),
+        width_um: Number::normal(0.55, 0.06),
+        bend_deg: 0.0.into(),
+        chained: 0.0.into(),
+        absorbance: 0.15.into(),
+        phase_rad: 0.0.into(),
+    };
+    debris.speckles = Speckles {
+        count: 120.0.into(),
+        form: SpeckForm::Dilated,
+        dilations: Number::Drawn {
+            law: super::Law::Choice(vec![0.0, 0.0, 1.0]),
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+        },
+        absorbance: 0.25.into(),
+        phase_rad: 0.0.into(),
+    };
+    debris.out_of_focus = OutOfFocus {
+        count: 5.0.into(),
+        radius_um: Number::log_normal(9.0, 0.5),
+        alpha: 0.15.into(),
+        beta: 0.2.into(),
+        depth_um: Number::uniform(14.0, 40.0),
+        absorbance: 0.35.into(),
+    };
+    debris
 }
 
 #[cfg(test)]
