@@ -57,6 +57,14 @@ pub struct TwoSample {
     pub scores: [Vec<f64>; 2],
 }
 
+impl TwoSample {
+    /// Mean AUC between random halves of the real fields; NaN if there were too few fields to halve.
+    #[must_use]
+    pub fn null_mean(&self) -> f64 {
+        if self.null.is_empty() { f64::NAN } else { mean(&self.null) }
+    }
+}
+
 /// What the features of one family can tell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FamilyAlone {

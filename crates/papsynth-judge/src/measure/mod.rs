@@ -39,6 +39,19 @@ pub enum NucleiFrom {
 }
 
 impl NucleiFrom {
+    /// All of them, from the least to the most that is known.
+    pub const ALL: [Self; 3] = [Self::Search, Self::Points, Self::Masks];
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Search => "search",
+            Self::Points => "points",
+            Self::Masks => "masks",
+        }
+    }
+
     /// The most that a picture allows.
     #[must_use]
     pub fn of(known: &Known) -> Self {
