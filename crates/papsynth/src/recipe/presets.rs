@@ -186,7 +186,7 @@ fn bacterial_vaginosis() -> Recipe {
     let mut recipe = lbc();
     let debris = &mut recipe.debris;
     debris.clue_cells.share = Number::uniform(0.3, 0.7);
-    debris.clue_cells.density = Number::uniform(1.0, 3.0);
+    debris.clue_cells.density = Number::uniform(2.0, 6.0);
     debris.cocci.colonies = Number::log_normal(14.0, 0.5);
     debris.cocci.per_colony = Number::log_normal(60.0, 0.9).at_least(2.0);
     debris.bacilli.clusters = 0.0.into();
