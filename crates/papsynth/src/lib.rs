@@ -11,6 +11,7 @@ mod engine;
 mod error;
 mod exp10;
 mod frame;
+mod fuse;
 pub mod key;
 pub mod learn;
 pub mod model;

@@ -4,6 +4,7 @@ use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
 use crate::frame::{Finished, Plane};
+use crate::fuse;
 use crate::phantom::{self, Phantom, Studio};
 use crate::recipe::Restore;
 use crate::restore::{Feathered, restore};
@@ -226,7 +227,9 @@ impl Rendering {
                 .scene
                 .planes_um
                 .iter()
-                .map(|plane| self.scene.in_focus_um(*plane) - object.depth_um)
+                .map(|plane| {
+                    self.scene.in_focus_um(self.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um
+                })
                 .collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
         }
@@ -310,9 +313,14 @@ impl<'a> Exposure<'a> {
 
     /// What is done to a whole frame.
     fn finish(&mut self) {
-        let Plane { grey, saturated, .. } = &mut *self.plane;
+        let Plane { grey, noise_free, saturated, .. } = &mut *self.plane;
         let width = self.rendering.scene.view.width;
         self.rendering.detector.finish(width, &self.keys, grey, self.developing);
+        let scene = &self.rendering.scene;
+        if let Some(fusion) = &scene.fusion {
+            fuse::correlate(grey, noise_free, width, scene.channels(), fusion, scene.camera.bits);
+        }
+        self.rendering.detector.compress(width, grey);
         *saturated = self.developing.saturated();
     }
 }

@@ -4,6 +4,7 @@
 
 mod cell;
 mod chromatin;
+mod form;
 mod nucleus;
 pub(crate) mod pools;
 mod studio;

@@ -23,12 +23,12 @@ pub use crate::debris::{
 pub use check::Problem;
 pub use imaging::{
     Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,
-    Rendition, Subsampling,
+    Picture, Rendition, Subsampling,
 };
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use specimen::{
-    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
+    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
     Slide, Stain, TintMix,
 };
 

@@ -5,12 +5,12 @@ use crate::error::Error;
 use crate::key::{Key, Stream};
 use crate::model::Model;
 use crate::random;
-use crate::recipe::{Illumination, Light, Number, Optics, Recipe};
+use crate::recipe::{Illumination, Light, Number, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
 use super::stain::{FieldStain, slide_of};
 use super::{
-    Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
+    Fusion, Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
     View, WeightMap,
 };
 
@@ -62,6 +62,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         slide: slide_of(recipe, key),
         view,
         planes_um: planes(recipe, &field),
+        fusion: fusion(recipe, &field),
         background: background(recipe, &field),
         light: light(recipe, &field),
         optics: optics(recipe, &field),
@@ -86,12 +87,34 @@ fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     field.draw("camera.pixel_um", &camera.pixel_um) * binning as f64 / magnification
 }
 
-fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
+/// Number of planes, travel to the middle one, travel between them.
+fn stack(recipe: &Recipe, field: &FieldNumbers) -> (usize, f64, f64) {
     let count = field.count("focus.planes", &recipe.focus.planes).max(1);
     let step = field.draw("focus.step_um", &recipe.focus.step_um);
-    let centre = field.draw("focus.centre_um", &recipe.focus.centre_um);
+    (count, field.draw("focus.centre_um", &recipe.focus.centre_um), step)
+}
+
+fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
+    let (count, centre, step) = stack(recipe, field);
+    if recipe.focus.picture == Picture::Extended {
+        return vec![centre];
+    }
     let middle = (count - 1) as f64 / 2.0;
     (0..count).map(|plane| centre + (plane as f64 - middle) * step).collect()
+}
+
+fn fusion(recipe: &Recipe, field: &FieldNumbers) -> Option<Fusion> {
+    let focus = &recipe.focus;
+    let (planes, centre, step_um) = stack(recipe, field);
+    (focus.picture == Picture::Extended).then(|| Fusion {
+        first_um: centre - (planes - 1) as f64 / 2.0 * step_um,
+        step_um,
+        planes,
+        noise_correlation: [
+            field.draw("focus.fused_noise_across", &focus.fused_noise_across),
+            field.draw("focus.fused_noise_down", &focus.fused_noise_down),
+        ],
+    })
 }
 
 fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {

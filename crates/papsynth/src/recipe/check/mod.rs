@@ -118,6 +118,11 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ],
         );
         check.whole(&format!("cells.{class}"), &[("count", &mix.count)]);
+        check.numbers(
+            &format!("cells.{class}.group"),
+            &[("size", &mix.group.size, 1.0, 1000.0), ("distance", &mix.group.distance, 0.2, 3.0)],
+        );
+        check.whole(&format!("cells.{class}.group"), &[("size", &mix.group.size)]);
         let tints = &mix.tints;
         let weights = [
             ("cyanophilic", &tints.cyanophilic, 0.0, 1000.0),
@@ -134,6 +139,13 @@ fn cells(recipe: &Recipe, check: &mut Check) {
         "cytoplasm",
         &[
             ("excess", &cytoplasm.excess, 1.0, 2.0),
+            ("corners", &cytoplasm.corners, 0.0, 1.0),
+            ("notches", &cytoplasm.notches, 0.0, 20.0),
+            ("tongues", &cytoplasm.tongues, 0.0, 20.0),
+            ("wrinkles", &cytoplasm.wrinkles, 0.0, 100.0),
+            ("wrinkle", &cytoplasm.wrinkle, 0.0, 5.0),
+            ("wrinkle_um", &cytoplasm.wrinkle_um, 0.05, 5.0),
+            ("endoplasm", &cytoplasm.endoplasm, 0.0, 2.0),
             ("clouds", &cytoplasm.clouds, 0.0, 2.0),
             ("clouds_um", &cytoplasm.clouds_um, 0.1, 100.0),
             ("flecks", &cytoplasm.flecks, 0.0, 5.0),
@@ -143,6 +155,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("granular", &cytoplasm.granular, 0.0, 1.0),
             ("granules", &cytoplasm.granules, 0.0, 1000.0),
             ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
+            ("rim_um", &cytoplasm.rim_um, 0.0, 10.0),
             ("phase_rad", &cytoplasm.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
@@ -169,6 +182,8 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("pyknotic", &nucleus.pyknotic, 0.0, 1.0),
             ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
             ("rim", &nucleus.rim, 0.0, 2.0),
+            ("dome", &nucleus.dome, 0.0, 1.0),
+            ("wedge", &nucleus.wedge, 0.0, 1.0),
         ],
     );
     check.whole("nucleus", &[("donors", &nucleus.donors)]);
