@@ -26,7 +26,7 @@ pub struct BareNuclei {
     pub radius_um: Number,
     /// Length relative to width, 1 to 4.
     pub elongation: Number,
-    /// Absorbance, 0 to 4.
+    /// Absorbance, 0 to 4, before the field's stain of nuclei.
     pub absorbance: Number,
     /// Contrast of its chromatin relative to the absorbance, 0 to 2.
     pub texture: Number,
@@ -88,7 +88,7 @@ impl Kinds for BareNuclei {
             let nucleus = BareNucleus {
                 radius_um: self.radius_um.draw(&mut rng),
                 elongation: self.elongation.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng) * ground.nuclear_stain(),
                 texture: self.texture.draw(&mut rng),
                 shreds: self.shreds.draw(&mut rng),
                 dyes,

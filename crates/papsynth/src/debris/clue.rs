@@ -52,11 +52,11 @@ impl Default for ClueCells {
     fn default() -> Self {
         Self {
             share: Number::log_normal(0.004, 1.3).at_most(0.8),
-            density: Number::uniform(0.8, 2.2),
+            density: Number::uniform(1.5, 4.5),
             cover: Number::uniform(0.35, 0.95),
             beyond_um: Number::uniform(0.8, 3.0),
             width_um: Number::normal(0.6, 0.04),
-            absorbance: Number::log_normal(0.10, 0.25),
+            absorbance: Number::log_normal(0.045, 0.25),
         }
     }
 }
@@ -102,6 +102,13 @@ const PATCH_UM: f64 = 3.0;
 const THIN: f64 = 0.08;
 const RIM: f64 = 0.5;
 
+/// How fast a patch thickens from its border inwards, for each standard deviation of the field it is cut from.
+const SOFT: f64 = 1.2;
+
+/// Size (standard deviation) of the tufts beyond the rim, µm, and how dense it is between them.
+const TUFT_UM: f64 = 0.8;
+const TUFTED: f64 = 0.15;
+
 /// Distance over which a coat thickens towards the rim, µm.
 const RIM_UM: f64 = 2.0;
 
@@ -117,6 +124,10 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
     let inside = widened(&cell.coverage, &painting.coverage);
     let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
     let (rim, beyond) = (near(RIM_UM), near(coat.beyond_um));
+    // Beyond the rim bacteria hang together in tufts.
+    let tufts = Look::clouds(TUFT_UM / pixel_um, &mut rng);
+    let mut tufted = Vec::with_capacity(painting.coverage.values.len());
+    painting.rows(pools.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
     // How dense the coat is at each pixel.
     let threshold = pools.clouds().quantile(1.0 - coat.cover);
     let look = Look::clouds(PATCH_UM / pixel_um, &mut rng);
@@ -127,10 +138,11 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
         for (x, patch) in field.iter().enumerate() {
             let at = row * width + x;
             let covered = f64::from(inside.values[at]);
-            let patchy = if *patch > threshold { 1.0 } else { THIN };
+            let patchy = (0.5 + SOFT * f64::from(*patch - threshold)).clamp(THIN, 1.0);
             let at_rim = RIM * (2.0 * (1.0 - f64::from(rim.values[at]))).min(1.0);
-            let outside = 2.0 * f64::from(beyond.values[at]);
-            density[at] = covered * (patchy + at_rim).min(1.0) + (1.0 - covered) * 0.8 * outside * outside * patchy;
+            let outside = (2.0 * f64::from(beyond.values[at])).min(1.0);
+            let tuft = (TUFTED + (1.0 - TUFTED) * f64::from(tufted[at])).clamp(0.0, 1.0);
+            density[at] = covered * (patchy + at_rim).min(1.0) + (1.0 - covered) * outside * tuft * patchy.max(RIM);
         }
         row += 1;
     });

@@ -45,9 +45,9 @@ pub struct Crystal {
 impl Default for Crystals {
     fn default() -> Self {
         Self {
-            count: Number::log_normal(0.6, 1.0),
+            count: Number::log_normal(0.45, 0.9),
             on_cells: 0.3.into(),
-            diameter_um: Number::log_normal(1.8, 0.45),
+            diameter_um: Number::log_normal(1.2, 0.4),
             absorbance: Number::log_normal(0.6, 0.4),
             phase_rad: Number::uniform(0.3, 1.0),
             dyes: DyeAmounts { haematein: 0.9, eosin_y: 0.4, orange_g: 0.4, ..DyeAmounts::none() },

@@ -87,6 +87,11 @@ impl<'a> Ground<'a> {
         self.stain.balanced(dyes)
     }
 
+    /// How strongly the field's nuclei are stained.
+    pub(super) fn nuclear_stain(&self) -> f64 {
+        self.stain.nucleus
+    }
+
     /// Dyes of pale cytoplasm.
     pub(super) fn cyanophilic(&self) -> dye_spectra::Amounts {
         self.stain.cyanophilic()

@@ -121,6 +121,14 @@ macro_rules! kinds {
             }
         }
 
+        impl Kind {
+            /// Whether all of it in an image is one row and one mask of the truth: a layer that nobody counts.
+            #[must_use]
+            pub fn is_layer(self) -> bool {
+                self == Self::Dirt
+            }
+        }
+
         impl Body {
             /// The kind of the object.
             #[must_use]
@@ -222,3 +230,6 @@ kinds! {
     /// Scratches in the glass.
     scratches: Scratches => Scratch(Scratch), "scratch";
 }
+
+#[cfg(test)]
+mod tests;

@@ -116,9 +116,12 @@ const PARTS: usize = 40;
 const BEND: f64 = 0.03;
 
 /// Absorbance of what lies between the fibres relative to them, how cloudy that is, and the size of its clouds, µm.
-const VEIL: f64 = 0.45;
-const CLOUDY: f32 = 0.5;
+const VEIL: f64 = 0.3;
+const CLOUDY: f32 = 0.8;
 const CLOUD_UM: f64 = 0.7;
+
+/// Share of the length over which either end thins out.
+const TAPER: f64 = 0.3;
 
 /// Narrowest place of a strand relative to its width: where it was drawn out.
 const NECK: f64 = 0.35;
@@ -146,7 +149,8 @@ impl Thing for Strand {
             .map(|i| {
                 let t = i as f64 / PARTS as f64;
                 let swell = 0.5 + 0.5 * libm::sin(7.0 * t + waves[0]) * libm::cos(3.0 * t + waves[1]);
-                0.5 * self.width_um * (NECK + (1.0 - NECK) * swell)
+                let taper = (t / TAPER).min((1.0 - t) / TAPER).min(1.0);
+                0.5 * self.width_um * (NECK + (1.0 - NECK) * swell) * (0.15 + 0.85 * taper)
             })
             .collect();
         let mut fibres: Vec<Vec<Point>> = Vec::with_capacity(self.fibres);

@@ -64,12 +64,12 @@ impl Default for Smudges {
         Self {
             count: Number::log_normal(7.0, 0.8),
             on_cells: 0.25.into(),
-            diameter_um: Number::log_normal(5.5, 0.65).at_least(2.0).at_most(45.0),
+            diameter_um: Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0),
             elongation: Number::log_normal(1.5, 0.3).at_least(1.0),
             grain_um: Number::uniform(0.6, 1.1),
             granularity: Number::uniform(0.3, 0.7),
             ragged: Number::uniform(0.6, 1.3),
-            absorbance: Number::log_normal(0.085, 0.6).at_least(0.015).at_most(0.4),
+            absorbance: Number::log_normal(0.05, 0.65).at_least(0.012).at_most(0.4),
             phase_rad: Number::uniform(0.0, 0.2),
             dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
         }

@@ -160,9 +160,6 @@ impl Thing for Trichomonad {
         for pair in threads.iter().flat_map(|thread| thread.windows(2)) {
             hairs.stroke(&Stroke::even(pair[0], pair[1], half_width), FLAGELLUM * self.absorbance);
         }
-        for (value, hair) in painting.absorbance.values.iter_mut().zip(&hairs.absorbance.values) {
-            *value += hair;
-        }
         let mut nucleus = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
         let (at, tilt) = ([0.42 * a, 0.2 * b * random::normal(&mut rng)], 0.4 * random::normal(&mut rng));
         let reach = 0.15 * self.length_um;
@@ -175,6 +172,10 @@ impl Thing for Trichomonad {
         }
         let both = nucleus.absorbance.values.iter_mut().zip(&nucleus.coverage.values);
         both.for_each(|(value, cover)| *value = self.nucleus as f32 * cover);
-        painting.finish(self.dyes, 0.0, self.absorbance).stained(nucleus.absorbance, site.scene.dyes.nucleus)
+        // Flagella are no part of its outline: nobody would draw it round them.
+        painting
+            .finish(self.dyes, 0.0, self.absorbance)
+            .stained(nucleus.absorbance, site.scene.dyes.nucleus)
+            .stained(hairs.absorbance, self.dyes)
     }
 }

@@ -229,10 +229,13 @@ fn sparse() -> Recipe {
     let mut recipe = lbc();
     recipe.layout = Layout::Uniform {};
     recipe.cells = mix([("intermediate", Number::uniform(3.0, 8.0)), ("superficial", Number::uniform(1.0, 4.0))]);
-    recipe.debris.leukocytes.clusters = Number::uniform(0.0, 2.0);
-    recipe.debris.bacilli.clusters = Number::uniform(0.0, 3.0);
-    recipe.debris.speckles.count = Number::uniform(10.0, 50.0);
-    recipe.debris.out_of_focus.count = Number::uniform(0.0, 1.0);
+    let debris = &mut recipe.debris;
+    debris.leukocytes.clusters = Number::log_normal(0.8, 0.7);
+    debris.bacilli.clusters = Number::uniform(0.0, 3.0);
+    debris.speckles.count = Number::log_normal(2.5, 0.7);
+    debris.smudges.count = Number::log_normal(2.0, 0.7);
+    debris.dirt.drifts = Number::log_normal(7.0, 0.6);
+    debris.out_of_focus.count = Number::uniform(0.0, 1.0);
     recipe
 }
 
@@ -302,7 +305,7 @@ fn bacterial_vaginosis() -> Recipe {
     let mut recipe = lbc();
     let debris = &mut recipe.debris;
     debris.clue_cells.share = Number::uniform(0.3, 0.7);
-    debris.clue_cells.density = Number::uniform(1.0, 3.0);
+    debris.clue_cells.density = Number::uniform(2.0, 6.0);
     debris.cocci.colonies = Number::log_normal(14.0, 0.5);
     debris.cocci.per_colony = Number::log_normal(60.0, 0.9).at_least(2.0);
     debris.bacilli.clusters = 0.0.into();
