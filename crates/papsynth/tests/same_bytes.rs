@@ -77,7 +77,7 @@ fn another_speckle_moves_no_nucleus() {
             .objects
             .iter()
             .filter(|o| o.kind != Kind::Speckle)
-            .map(|o| (o.id, o.part, o.amodal.clone()))
+            .map(|o| (o.kind, o.part, o.amodal.clone()))
             .collect::<Vec<_>>()
     };
     assert_eq!(others(&few), others(&more));
