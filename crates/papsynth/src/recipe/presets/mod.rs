@@ -176,16 +176,16 @@ fn extended_focus() -> Recipe {
         planes: 11.0.into(),
         step_um: 1.0.into(),
         picture: Picture::Extended,
-        fused_noise_across: Number::uniform(0.20, 0.30),
-        fused_noise_down: Number::uniform(0.36, 0.46),
+        fused_noise_across: Number::uniform(0.24, 0.34),
+        fused_noise_down: Number::uniform(0.40, 0.48),
         ..recipe.focus
     };
     if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
-        *extra_blur_um = Number::uniform(0.30, 0.52);
+        *extra_blur_um = Number::uniform(0.30, 0.54);
     }
-    recipe.camera.full_well_e = 60_000.0.into();
-    recipe.camera.read_noise_e = Number::uniform(180.0, 480.0);
-    recipe.stain.field_texture = Number::log_normal(0.34, 0.3);
+    recipe.camera.full_well_e = 40_000.0.into();
+    recipe.camera.read_noise_e = Number::uniform(90.0, 300.0);
+    recipe.stain.field_texture = Number::log_normal(0.35, 0.3);
     recipe
 }
 
