@@ -159,6 +159,8 @@ impl Gauge {
     pub fn measure(&self, picture: &Picture) -> Result<Field, Error> {
         picture.check()?;
         let picture = picture.trimmed();
+        // What is left of it may be too little.
+        picture.check()?;
         let pixel_um = self.params.pixel_um;
         let maps = Maps::new(&picture);
         let regions = self.nuclei(&maps, &picture.nuclei);
