@@ -15,6 +15,7 @@ mod recipe_file;
 mod report;
 mod schema;
 mod setup;
+mod study;
 mod text_file;
 
 use std::process::ExitCode;
@@ -58,6 +59,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Learn(args) => learn::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
+        Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))

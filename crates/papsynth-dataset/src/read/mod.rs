@@ -24,8 +24,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 pub use components::{Component, components};
-pub(crate) use image::LevelImage;
-pub use image::{GreyImage, label_map, read_label_map};
+pub use image::{GreyImage, LevelImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
 pub use stack::{Stack, natural_order};
