@@ -339,8 +339,8 @@ defocus, stain and density. Of images in colour green is shown, of stacks the mi
 
 Fields are shown as they are; --grey glass brings the bright glass of each to one level. If the size of
 a pixel is known of both, the finer are resampled. A patch is taken anywhere at random, 8 pixels off the
-border, where at least a tenth of it is 8 % darker than the glass, and shares at most a quarter with
-another. In OUT, each subject has a folder with trials.csv, summary.json, and the state to go on from.
+border, where at least a fifth of it is 8 % darker than the glass, and shares at most a quarter with
+another. In the folder of --out, each subject has a folder with trials.csv, summary.json, and the state to go on from.
 
 An accuracy near .5 known to 5 points takes 384 trials, of one subject or several.")]
 pub(crate) struct Study {
@@ -384,10 +384,10 @@ pub(crate) struct Study {
     #[arg(long, value_name = "NAME", value_parser = grey_parser(), default_value = StudyParams::default().grey.name())]
     pub(crate) grey: Grey,
     /// Size of a real pixel in the object, in micrometres
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) pixel_um: Option<f64>,
     /// Size of a synthetic pixel, in micrometres [default: as the data set says]
-    #[arg(long, value_name = "UM")]
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
     pub(crate) synthetic_pixel_um: Option<f64>,
     /// Port of 127.0.0.1 to serve the page at [default: that of last time, or any]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -399,7 +399,7 @@ pub(crate) struct Study {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["real", "synthetic", "open", "port"])]
     pub(crate) results: Option<PathBuf>,
     /// Print results as JSON instead of a table
-    #[arg(long, requires = "results")]
+    #[arg(long, requires = "results", conflicts_with_all = ["real", "synthetic"])]
     pub(crate) json: bool,
 }
 

@@ -2,9 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use papsynth_study::{
-    Error, Interval, Pool, Server, Session, Side, StudyParams, Summary, breakdown_table, table,
-};
+use papsynth_study::{Error, Interval, Pool, Server, Session, Side, StudyParams, Summary, breakdown_table, table};
 
 use crate::args::Study;
 use crate::exit::{self, Complaint, Failure};
@@ -44,7 +42,10 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
     server.run(session, interrupt.flag(), |session| {
         all_answered = true;
         // Whoever closed the pipe reads the page or the files.
-        let _ = exit::print(&format!("\n{}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n", results(&session.summary())));
+        let _ = exit::print(&format!(
+            "\n{}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n",
+            results(&session.summary())
+        ));
     })?;
     if all_answered {
         return Ok(());
@@ -76,7 +77,9 @@ fn results(summary: &Summary) -> String {
 }
 
 fn claim(trials: u64) -> String {
-    format!("Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n")
+    format!(
+        "Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n"
+    )
 }
 
 /// All subjects in a folder.

@@ -132,11 +132,7 @@ impl Root {
             fields.push(Field {
                 name: format!("{prefix}{}", image.path),
                 path: self.inside(&root.join(&image.path))?,
-                frame: Some(Frame {
-                    root: root.to_owned(),
-                    summary: record.summary,
-                    recipe: Arc::clone(&recipe),
-                }),
+                frame: Some(Frame { root: root.to_owned(), summary: record.summary, recipe: Arc::clone(&recipe) }),
             });
         }
         Ok(())

@@ -172,11 +172,8 @@ mod tests {
 
     #[test]
     fn what_recipes_differ_in_is_found() {
-        let field = |recipe: Option<&str>| Field {
-            name: String::new(),
-            path: PathBuf::new(),
-            frame: recipe.map(frame),
-        };
+        let field =
+            |recipe: Option<&str>| Field { name: String::new(), path: PathBuf::new(), frame: recipe.map(frame) };
         let fields = [field(Some("a = 1\nb = 2.5\nc = [1, 2]")), field(Some("a = 1\nb = 3\nc = [1, 3]"))];
         let [first, second] = varied(&fields.iter().collect::<Vec<_>>()).try_into().unwrap();
         assert_eq!(first.keys().collect::<Vec<_>>(), ["b", "c"]);

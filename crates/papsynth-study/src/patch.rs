@@ -3,7 +3,7 @@
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use rand_core::Rng;
 
-use crate::design::unit;
+use crate::key::unit;
 use crate::normal::pair;
 
 /// Adds Gaussian noise of `sigma` grey levels and rounds to 8 bits. Each pixel takes the same random numbers whatever its level.

@@ -6,12 +6,13 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::design::{Grey, Key, Side, Stage, StudyParams, hex, order, shuffle};
+use crate::design::{Grey, Side, Stage, StudyParams, order};
 use crate::error::Error;
 use crate::fields::{Field, Root, bytes, limits};
+use crate::key::{Key, hex, shuffle};
 use crate::parameters::{Objects, Parameters, varied};
 use crate::patch;
-use crate::picture::{Picture, Raw};
+use crate::picture::{Picture, Places, Raw};
 
 /// Pixel sizes that differ by less than this part are the same.
 const SAME_PIXEL: f64 = 0.005;
@@ -21,6 +22,9 @@ const GLASS_LEVEL: f32 = 230.0;
 
 /// Bits of a grey level that cameras have.
 const BITS: [u32; 5] = [8, 10, 12, 14, 16];
+
+/// Stands for a full scale until all fields of the side have been seen.
+const UNKNOWN: f32 = 0.0;
 
 /// A field that patches are taken from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,76 +111,42 @@ impl Plan {
     /// too.
     pub(crate) fn draw(params: &StudyParams, folders: &Folders) -> Result<Self, Error> {
         let mut notes = Vec::new();
-        let mut chosen: Vec<(Side, &Field)> = Vec::new();
-        for side in Side::BOTH {
-            let all = folders.fields(side);
-            let names = Key::new(params.seed, "", all.iter().map(|field| field.name.as_bytes()));
-            let mut indices: Vec<usize> = (0..all.len()).collect();
-            shuffle(&mut indices, &mut names.stream("fields", place(side)));
-            indices.truncate(params.fields);
-            indices.sort_unstable();
-            if all.len() < params.fields {
-                let (name, count, wanted) = (side.name(), all.len(), params.fields);
-                notes.push(format!("{name}: {count} of {wanted} fields are there; patches come from these"));
-            }
-            chosen.extend(indices.into_iter().map(|index| (side, &all[index])));
-        }
+        let chosen = choose(params, folders, &mut notes);
         let hashes = chosen.iter().map(|(_, field)| hash(field)).collect::<Result<Vec<_>, _>>()?;
         let key = Key::new(params.seed, &params.subject, hashes.iter());
         let orders = order(params, &mut key.stream("order", 0));
+        let needed =
+            Side::BOTH.map(|side| orders.iter().flat_map(|o| &o.sides).filter(|shown| **shown == side).count());
         let reduce = reductions(params, &chosen, &mut notes);
+        let (fields, places) = survey(params, &chosen, hashes, &reduce, needed, &key)?;
 
-        let mut fields = Vec::with_capacity(chosen.len());
-        let mut places = Vec::with_capacity(chosen.len());
-        let mut deepest = [0.0_f32; 2];
-        for (index, ((side, field), sha256)) in chosen.iter().zip(hashes).enumerate() {
-            let raw = Raw::read(field)?;
-            let deep = &mut deepest[place(*side)];
-            if raw.is_deep {
-                *deep = deep.max(raw.picture.most());
-            }
-            let reduce = reduce[index];
-            let picture = raw.picture.reduced(reduce);
-            let needed = orders.iter().flat_map(|order| &order.sides).filter(|shown| *shown == side).count();
-            places.push(picture.places(params.patch_px, needed, &mut key.stream("places", index)));
-            let full_scale = match &field.frame {
-                Some(frame) => full_scale(frame.summary.bits),
-                // Of deep pictures known when all of the side have been seen.
-                None if raw.is_deep => 0.0,
-                None => full_scale(8),
-            };
-            let (name, glass) = (field.name.clone(), picture.glass().max(1.0));
-            fields.push(FieldRecord { side: *side, name, sha256, full_scale, glass, reduce });
-        }
-        for field in fields.iter_mut().filter(|field| field.full_scale == 0.0) {
-            let most = deepest[place(field.side)];
-            field.full_scale = BITS.map(full_scale).into_iter().find(|full| *full >= most).unwrap_or(most);
-        }
-
-        let mut dealt = [Vec::new(), Vec::new()];
+        let mut hands = [Vec::new(), Vec::new()];
         for side in Side::BOTH {
-            let needed = orders.iter().flat_map(|order| &order.sides).filter(|shown| **shown == side).count();
-            let mut own: Vec<usize> = (0..fields.len()).filter(|index| fields[*index].side == side).collect();
-            shuffle(&mut own, &mut key.stream("turns", place(side)));
-            let cards = deal(&own, &places, needed);
-            if cards.len() < needed {
-                let (side, fields, found) = (side.name(), own.len(), cards.len());
+            let (hand, needed) = (&mut hands[place(side)], needed[place(side)]);
+            let mut turns: Vec<usize> = (0..fields.len()).filter(|index| fields[*index].side == side).collect();
+            shuffle(&mut turns, &mut key.stream("turns", place(side)));
+            *hand = deal(&turns, &places, needed);
+            if hand.len() < needed {
+                let (side, fields, found) = (side.name(), turns.len(), hand.len());
                 return Err(Error::TooFew { side, fields, found, needed });
             }
-            dealt[place(side)] = cards;
-            shuffle(&mut dealt[place(side)], &mut key.stream("patches", place(side)));
+            shuffle(hand, &mut key.stream("patches", place(side)));
         }
         let known = Known::read(folders, &chosen, &mut notes);
-        let mut trials = Vec::with_capacity(orders.len());
-        for order in orders {
-            let patches = order.sides.iter().filter_map(|side| {
-                let (field, [x_px, y_px]) = dealt[place(*side)].pop()?;
-                let reduce = fields[field].reduce;
-                let parameters = known.of(field, [x_px, y_px].map(|at| at as f64 * reduce), params.patch_px as f64 * reduce);
-                Some(Patch { side: *side, field, x_px, y_px, parameters })
-            });
-            trials.push(Trial { stage: order.stage, patches: patches.collect() });
-        }
+        let mut patch = |side: Side| {
+            let (field, [x_px, y_px]) = hands[place(side)].pop()?;
+            let reduce = fields[field].reduce;
+            let parameters =
+                known.of(field, [x_px, y_px].map(|at| at as f64 * reduce), params.patch_px as f64 * reduce);
+            Some(Patch { side, field, x_px, y_px, parameters })
+        };
+        let trials = orders
+            .into_iter()
+            .map(|order| Trial {
+                stage: order.stage,
+                patches: order.sides.into_iter().filter_map(&mut patch).collect(),
+            })
+            .collect();
         Ok(Self { fields, trials, notes })
     }
 
@@ -190,21 +160,16 @@ impl Plan {
         let key = self.key(params);
         let mut shown: Vec<Vec<Vec<u8>>> =
             self.trials.iter().map(|trial| vec![Vec::new(); trial.patches.len()]).collect();
+        // Field by field, since only one is in memory at a time.
         for (index, record) in self.fields.iter().enumerate() {
             let picture = record.picture(params, folders)?;
-            for (trial, patches) in self.trials.iter().zip(&mut shown).enumerate().map(|(k, (t, p))| ((k, t), p)) {
-                let (number, trial) = trial;
-                for (slot, (patch, png)) in trial.patches.iter().zip(patches).enumerate() {
-                    if patch.field != index {
-                        continue;
-                    }
-                    let (x, y, side) = (patch.x_px, patch.y_px, params.patch_px);
-                    if x + side > picture.width || y + side > picture.height() {
-                        return Err(record.changed(folders));
-                    }
-                    let levels = picture.square([x, y], side);
+            for (number, trial) in self.trials.iter().enumerate() {
+                for (slot, patch) in trial.patches.iter().enumerate().filter(|(_, patch)| patch.field == index) {
+                    let levels = picture.square([patch.x_px, patch.y_px], params.patch_px);
+                    let levels = levels.ok_or_else(|| record.changed(folders))?;
                     let mut rng = key.stream("noise", patch_number(number, slot));
-                    *png = patch::png(&patch::noisy(&levels, params.noise_dn, &mut rng), side);
+                    shown[number][slot] =
+                        patch::png(&patch::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
                 }
             }
         }
@@ -241,7 +206,10 @@ impl FieldRecord {
 
     fn changed(&self, folders: &Folders) -> Error {
         let path = folders.root(self.side).path().join(&self.name);
-        Error::folder(&path, "has changed since the study of this subject began; --subject with another name begins a new one")
+        Error::folder(
+            &path,
+            "has changed since the study of this subject began; --subject with another name begins a new one",
+        )
     }
 }
 
@@ -256,6 +224,68 @@ fn hash(field: &Field) -> Result<String, Error> {
     Ok(hex(&Sha256::digest(bytes(&field.path, limits().max_file_bytes)?)))
 }
 
+/// The fields that are shown: as many of each side as are asked for, or all.
+fn choose<'a>(params: &StudyParams, folders: &'a Folders, notes: &mut Vec<String>) -> Vec<(Side, &'a Field)> {
+    let mut chosen = Vec::new();
+    for side in Side::BOTH {
+        let all = folders.fields(side);
+        let key = Key::new(params.seed, "", all.iter().map(|field| field.name.as_bytes()));
+        let mut indices: Vec<usize> = (0..all.len()).collect();
+        shuffle(&mut indices, &mut key.stream("fields", place(side)));
+        indices.truncate(params.fields);
+        indices.sort_unstable();
+        if all.len() < params.fields {
+            let (name, count, wanted) = (side.name(), all.len(), params.fields);
+            notes.push(format!("{name}: {count} of {wanted} fields are there; patches come from these"));
+        }
+        chosen.extend(indices.into_iter().map(|index| (side, &all[index])));
+    }
+    chosen
+}
+
+/// Looks at every field: what is to be known of it, and where patches may be taken.
+fn survey(
+    params: &StudyParams,
+    chosen: &[(Side, &Field)],
+    hashes: Vec<String>,
+    reduce: &[f64],
+    needed: [usize; 2],
+    key: &Key,
+) -> Result<(Vec<FieldRecord>, Vec<Places>), Error> {
+    let mut fields = Vec::with_capacity(chosen.len());
+    let mut places = Vec::with_capacity(chosen.len());
+    // The largest level of each side's pictures of more than 8 bits that do not say how many.
+    let mut deepest = [0.0_f32; 2];
+    for (index, ((side, field), sha256)) in chosen.iter().zip(hashes).enumerate() {
+        let raw = Raw::read(field)?;
+        let full_scale = match &field.frame {
+            Some(frame) => full_scale(frame.summary.bits),
+            None if raw.is_deep => UNKNOWN,
+            None => full_scale(8),
+        };
+        if full_scale == UNKNOWN {
+            let deepest = &mut deepest[place(*side)];
+            *deepest = deepest.max(raw.picture.most());
+        }
+        let picture = raw.picture.reduced(reduce[index]);
+        places.push(picture.places(params.patch_px, needed[place(*side)], &mut key.stream("places", index)));
+        fields.push(FieldRecord {
+            side: *side,
+            name: field.name.clone(),
+            sha256,
+            full_scale,
+            // Black glass would have no scale.
+            glass: picture.glass().max(1.0),
+            reduce: reduce[index],
+        });
+    }
+    for field in fields.iter_mut().filter(|field| field.full_scale == UNKNOWN) {
+        let most = deepest[place(field.side)];
+        field.full_scale = BITS.map(full_scale).into_iter().find(|full| *full >= most).unwrap_or(most);
+    }
+    Ok((fields, places))
+}
+
 /// How much each field is reduced, so that all have pixels of one size: that of the coarsest.
 fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<String>) -> Vec<f64> {
     let own = |side: Side, field: &Field| {
@@ -267,10 +297,8 @@ fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<S
         return vec![1.0; chosen.len()];
     };
     let coarsest = sizes.iter().copied().fold(0.0, f64::max);
-    let reduce: Vec<f64> = sizes
-        .iter()
-        .map(|size| if coarsest / size < 1.0 + SAME_PIXEL { 1.0 } else { coarsest / size })
-        .collect();
+    let reduce: Vec<f64> =
+        sizes.iter().map(|size| if coarsest / size < 1.0 + SAME_PIXEL { 1.0 } else { coarsest / size }).collect();
     for side in Side::BOTH {
         let finer = chosen.iter().zip(&reduce).filter(|((own, _), reduce)| *own == side && **reduce > 1.0).count();
         if finer > 0 {
@@ -281,11 +309,10 @@ fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<S
 }
 
 /// Patches of the fields in turn, so that all give about as many: for each the field and the place.
-fn deal(turns: &[usize], places: &[Vec<[usize; 2]>], needed: usize) -> Vec<(usize, [usize; 2])> {
+fn deal(turns: &[usize], places: &[Places], needed: usize) -> Vec<(usize, [usize; 2])> {
     let rounds = turns.iter().map(|&field| places[field].len()).max().unwrap_or(0);
-    let all = (0..rounds).flat_map(|round| {
-        turns.iter().filter_map(move |&field| places[field].get(round).map(|place| (field, *place)))
-    });
+    let all = (0..rounds)
+        .flat_map(|round| turns.iter().filter_map(move |&field| places[field].get(round).map(|place| (field, *place))));
     all.take(needed).collect()
 }
 
@@ -354,7 +381,10 @@ mod tests {
         }
         // Seven of each side over four and three fields.
         let counts: Vec<i32> = (0..7).map(|field| uses[&field]).collect();
-        assert!(counts[..4].iter().all(|n| (1..=2).contains(n)) && counts[4..].iter().all(|n| (2..=3).contains(n)), "{counts:?}");
+        assert!(
+            counts[..4].iter().all(|n| (1..=2).contains(n)) && counts[4..].iter().all(|n| (2..=3).contains(n)),
+            "{counts:?}"
+        );
         assert!(plan.notes.iter().any(|note| note.starts_with("real: 4 of 25 fields")), "{:?}", plan.notes);
     }
 
@@ -387,7 +417,10 @@ mod tests {
         let plan = Plan::draw(&few, &folders).unwrap();
         let names = |plan: &Plan| plan.fields.iter().map(|f| (f.side, f.name.clone())).collect::<Vec<_>>();
         assert_eq!(plan.fields.len(), 6);
-        assert_eq!(names(&plan), names(&Plan::draw(&StudyParams { subject: "2".to_owned(), ..few.clone() }, &folders).unwrap()));
+        assert_eq!(
+            names(&plan),
+            names(&Plan::draw(&StudyParams { subject: "2".to_owned(), ..few.clone() }, &folders).unwrap())
+        );
         assert_ne!(names(&plan), names(&Plan::draw(&StudyParams { seed: 1, ..few }, &folders).unwrap()));
         assert!(!plan.notes.iter().any(|note| note.contains("fields are there")));
     }
@@ -398,9 +431,11 @@ mod tests {
         let folders = study_folders(&scratch, 4, 4);
         let pairs = StudyParams { task: Task::TwoAlternatives, ..params() };
         let plan = Plan::draw(&pairs, &folders).unwrap();
-        assert!(plan.trials.iter().all(|trial| {
-            trial.patches.len() == 2 && trial.patches[0].side != trial.patches[1].side
-        }));
+        assert!(
+            plan.trials
+                .iter()
+                .all(|trial| { trial.patches.len() == 2 && trial.patches[0].side != trial.patches[1].side })
+        );
         let key = plan.key(&pairs);
         let names: BTreeSet<String> = (0..14).flat_map(|t| [0, 1].map(|slot| plan.patch_name(&key, t, slot))).collect();
         assert_eq!(names.len(), 28);
@@ -427,7 +462,11 @@ mod tests {
             let wanted = if field.side == Side::Real { 1.0 } else { 0.33 / 0.25 };
             assert_eq!(field.reduce, wanted);
         }
-        assert!(plan.notes.iter().any(|note| note == "synthetic: 2 fields are resampled to pixels of 0.33 µm"), "{:?}", plan.notes);
+        assert!(
+            plan.notes.iter().any(|note| note == "synthetic: 2 fields are resampled to pixels of 0.33 µm"),
+            "{:?}",
+            plan.notes
+        );
         plan.patches(&both, &folders).unwrap();
         let one = StudyParams { real_pixel_um: Some(0.33), ..few };
         assert!(Plan::draw(&one, &folders).unwrap().fields.iter().all(|field| field.reduce == 1.0));

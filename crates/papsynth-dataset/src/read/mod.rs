@@ -5,9 +5,9 @@
 //!
 //! # What is accepted
 //!
-//! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused: how much light of
-//! one wavelength a colour stands for is not known. A colour file whose pixels are all grey (R = G = B, opaque) is read
-//! as grey. In label images and masks a palette is not looked at, its indices are the labels.
+//! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused, but for
+//! [`LevelImage`], which keeps its channels: how much light of one wavelength a colour stands for is not known. A colour
+//! file whose pixels are all grey (R = G = B, opaque) is read as grey. In label images and masks a palette is not looked at, its indices are the labels.
 
 mod components;
 mod image;

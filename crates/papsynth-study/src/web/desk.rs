@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use crate::session::{Answer, Exposure, Refusal, Session};
+use crate::saved::{Answer, Exposure};
+use crate::session::{Refusal, Session};
 
 /// Longest body of a request, bytes; what the page sends is a tenth of it.
 pub(crate) const LONGEST_BODY: usize = 4096;
@@ -207,7 +208,14 @@ mod tests {
 
     fn post(desk: &mut Desk, target: &str, body: &str) -> Reply {
         let content_type = Some(JSON.as_bytes());
-        desk.reply(&Request { method: "POST", target, hosts: HOST, content_type, body: body.as_bytes(), ..Request::default() })
+        desk.reply(&Request {
+            method: "POST",
+            target,
+            hosts: HOST,
+            content_type,
+            body: body.as_bytes(),
+            ..Request::default()
+        })
     }
 
     fn state(desk: &mut Desk) -> serde_json::Value {
@@ -322,12 +330,22 @@ mod tests {
         };
         assert_eq!(ask(&[b"localhost:8123"], None), 200);
         assert_eq!(ask(HOST, Some(b"http://127.0.0.1:8123")), 200);
-        for host in ["evil.example:8123", "127.0.0.1", "127.0.0.1:8124", "localhost", "", "127.0.0.1:8123.evil.example", "[::1]:8123"] {
+        for host in [
+            "evil.example:8123",
+            "127.0.0.1",
+            "127.0.0.1:8124",
+            "localhost",
+            "",
+            "127.0.0.1:8123.evil.example",
+            "[::1]:8123",
+        ] {
             assert_eq!(ask(&[host.as_bytes()], None), 421, "{host}");
         }
         assert_eq!(ask(&[], None), 400);
         assert_eq!(ask(&[HOST[0], HOST[0]], None), 400);
-        for origin in ["http://evil.example", "null", "https://127.0.0.1:8123", "http://127.0.0.1:81", "", "http://localhost"] {
+        for origin in
+            ["http://evil.example", "null", "https://127.0.0.1:8123", "http://127.0.0.1:81", "", "http://localhost"]
+        {
             assert_eq!(ask(HOST, Some(origin.as_bytes())), 403, "{origin}");
         }
         let session = desk.session;
@@ -341,9 +359,23 @@ mod tests {
         let scratch = bench("desk-routes");
         let mut desk = open(&scratch, Task::YesNo);
         for target in [
-            "/index.html", "//", "/../real/f0.png", "/patch/../../real/f0.png", "/patch/", "/patch/%2e%2e/session.json",
-            "/study.js?x", "/session.json", "/out/1/session.json", "", "*", "/STATE", "/state/", "/patch/..%5c..%5c",
-            "http://127.0.0.1:8123/state", "/\u{e9}\u{20ac}", "/patch/\0",
+            "/index.html",
+            "//",
+            "/../real/f0.png",
+            "/patch/../../real/f0.png",
+            "/patch/",
+            "/patch/%2e%2e/session.json",
+            "/study.js?x",
+            "/session.json",
+            "/out/1/session.json",
+            "",
+            "*",
+            "/STATE",
+            "/state/",
+            "/patch/..%5c..%5c",
+            "http://127.0.0.1:8123/state",
+            "/\u{e9}\u{20ac}",
+            "/patch/\0",
         ] {
             let status = get(&mut desk, target).status;
             assert!(status == 404 || (status == 409 && target.starts_with(PATCH)), "{target:?}: {status}");
@@ -369,9 +401,19 @@ mod tests {
         let before = state(&mut desk);
         let name = before["patches"][0].as_str().unwrap().to_owned();
         for body in [
-            "", "{}", "null", "[]", "\u{feff}{}", "{\"patch\":1}", &said(&name, "left"), &said(&name, "maybe"),
-            &said(&name, "real").replace("400.5", "-1"), &said(&name, "real").replace("400.5", "1e999"),
-            &said(&name, "real").replace('}', ",\"more\":1}"), &"[".repeat(4000), &" ".repeat(LONGEST_BODY + 1),
+            "",
+            "{}",
+            "null",
+            "[]",
+            "\u{feff}{}",
+            "{\"patch\":1}",
+            &said(&name, "left"),
+            &said(&name, "maybe"),
+            &said(&name, "real").replace("400.5", "-1"),
+            &said(&name, "real").replace("400.5", "1e999"),
+            &said(&name, "real").replace('}', ",\"more\":1}"),
+            &"[".repeat(4000),
+            &" ".repeat(LONGEST_BODY + 1),
         ] {
             let status = post(&mut desk, "/answer", body).status;
             assert!(matches!(status, 400 | 409 | 413), "{body:.60}: {status}");
@@ -382,7 +424,14 @@ mod tests {
         assert_eq!(state(&mut desk), before);
         let garbage = [0xff_u8, 0xfe, 0];
         let content_type = Some(JSON.as_bytes());
-        let request = Request { method: "POST", target: "/answer", hosts: HOST, content_type, body: &garbage, ..Request::default() };
+        let request = Request {
+            method: "POST",
+            target: "/answer",
+            hosts: HOST,
+            content_type,
+            body: &garbage,
+            ..Request::default()
+        };
         assert_eq!(desk.reply(&request).status, 400);
     }
 }
