@@ -6,6 +6,7 @@
 
 mod arguments;
 mod bench;
+mod browser;
 mod ci;
 mod dataset;
 mod deps;
@@ -51,6 +52,7 @@ const CHORES: &[Chore] = &[
     equations::CHORE,
     deps::CHORE,
     external::CHORE,
+    browser::CHORE,
     wasm::CHORE,
     publish::CHORE,
     ci::CHORE,
