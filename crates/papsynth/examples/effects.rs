@@ -208,9 +208,9 @@ fn nearest(recipe: &Recipe, path: &str, wanted: f64, middle: f64) -> Option<(f64
     (0..=STEPS).find_map(|step| {
         let value = wanted + (middle - wanted) * f64::from(step) / f64::from(STEPS);
         // Where things are counted, only whole numbers are taken.
-        [value, libm::round(value)]
-            .into_iter()
-            .find_map(|value| with(recipe, path, json!(value)).or_else(|| with(recipe, path, json!(value as i64))).map(|r| (value, r)))
+        [value, libm::round(value)].into_iter().find_map(|value| {
+            with(recipe, path, json!(value)).or_else(|| with(recipe, path, json!(value as i64))).map(|r| (value, r))
+        })
     })
 }
 
@@ -233,5 +233,9 @@ fn with(recipe: &Recipe, path: &str, value: Value) -> Option<Recipe> {
 }
 
 fn shown(value: f64) -> String {
-    if value != 0.0 && value.abs() < 0.01 { format!("{value:.1e}") } else { format!("{:.4}", value).trim_end_matches('0').trim_end_matches('.').to_owned() }
+    if value != 0.0 && value.abs() < 0.01 {
+        format!("{value:.1e}")
+    } else {
+        format!("{:.4}", value).trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
 }

@@ -8,7 +8,9 @@ mod support;
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix};
+use papsynth::recipe::{
+    CellMix, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
+};
 use papsynth::scene::Kind;
 use papsynth::truth::Part;
 use papsynth::{Engine, Frame, Inputs};
