@@ -10,13 +10,13 @@ mod support;
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Preset, Recipe};
+use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
 use support::{LINE, Outcome, enlarged, picture, write};
 
 /// Camera pixels of a tile, and how much larger it is shown.
-const TILE: [u32; 2] = [200, 150];
+const TILE: [u32; 2] = [210, 160];
 const ZOOM: u32 = 1;
 
 /// Rows side by side, and pixels between tiles.
@@ -73,6 +73,10 @@ const CHOICES: [(&str, &[&str]); 18] = [
     ("light.rendition", &["display", "srgb", "raw"]),
 ];
 
+/// What is a probability, by the end of the path: shown at 0 and at 1.
+const PROBABILITIES: [&str; 9] =
+    ["flap", "roll", "cigar", "granular", "pyknotic", "wrinkled", "degenerated", "on_cells", "ghosts"];
+
 /// A row: a parameter and the recipes that show it, each with what stands beneath.
 struct Row {
     path: String,
@@ -117,13 +121,23 @@ fn base(section: &str) -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.field.width_px = f64::from(TILE[0]).into();
     recipe.field.height_px = f64::from(TILE[1]).into();
-    recipe.slide.spacing_um = 12.0.into();
+    recipe.field.pixel_um = 0.33.into();
+    recipe.slide.spacing_um = 30.0.into();
+    recipe.layout = Layout::Uniform {};
+    if section != "debris" {
+        recipe.debris = Debris::none();
+    }
     recipe.cells.retain(|class, _| class == "intermediate");
-    recipe.cells.insert("intermediate".to_owned(), CellMix { count: 3.0.into(), ..CellMix::default() });
+    recipe.cells.insert("intermediate".to_owned(), CellMix { count: 2.0.into(), ..CellMix::default() });
     match section {
         "stain" => recipe = with(&recipe, "light", json!({ "kind": "colour" })).unwrap_or(recipe),
         // A share of a field of many square millimetres is seldom in so small a one.
         "debris" => recipe = abundant(&recipe),
+        "layout" => {
+            recipe.layout = Preset::Lbc.recipe().layout;
+            recipe.field.pixel_um = 1.3.into();
+            recipe.cells.insert("intermediate".to_owned(), CellMix { count: 20.0.into(), ..CellMix::default() });
+        }
         _ => {}
     }
     recipe
@@ -179,7 +193,9 @@ fn number(whole: &Value, path: &str, value: &Value) -> Option<Row> {
     };
     let middle = 0.5 * (low + high);
     let name = path.rsplit('.').next().unwrap_or(path);
-    let (low, high) = if middle == 0.0 {
+    let (low, high) = if PROBABILITIES.contains(&name) {
+        (0.0, 1.0)
+    } else if middle == 0.0 {
         let high = OF_NOTHING.iter().find(|(known, _)| *known == name).map_or(1.0, |(_, high)| *high);
         (0.0, high)
     } else {
@@ -197,7 +213,7 @@ fn alone(recipe: &Recipe, path: &str) -> Recipe {
     };
     let mut whole = serde_json::to_value(recipe).unwrap_or_default();
     let mine = whole["debris"][kind].clone();
-    whole["debris"] = serde_json::to_value(papsynth::recipe::Debris::none()).unwrap_or_default();
+    whole["debris"] = serde_json::to_value(Debris::none()).unwrap_or_default();
     whole["debris"][kind] = mine;
     serde_json::from_value(whole).unwrap_or_else(|_| recipe.clone())
 }

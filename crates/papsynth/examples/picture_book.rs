@@ -42,7 +42,9 @@ fn main() -> Outcome<()> {
         let (x, y) = (GAP + i % COLUMNS * cell[0], GAP + i / COLUMNS * cell[1]);
         let tile = draw(chapter, colour)?;
         image::imageops::replace(&mut page, &tile, i64::from(x), i64::from(y));
-        write(&mut page, chapter.name, [x + 4, y + TILE[1] * ZOOM + 4], DOT);
+        // A name that is too long for its tile is written smaller.
+        let fits = chapter.name.len() as u32 * 8 * DOT <= TILE[0] * ZOOM;
+        write(&mut page, chapter.name, [x + 4, y + TILE[1] * ZOOM + 4], if fits { DOT } else { 1 });
     }
     page.save(&out)?;
     Ok(())
@@ -100,18 +102,18 @@ fn cells() -> Vec<Chapter> {
     vec![
         far(class("superficial", 1.0, Group::default())),
         far(class("intermediate", 1.0, Group::default())),
-        class("parabasal", 4.0, heap(4.0)),
-        class("basal", 6.0, heap(6.0)),
-        class("metaplastic", 4.0, heap(4.0)),
-        class("endocervical", 9.0, group(GroupForm::Palisade, 9.0, 0.46)),
-        class("endocervical-en-face", 19.0, group(GroupForm::Honeycomb, 19.0, 0.85)),
+        far(class("parabasal", 4.0, heap(4.0))),
+        far(class("basal", 6.0, heap(6.0))),
+        far(class("metaplastic", 4.0, heap(4.0))),
+        far(class("endocervical", 9.0, group(GroupForm::Palisade, 9.0, 0.46))),
+        far(class("endocervical-en-face", 19.0, group(GroupForm::Honeycomb, 19.0, 0.85))),
         far(class("lsil", 2.0, heap(2.0))),
-        class("high-grade", 3.0, heap(3.0)),
-        class("severe", 5.0, heap(5.0)),
-        class("carcinoma", 6.0, heap(6.0)),
+        far(class("high-grade", 3.0, heap(3.0))),
+        far(class("severe", 5.0, heap(5.0))),
+        far(class("carcinoma", 6.0, heap(6.0))),
         far(class("oral-superficial", 1.0, Group::default())),
         far(class("oral-intermediate", 1.0, Group::default())),
-        class("oral-parabasal", 3.0, heap(3.0)),
+        far(class("oral-parabasal", 3.0, heap(3.0))),
     ]
 }
 

@@ -1,6 +1,6 @@
 //! What the examples that draw pages share: pictures of frames, labels.
 
-#![allow(dead_code, reason = "no example uses all of it")]
+#![allow(dead_code, clippy::cast_sign_loss, reason = "no example uses all of it; numbers are small")]
 
 use font8x8::UnicodeFonts;
 use image::{Rgb, RgbImage};
