@@ -11,7 +11,8 @@ mod support;
 use support::Toy;
 
 fn gauge(detail: Detail) -> Gauge {
-    Gauge::new(&GaugeParams { nuclei_from: NucleiFrom::Search, detail, ..GaugeParams::default() }).expect("defaults are in range")
+    Gauge::new(&GaugeParams { nuclei_from: NucleiFrom::Search, detail, ..GaugeParams::default() })
+        .expect("defaults are in range")
 }
 
 /// A field of 1280 x 960 pixels with 29 nuclei, on one thread.
@@ -38,7 +39,9 @@ fn compare(c: &mut Criterion) {
     group.sample_size(10).throughput(Throughput::Elements(24));
     for (name, params) in [("quick", JudgeParams::quick()), ("default", JudgeParams::default())] {
         let judge = Judge::new(&params).expect("defaults are in range");
-        group.bench_function(name, |b| b.iter_batched(|| (), |()| judge.compare(&real, &synthetic), BatchSize::PerIteration));
+        group.bench_function(name, |b| {
+            b.iter_batched(|| (), |()| judge.compare(&real, &synthetic), BatchSize::PerIteration)
+        });
     }
     group.finish();
 }

@@ -84,7 +84,8 @@ impl Background {
         let mut band = FIRST_BAND * brightest;
         for _ in 0..ROUNDS {
             let rest = |b: &Block| b.level - surface.at(place(b));
-            let chosen: Vec<&Block> = blocks.iter().filter(|b| b.spread <= even.max(1e-4) && rest(b).abs() < band).collect();
+            let chosen: Vec<&Block> =
+                blocks.iter().filter(|b| b.spread <= even.max(1e-4) && rest(b).abs() < band).collect();
             if chosen.len() < 2 * TERMS {
                 break;
             }
@@ -184,11 +185,22 @@ mod tests {
         let (width, height) = (400, 300);
         let terms = [0.9, 0.004, -0.006, -0.03, 0.002, -0.012];
         let lamp = Surface(terms);
-        let at = |i: usize| [2.0 * (i % width) as f64 / width as f64 - 1.0, 2.0 * (i / width) as f64 / height as f64 - 1.0];
+        let at =
+            |i: usize| [2.0 * (i % width) as f64 / width as f64 - 1.0, 2.0 * (i / width) as f64 / height as f64 - 1.0];
         // Half of the field is covered, in two layers.
-        let a = |i: usize| if i % width < 120 { 0.05 } else if i % width < 200 && i / width > 60 { 0.3 } else { 0.0 };
+        let a = |i: usize| {
+            if i % width < 120 {
+                0.05
+            } else if i % width < 200 && i / width > 60 {
+                0.3
+            } else {
+                0.0
+            }
+        };
         let noise = |i: usize| ((i * 7919) % 101) as f64 / 100.0 - 0.5;
-        let grey: Vec<f32> = (0..width * height).map(|i| single((255.0 * lamp.at(at(i)) * libm::pow(10.0, -a(i)) + noise(i)).round())).collect();
+        let grey: Vec<f32> = (0..width * height)
+            .map(|i| single((255.0 * lamp.at(at(i)) * libm::pow(10.0, -a(i)) + noise(i)).round()))
+            .collect();
         let found = Background::new(&grey, width, 255.0);
         for (found, wanted) in found.surface.0.iter().zip(terms) {
             assert!((found - wanted).abs() < 0.002, "{found}, not {wanted}");

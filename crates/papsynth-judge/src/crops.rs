@@ -27,8 +27,11 @@ pub(crate) struct Crop {
     pub(crate) width: usize,
 }
 
+/// A name, the table of it, and the side of its picture.
+type Kind = (&'static str, fn(&Field) -> &Table, usize);
+
 pub(crate) fn crops(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample>]) -> Vec<Crop> {
-    let kinds: [(&'static str, fn(&Field) -> &Table, usize); 2] =
+    let kinds: [Kind; 2] =
         [("nuclei", |f| &f.nuclei, NUCLEUS_PX), ("patches", |f| &f.patches, crate::measure::PATCH_PX)];
     let mut crops = Vec::new();
     for (of, table, side) in kinds {
@@ -36,13 +39,22 @@ pub(crate) fn crops(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample
         for (is_synthetic, fields) in [(false, real), (true, synthetic)] {
             let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
             let scores = &test.result.scores[usize::from(is_synthetic)];
-            let mut all: Vec<(f64, &Field, [f64; 2])> = scores.iter().zip(places).map(|(s, (f, p))| (*s, f, p)).collect();
+            let mut all: Vec<(f64, &Field, [f64; 2])> =
+                scores.iter().zip(places).map(|(s, (f, p))| (*s, f, p)).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
             let shown = SHOWN.min(all.len());
             for (looks_real, part) in [(true, &all[..shown]), (false, &all[all.len() - shown..])] {
                 crops.extend(part.iter().filter_map(|(score, field, place)| {
                     let (grey, width) = cut(field, *place, side)?;
-                    Some(Crop { of, synthetic: is_synthetic, looks_real, field: field.name.clone(), score: *score, grey, width })
+                    Some(Crop {
+                        of,
+                        synthetic: is_synthetic,
+                        looks_real,
+                        field: field.name.clone(),
+                        score: *score,
+                        grey,
+                        width,
+                    })
                 }));
             }
         }

@@ -36,7 +36,11 @@ fn separable(image: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f
     let mut out = vec![0.0; image.len()];
     for (y, to) in out.chunks_exact_mut(width).enumerate() {
         let row = |offset: usize, sign: bool| {
-            let at = if sign { mirrored(y + down.len() - 1 + offset, down.len() - 1, height) } else { mirrored(y + down.len() - 1 - offset, down.len() - 1, height) };
+            let at = if sign {
+                mirrored(y + down.len() - 1 + offset, down.len() - 1, height)
+            } else {
+                mirrored(y + down.len() - 1 - offset, down.len() - 1, height)
+            };
             &rows[at * width..(at + 1) * width]
         };
         scale(row(0, true), down[0], to);
@@ -91,7 +95,8 @@ pub(crate) fn gradient(image: &[f32], width: usize) -> [Vec<f32>; 2] {
     let mut down = vec![0.0; image.len()];
     for y in 0..height {
         let row = &image[y * width..(y + 1) * width];
-        let (above, below) = (&image[y.saturating_sub(1) * width..][..width], &image[(y + 1).min(height - 1) * width..][..width]);
+        let (above, below) =
+            (&image[y.saturating_sub(1) * width..][..width], &image[(y + 1).min(height - 1) * width..][..width]);
         let (to_x, to_y) = (&mut across[y * width..(y + 1) * width], &mut down[y * width..(y + 1) * width]);
         for x in 0..width {
             to_x[x] = 0.5 * (row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)]);
@@ -144,7 +149,8 @@ mod tests {
                 for dy in -reach..=reach {
                     for dx in -reach..=reach {
                         let weight = |d: i64| f64::from(taps[usize::try_from(d.abs()).unwrap()]);
-                        sum += weight(dx) * weight(dy) * f64::from(image[mirror(y + dy, 7) * width + mirror(x + dx, 9)]);
+                        sum +=
+                            weight(dx) * weight(dy) * f64::from(image[mirror(y + dy, 7) * width + mirror(x + dx, 9)]);
                     }
                 }
                 assert!((f64::from(*value) - sum).abs() < 1e-5, "sigma {sigma}, pixel {i}: {value}, not {sum}");

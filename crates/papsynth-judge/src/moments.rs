@@ -109,12 +109,14 @@ pub fn qq_slope(x: &[f64], y: &[f64]) -> f64 {
     };
     let (x, y) = (quantiles(x), quantiles(y));
     let (mx, my) = (mean(&x), mean(&y));
-    let (xy, xx) = x.iter().zip(&y).fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
+    let (xy, xx) =
+        x.iter().zip(&y).fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
     if xx > 0.0 { xy / xx } else { f64::NAN }
 }
 
 /// Columns of the table of nuclei that are compared.
-const COLUMNS: [&str; 6] = ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
+const COLUMNS: [&str; 6] =
+    ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
 
 /// Quantiles that are kept to be drawn.
 const DRAWN: usize = 60;
@@ -143,7 +145,8 @@ pub(crate) fn compare(real: &[Table], synthetic: &[Table], n: usize, draws: usiz
     let descriptors = COLUMNS.iter().map(|name| {
         let values = |tables: &[&Table]| tables.iter().flat_map(|t| t.column(name)).collect::<Vec<f64>>();
         let all = [values(&real), values(&synthetic)];
-        let (mut slopes, mut shifts, mut null_slopes, mut null_shifts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut slopes, mut shifts, mut null_slopes, mut null_shifts) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for half in &halves {
             let mut draw = |mut values: Vec<f64>| {
                 shuffle(&mut values, &mut rng);
@@ -234,7 +237,9 @@ mod tests {
             let mut table = Table::default();
             for _ in 0..30 {
                 let mut row = crate::table::Row::default();
-                COLUMNS.iter().for_each(|name| row.put(crate::table::Family::Texture, *name, mean + own + sd * normal(&mut rng)));
+                COLUMNS
+                    .iter()
+                    .for_each(|name| row.put(crate::table::Family::Texture, *name, mean + own + sd * normal(&mut rng)));
                 table.push(row, [0.0; 2]);
             }
             table

@@ -55,7 +55,13 @@ pub(crate) enum Hints<'a> {
 }
 
 /// The nuclei of a picture, by their centres from top to bottom. No two have a pixel in common.
-pub(crate) fn nuclei(absorbance: &[f32], width: usize, pixel_um: f64, hints: &Hints, params: &NucleiParams) -> Vec<Region> {
+pub(crate) fn nuclei(
+    absorbance: &[f32],
+    width: usize,
+    pixel_um: f64,
+    hints: &Hints,
+    params: &NucleiParams,
+) -> Vec<Region> {
     let mut regions = match hints {
         Hints::Masks(labels) => masks(labels, width),
         Hints::Nothing => found(absorbance, width, pixel_um, None, params),
@@ -82,7 +88,13 @@ fn masks(labels: &[u32], width: usize) -> Vec<Region> {
     largest.into_values().collect()
 }
 
-fn found(absorbance: &[f32], width: usize, pixel_um: f64, points: Option<&[[f64; 2]]>, params: &NucleiParams) -> Vec<Region> {
+fn found(
+    absorbance: &[f32],
+    width: usize,
+    pixel_um: f64,
+    points: Option<&[[f64; 2]]>,
+    params: &NucleiParams,
+) -> Vec<Region> {
     let smooth = blur(absorbance, width, (SMOOTH_UM / pixel_um).max(0.5));
     let px2 = pixel_um * pixel_um;
     let (smallest, largest) = (params.smallest_um2 / px2, params.largest_um2 / px2);
@@ -156,7 +168,8 @@ fn nearest_mark(points: &[[f64; 2]], marked: &[bool], blob: &Blob, pixel_um: f64
 
 /// Mean absorbance inside above the median of what lies around.
 fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
-    let inner = region.pixels.iter().map(|p| f64::from(absorbance[*p as usize])).sum::<f64>() / region.pixels.len() as f64;
+    let inner =
+        region.pixels.iter().map(|p| f64::from(absorbance[*p as usize])).sum::<f64>() / region.pixels.len() as f64;
     let [from, to] = AROUND_UM.map(|um| um / pixel_um);
     let mut outer: Vec<f64> = Vec::new();
     let margin = whole(to) + 1;
@@ -218,7 +231,8 @@ mod tests {
         assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &Hints::Nothing), [0; 0]);
         assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &Hints::Nothing), [0; 0]);
         assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &Hints::Nothing), [0; 0]);
-        let chain: Vec<([f64; 2], f64, f64)> = (0..12).map(|i| ([40.0 + 9.0 * f64::from(i), 60.0 + 20.0 * f64::from(i % 2)], 9.0, 0.1)).collect();
+        let chain: Vec<([f64; 2], f64, f64)> =
+            (0..12).map(|i| ([40.0 + 9.0 * f64::from(i), 60.0 + 20.0 * f64::from(i % 2)], 9.0, 0.1)).collect();
         assert!(areas(&image(&chain), &Hints::Nothing).is_empty());
     }
 

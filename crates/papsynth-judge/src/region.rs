@@ -75,7 +75,8 @@ impl Region {
             return self.clone();
         }
         let place = |i: usize| {
-            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            let (x, y) =
+                (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
             (x < self.width && y < height).then(|| id(y * self.width + x))
         };
         Self { pixels: (0..inside.len()).filter(|&i| !outside[i]).filter_map(place).collect(), width: self.width }
@@ -98,7 +99,8 @@ impl Region {
         }
         let centre = [sx / area, sy / area];
         // A pixel is a square, not a point.
-        let (xx, yy) = (sxx / area - centre[0] * centre[0] + 1.0 / 12.0, syy / area - centre[1] * centre[1] + 1.0 / 12.0);
+        let (xx, yy) =
+            (sxx / area - centre[0] * centre[0] + 1.0 / 12.0, syy / area - centre[1] * centre[1] + 1.0 / 12.0);
         let xy = sxy / area - centre[0] * centre[1];
         let half = 0.5 * (xx + yy);
         let root = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
@@ -214,7 +216,13 @@ pub(crate) fn components(inside: &[bool], width: usize) -> Vec<Region> {
 }
 
 /// What is connected with a pixel through its edges, of those where `inside` holds.
-pub(crate) fn flood(start: usize, width: usize, length: usize, seen: &mut [bool], inside: impl Fn(usize) -> bool) -> Region {
+pub(crate) fn flood(
+    start: usize,
+    width: usize,
+    length: usize,
+    seen: &mut [bool],
+    inside: impl Fn(usize) -> bool,
+) -> Region {
     let mut pixels = vec![id(start)];
     seen[start] = true;
     let mut next = 0;
@@ -222,7 +230,12 @@ pub(crate) fn flood(start: usize, width: usize, length: usize, seen: &mut [bool]
         next += 1;
         let p = pixel as usize;
         let x = p % width;
-        let around = [(x > 0).then(|| p - 1), (x + 1 < width).then(|| p + 1), p.checked_sub(width), Some(p + width).filter(|q| *q < length)];
+        let around = [
+            (x > 0).then(|| p - 1),
+            (x + 1 < width).then(|| p + 1),
+            p.checked_sub(width),
+            Some(p + width).filter(|q| *q < length),
+        ];
         for q in around.into_iter().flatten() {
             if !seen[q] && inside(q) {
                 seen[q] = true;
@@ -323,7 +336,10 @@ mod tests {
             u * u / 1600.0 + v * v / 400.0 < 1.0
         };
         let shape = region(120, 100, inside).shape();
-        assert!((shape.eccentricity - 0.75_f64.sqrt()).abs() < 0.005 && (shape.direction - 0.5).abs() < 0.01, "{shape:?}");
+        assert!(
+            (shape.eccentricity - 0.75_f64.sqrt()).abs() < 0.005 && (shape.direction - 0.5).abs() < 0.01,
+            "{shape:?}"
+        );
     }
 
     #[test]
@@ -332,7 +348,9 @@ mod tests {
         assert!((square.shape().circularity - std::f64::consts::FRAC_PI_4).abs() < 0.06, "{:?}", square.shape());
         assert_eq!(square.outline().len(), 120);
         assert!((square.shape().solidity - 1.0).abs() < 1e-12);
-        let cross = region(60, 60, |x, y| (20.0..40.0).contains(&x) != (20.0..40.0).contains(&y) || (x - 30.0).abs().max((y - 30.0).abs()) < 10.5);
+        let cross = region(60, 60, |x, y| {
+            (20.0..40.0).contains(&x) != (20.0..40.0).contains(&y) || (x - 30.0).abs().max((y - 30.0).abs()) < 10.5
+        });
         let area = cross.shape().area;
         assert!((cross.shape().solidity - area / (3600.0 - 4.0 * 200.0)).abs() < 0.02, "{:?}", cross.shape());
     }
@@ -361,7 +379,8 @@ mod tests {
         let distances = distance_inside(&inside, width);
         for (i, d) in distances.iter().enumerate() {
             let at = |i: usize| [(i % width) as f64, (i / width) as f64];
-            let slow = (0..inside.len()).filter(|j| !inside[*j]).map(|j| distance(at(i), at(j))).fold(f64::INFINITY, f64::min);
+            let slow =
+                (0..inside.len()).filter(|j| !inside[*j]).map(|j| distance(at(i), at(j))).fold(f64::INFINITY, f64::min);
             assert!((f64::from(*d) - slow).abs() < 1e-5, "{i}: {d}, not {slow}");
         }
     }

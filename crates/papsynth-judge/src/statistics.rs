@@ -102,9 +102,11 @@ mod tests {
     #[test]
     fn weights_stand_for_copies() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-        let scores: Vec<(f64, bool, usize)> = (0..40).map(|i| (below(12, &mut rng) as f64, i % 3 == 0, below(4, &mut rng))).collect();
+        let scores: Vec<(f64, bool, usize)> =
+            (0..40).map(|i| (below(12, &mut rng) as f64, i % 3 == 0, below(4, &mut rng))).collect();
         let mut weighted: Vec<(f64, bool, f64)> = scores.iter().map(|(s, side, w)| (*s, *side, *w as f64)).collect();
-        let copies = |side: bool| -> Vec<f64> { scores.iter().filter(|s| s.1 == side).flat_map(|s| vec![s.0; s.2]).collect() };
+        let copies =
+            |side: bool| -> Vec<f64> { scores.iter().filter(|s| s.1 == side).flat_map(|s| vec![s.0; s.2]).collect() };
         assert!((weighted_auc(&mut weighted) - auc(&copies(false), &copies(true))).abs() < 1e-12);
     }
 

@@ -106,10 +106,19 @@ pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f6
             let p = pixel as usize;
             let (x, y) = (p % width, p / width);
             let mut own = NONE;
-            let around = [(x > 0).then(|| p - 1), (x + 1 < width).then(|| p + 1), p.checked_sub(width), Some(p + width).filter(|q| *q < absorbance.len())];
+            let around = [
+                (x > 0).then(|| p - 1),
+                (x + 1 < width).then(|| p + 1),
+                p.checked_sub(width),
+                Some(p + width).filter(|q| *q < absorbance.len()),
+            ];
             for q in around.into_iter().flatten().filter(|q| slot[*q] != NONE) {
                 let root = find(&mut parents, slot[q]);
-                own = if own == NONE || own == root { root } else { join(&mut parents, &mut roots, &mut next, own, root) };
+                own = if own == NONE || own == root {
+                    root
+                } else {
+                    join(&mut parents, &mut roots, &mut next, own, root)
+                };
             }
             if own == NONE {
                 own = id(roots.len());
@@ -119,7 +128,15 @@ pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f6
             slot[p] = own;
             let (fx, fy) = (x as f64, y as f64);
             let root = &mut roots[own as usize];
-            root.sums.add(Sums { n: 1.0, x: fx, y: fy, xx: fx * fx, xy: fx * fy, yy: fy * fy, a: f64::from(absorbance[p]) });
+            root.sums.add(Sums {
+                n: 1.0,
+                x: fx,
+                y: fy,
+                xx: fx * fx,
+                xy: fx * fy,
+                yy: fy * fy,
+                a: f64::from(absorbance[p]),
+            });
             if root.touched != level {
                 root.touched = level;
                 touched.push(own);
@@ -234,13 +251,16 @@ mod tests {
     fn every_blob_is_what_is_connected_at_its_threshold() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
         let width = 31;
-        let noise: Vec<f32> = (0..width * 24).map(|_| f32::from(u8::try_from(rng.next_u64() >> 56).unwrap()) / 255.0).collect();
+        let noise: Vec<f32> =
+            (0..width * 24).map(|_| f32::from(u8::try_from(rng.next_u64() >> 56).unwrap()) / 255.0).collect();
         let image = crate::filter::blur(&noise, width, 1.2);
         let blobs = blobs(&image, width, 0.3, 200.0);
         assert!(blobs.len() > 100);
         for blob in &blobs {
             let mut seen = vec![false; image.len()];
-            let region = flood(blob.pixel as usize, width, image.len(), &mut seen, |p| super::level(image[p], 250) >= blob.level);
+            let region = flood(blob.pixel as usize, width, image.len(), &mut seen, |p| {
+                super::level(image[p], 250) >= blob.level
+            });
             let shape = region.shape();
             assert_eq!(shape.area, blob.area);
             assert!((shape.centre[0] - blob.centre[0]).abs() + (shape.centre[1] - blob.centre[1]).abs() < 1e-9);
@@ -249,7 +269,9 @@ mod tests {
             if let Some(parent) = blob.parent.map(|p| &blobs[p as usize]) {
                 assert!(parent.level < blob.level && parent.area > blob.area);
                 let mut seen = vec![false; image.len()];
-                let around = flood(parent.pixel as usize, width, image.len(), &mut seen, |p| super::level(image[p], 250) >= parent.level);
+                let around = flood(parent.pixel as usize, width, image.len(), &mut seen, |p| {
+                    super::level(image[p], 250) >= parent.level
+                });
                 assert!(around.pixels.contains(&blob.pixel));
             }
         }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::forest::{Forest, Rows};
 use crate::number::single;
-use crate::statistics::{auc, below, mean, of_sorted, median, shuffle, weighted_auc};
+use crate::statistics::{auc, below, mean, median, of_sorted, shuffle, weighted_auc};
 use crate::table::{Family, Feature, Table};
 
 /// How the classifier is tried.
@@ -129,7 +129,8 @@ impl Sample {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut folds = vec![0; self.sides.len()];
         for side in [false, true] {
-            let mut fields: Vec<usize> = (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).collect();
+            let mut fields: Vec<usize> =
+                (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).collect();
             shuffle(&mut fields, &mut rng);
             for (i, field) in fields.into_iter().enumerate() {
                 folds[field] = i % count;
@@ -140,7 +141,8 @@ impl Sample {
 
     /// Fields with rows, of either side.
     fn counts(&self) -> [usize; 2] {
-        [false, true].map(|side| (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).count())
+        [false, true]
+            .map(|side| (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).count())
     }
 }
 
@@ -186,20 +188,26 @@ fn round(sample: &Sample, folds: usize, trees: usize, seed: u64) -> Option<Round
 }
 
 fn area(sample: &Sample, scores: &[f64]) -> f64 {
-    let of = |side: bool| -> Vec<f64> { scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect() };
+    let of = |side: bool| -> Vec<f64> {
+        scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     auc(&of(false), &of(true))
 }
 
 /// Tries to tell two sets of fields apart by their tables; none if a side has fewer than two fields with rows.
 pub fn two_sample(real: &[Table], synthetic: &[Table], params: &TwoSampleParams, seed: u64) -> Option<TwoSample> {
-    let tables: Vec<(&Table, bool)> = real.iter().map(|t| (t, false)).chain(synthetic.iter().map(|t| (t, true))).collect();
+    let tables: Vec<(&Table, bool)> =
+        real.iter().map(|t| (t, false)).chain(synthetic.iter().map(|t| (t, true))).collect();
     let sample = Sample::new(&tables)?;
     let round = round(&sample, params.folds, params.trees, seed)?;
-    let halves: Vec<Option<(f64, usize)>> = (0..params.halvings as u64).into_par_iter().map(|i| halving(real, params, seed.wrapping_add(i + 1))).collect();
+    let halves: Vec<Option<(f64, usize)>> =
+        (0..params.halvings as u64).into_par_iter().map(|i| halving(real, params, seed.wrapping_add(i + 1))).collect();
     let halves: Vec<(f64, usize)> = halves.into_iter().flatten().collect();
     let mut null_rows: Vec<f64> = halves.iter().map(|h| h.1 as f64).collect();
     let count = |side: bool| sample.rows.synthetic.iter().filter(|s| **s == side).count();
-    let of = |side: bool| round.scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect();
+    let of = |side: bool| {
+        round.scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     Some(TwoSample {
         rows: [count(false), count(true)],
         fields: sample.counts(),
@@ -227,8 +235,11 @@ fn halving(real: &[Table], params: &TwoSampleParams, seed: u64) -> Option<(f64, 
 /// The 95 % interval of the AUC, by drawing fields of each side with replacement.
 fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2] {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x_b007);
-    let sides = [false, true].map(|side| (0..sample.sides.len()).filter(|f| sample.sides[*f] == side && sample.fields.contains(f)).collect::<Vec<_>>());
-    let mut all: Vec<(f64, bool, usize)> = scores.iter().zip(&sample.rows.synthetic).zip(&sample.fields).map(|((s, side), f)| (*s, *side, *f)).collect();
+    let sides = [false, true].map(|side| {
+        (0..sample.sides.len()).filter(|f| sample.sides[*f] == side && sample.fields.contains(f)).collect::<Vec<_>>()
+    });
+    let mut all: Vec<(f64, bool, usize)> =
+        scores.iter().zip(&sample.rows.synthetic).zip(&sample.fields).map(|((s, side), f)| (*s, *side, *f)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut areas: Vec<f64> = (0..draws)
         .map(|_| {
@@ -238,7 +249,8 @@ fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2
                     weights[fields[below(fields.len(), &mut rng)]] += 1.0;
                 }
             }
-            let mut weighted: Vec<(f64, bool, f64)> = all.iter().map(|(s, side, f)| (*s, *side, weights[*f])).filter(|s| s.2 > 0.0).collect();
+            let mut weighted: Vec<(f64, bool, f64)> =
+                all.iter().map(|(s, side, f)| (*s, *side, weights[*f])).filter(|s| s.2 > 0.0).collect();
             weighted_auc(&mut weighted)
         })
         .collect();
@@ -247,28 +259,43 @@ fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2
 }
 
 /// The test with the features of each family alone.
-fn families<'a>(sample: &Sample, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<FamilyAlone> {
+fn families<'a>(
+    sample: &Sample,
+    mut tables: impl Iterator<Item = &'a Table>,
+    params: &TwoSampleParams,
+    seed: u64,
+) -> Vec<FamilyAlone> {
     let Some(features) = tables.find(|t| !t.is_empty()).map(|t| &t.features) else { return Vec::new() };
     let names: BTreeSet<Family> = features.iter().map(|f| f.family).collect();
     let names: Vec<Family> = names.into_iter().collect();
     let alone = |family: Family| {
-        let columns = sample.rows.columns.iter().zip(features).filter(|(_, f)| f.family == family).map(|(c, _)| c.clone());
+        let columns =
+            sample.rows.columns.iter().zip(features).filter(|(_, f)| f.family == family).map(|(c, _)| c.clone());
         let rows = Rows { columns: columns.collect(), synthetic: sample.rows.synthetic.clone() };
         let part = Sample { rows, fields: sample.fields.clone(), sides: sample.sides.clone() };
         round(&part, params.folds, params.trees, seed).map(|r| FamilyAlone { family, auc: area(&part, &r.scores) })
     };
-    let mut areas: Vec<FamilyAlone> = names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
+    let mut areas: Vec<FamilyAlone> =
+        names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
     areas.sort_by(|a, b| b.auc.total_cmp(&a.auc));
     areas
 }
 
 /// How far the sides' mean scores lie apart.
 fn separation(synthetic: &[bool], scores: &[f64]) -> f64 {
-    let of = |side: bool| -> Vec<f64> { scores.iter().zip(synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect() };
+    let of = |side: bool| -> Vec<f64> {
+        scores.iter().zip(synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     mean(&of(true)) - mean(&of(false))
 }
 
-fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<Giveaway> {
+fn giveaways<'a>(
+    sample: &Sample,
+    round: &Round,
+    mut tables: impl Iterator<Item = &'a Table>,
+    params: &TwoSampleParams,
+    seed: u64,
+) -> Vec<Giveaway> {
     let Some(features) = tables.find(|t| !t.is_empty()).map(|t| &t.features) else { return Vec::new() };
     let rows = &sample.rows;
     let mut order: Vec<usize> = (0..features.len()).collect();
@@ -286,9 +313,15 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
         }
         1.0 - separation(&rows.synthetic, &scores) / whole
     };
-    let importances: Vec<f64> = order.par_iter().enumerate().map(|(i, c)| if i < params.shuffled { shuffled(*c) } else { 0.0 }).collect();
+    let importances: Vec<f64> =
+        order.par_iter().enumerate().map(|(i, c)| if i < params.shuffled { shuffled(*c) } else { 0.0 }).collect();
     let spread = |column: usize, side: bool| {
-        let mut values: Vec<f64> = rows.columns[column].iter().zip(&rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| f64::from(*v)).collect();
+        let mut values: Vec<f64> = rows.columns[column]
+            .iter()
+            .zip(&rows.synthetic)
+            .filter(|(_, s)| **s == side)
+            .map(|(v, _)| f64::from(*v))
+            .collect();
         values.sort_unstable_by(f64::total_cmp);
         ([0.1, 0.5, 0.9].map(|q| of_sorted(&values, q)), values)
     };
@@ -302,7 +335,9 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
             Giveaway { feature: name.clone(), family: *family, importance, alone: auc(&low, &high), real, synthetic }
         })
         .collect();
-    list.sort_by(|a, b| b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs())));
+    list.sort_by(|a, b| {
+        b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs()))
+    });
     list
 }
 

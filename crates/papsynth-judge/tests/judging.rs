@@ -1,7 +1,8 @@
 //! What the judge says of fields that are known to be alike or not.
 
 use papsynth_judge::{
-    Descriptor, Error, Family, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report, TwoSampleParams, Verdict,
+    Descriptor, Error, Family, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report,
+    TwoSampleParams, Verdict,
 };
 
 mod support;
@@ -30,7 +31,12 @@ fn test<'a>(report: &'a Report, name: &str) -> &'a papsynth_judge::Test<papsynth
 #[test]
 fn fields_of_the_same_kind_are_not_told_apart() {
     let report = judge().compare(&fields(Toy::default(), 100), &fields(Toy::default(), 200)).unwrap();
-    assert_eq!(report.verdict, Verdict::NotToldApart, "{:?}", report.two_sample.iter().map(|t| (&t.name, t.result.auc)).collect::<Vec<_>>());
+    assert_eq!(
+        report.verdict,
+        Verdict::NotToldApart,
+        "{:?}",
+        report.two_sample.iter().map(|t| (&t.name, t.result.auc)).collect::<Vec<_>>()
+    );
     assert!(report.moments.iter().flat_map(|t| &t.result.descriptors).all(Descriptor::is_within));
 }
 
@@ -48,7 +54,11 @@ fn what_differs_is_told_and_named() {
         let found = test(&report, name);
         assert_eq!((report.verdict, found.verdict), (Verdict::ToldApart, Verdict::ToldApart), "{toy:?}");
         let [low, high] = found.result.interval;
-        assert!(found.result.auc > 0.8 && low <= found.result.auc && found.result.auc <= high, "{toy:?} {}", found.result.auc);
+        assert!(
+            found.result.auc > 0.8 && low <= found.result.auc && found.result.auc <= high,
+            "{toy:?} {}",
+            found.result.auc
+        );
         assert!(families.contains(&found.result.giveaways[0].family), "{toy:?} {:?}", found.result.giveaways[0]);
     }
 }
@@ -71,7 +81,8 @@ fn uniform_noise_and_a_blurred_copy_are_told_apart() {
     // Noise has no nuclei: nothing is said of them, and that is said.
     assert!(report.notes.iter().any(|n| n.starts_with("nuclei: fewer than two fields")), "{:?}", report.notes);
 
-    let blurred: Vec<Picture> = pictures.iter().map(|p| Picture { grey: blur(&p.grey, p.width), ..p.clone() }).collect();
+    let blurred: Vec<Picture> =
+        pictures.iter().map(|p| Picture { grey: blur(&p.grey, p.width), ..p.clone() }).collect();
     let report = judge().compare(&real, &measured(&blurred)).unwrap();
     assert_eq!(report.verdict, Verdict::ToldApart);
     assert!(test(&report, "patches").result.auc > 0.99);
@@ -83,7 +94,9 @@ fn blur(grey: &[f32], width: usize) -> Vec<f32> {
         let height = grey.len() / width;
         let at = |x: usize, y: usize| {
             let rows = y.saturating_sub(1)..(y + 2).min(height);
-            let cells: Vec<f32> = rows.flat_map(|v| (x.saturating_sub(1)..(x + 2).min(width)).map(move |u| grey[v * width + u])).collect();
+            let cells: Vec<f32> = rows
+                .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(width)).map(move |u| grey[v * width + u]))
+                .collect();
             cells.iter().sum::<f32>() / cells.len() as f32
         };
         (0..grey.len()).map(|i| at(i % width, i / width)).collect()
@@ -108,7 +121,10 @@ fn nuclei_of_another_grade_in_the_same_fields_are_told_apart() {
 fn groups_that_both_sides_have_are_looked_at_apart() {
     let grouped = |seed: u64| {
         let pictures = Toy::default().pictures(FIELDS, seed);
-        let named = pictures.into_iter().enumerate().map(|(i, p)| Picture { group: if i < 4 { "N" } else { "H" }.to_owned(), ..p });
+        let named = pictures
+            .into_iter()
+            .enumerate()
+            .map(|(i, p)| Picture { group: if i < 4 { "N" } else { "H" }.to_owned(), ..p });
         measured(&named.collect::<Vec<_>>())
     };
     let (real, mut synthetic) = (grouped(100), grouped(200));
@@ -155,11 +171,18 @@ fn too_few_fields_and_other_gauges_are_refused() {
     assert_eq!(judge().compare(&real[..1], &real).unwrap_err(), Error::Fields { side: "real", count: 1, least: 2 });
     assert_eq!(judge().compare(&real, &[]).unwrap_err(), Error::Fields { side: "synthetic", count: 0, least: 2 });
     let gauge = Gauge::new(&GaugeParams { pixel_um: 0.25, ..GaugeParams::default() }).unwrap();
-    let other = [gauge.measure(&Toy::default().picture(1)).unwrap(), gauge.measure(&Toy::default().picture(2)).unwrap()];
+    let other =
+        [gauge.measure(&Toy::default().picture(1)).unwrap(), gauge.measure(&Toy::default().picture(2)).unwrap()];
     assert!(matches!(judge().compare(&real, &other), Err(Error::Gauge { .. })));
     for (params, field) in [
         (JudgeParams { paper_nuclei: 7, ..JudgeParams::default() }, "paper_nuclei"),
-        (JudgeParams { two_sample: TwoSampleParams { folds: 1, ..TwoSampleParams::default() }, ..JudgeParams::default() }, "two_sample.folds"),
+        (
+            JudgeParams {
+                two_sample: TwoSampleParams { folds: 1, ..TwoSampleParams::default() },
+                ..JudgeParams::default()
+            },
+            "two_sample.folds",
+        ),
     ] {
         assert!(matches!(Judge::new(&params), Err(Error::Parameter { field: found, .. }) if found == field));
     }

@@ -40,7 +40,9 @@ fn toy_fields_are_measured_as_they_were_made() {
     assert!(of(&|s| s.corners) == 0.0);
     let nuclei: usize = fields.iter().map(|f| f.nuclei.len()).sum();
     assert!(nuclei >= 38, "{nuclei} of 42 nuclei");
-    for (name, wanted, within) in [("core above surroundings", 0.35, 0.06), ("rim sigma, px", 1.2, 0.45), ("nucleus solidity", 0.97, 0.03)] {
+    for (name, wanted, within) in
+        [("core above surroundings", 0.35, 0.06), ("rim sigma, px", 1.2, 0.45), ("nucleus solidity", 0.97, 0.03)]
+    {
         close(middle(fields.iter().flat_map(|f| f.nuclei.column(name)).collect()), wanted, within);
     }
 }
@@ -82,7 +84,8 @@ fn statistics_are_the_same_at_either_detail() {
 fn scale_of_grey_levels_and_dead_borders_do_not_matter() {
     let picture = Toy::default().picture(5);
     let plain = gauge(NucleiFrom::Points).measure(&picture).unwrap();
-    let deep = Picture { grey: picture.grey.iter().map(|g| g * 257.0).collect(), full_scale: 65_535.0, ..picture.clone() };
+    let deep =
+        Picture { grey: picture.grey.iter().map(|g| g * 257.0).collect(), full_scale: 65_535.0, ..picture.clone() };
     let deep = gauge(NucleiFrom::Points).measure(&deep).unwrap();
     close(deep.statistics.background_dn, plain.statistics.background_dn, 1e-3);
     assert_eq!(deep.nuclei.places, plain.nuclei.places);
@@ -155,7 +158,11 @@ fn coarser_pixels_keep_the_light_and_move_with_their_nuclei() {
 
 #[test]
 fn what_a_picture_allows_is_known() {
-    for (known, from) in [(Known::Nothing, NucleiFrom::Search), (Known::Points(vec![]), NucleiFrom::Points), (Known::Masks(vec![]), NucleiFrom::Masks)] {
+    for (known, from) in [
+        (Known::Nothing, NucleiFrom::Search),
+        (Known::Points(vec![]), NucleiFrom::Points),
+        (Known::Masks(vec![]), NucleiFrom::Masks),
+    ] {
         assert_eq!(NucleiFrom::of(&known), from);
         assert!(NucleiFrom::ALL.contains(&from));
     }

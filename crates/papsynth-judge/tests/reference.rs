@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report, TwoSampleParams, Verdict};
+use papsynth_judge::{
+    Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report, TwoSampleParams, Verdict,
+};
 use rayon::prelude::*;
 
 fn reference() -> Option<PathBuf> {
@@ -82,7 +84,9 @@ fn halves_of_the_real_fields_are_not_told_apart_and_grades_are() {
     let Some(folder) = reference() else { return };
     let fields = measured(&pictures(&folder), NucleiFrom::Points);
     // Every other field of each grade.
-    let half = |odd: usize| fields.iter().enumerate().filter(|(i, _)| i % 2 == odd).map(|(_, f)| f.clone()).collect::<Vec<Field>>();
+    let half = |odd: usize| {
+        fields.iter().enumerate().filter(|(i, _)| i % 2 == odd).map(|(_, f)| f.clone()).collect::<Vec<Field>>()
+    };
     let report = judged(&half(0), &half(1));
     eprintln!("halves: {:?}", verdicts(&report));
     assert_eq!(report.verdict, Verdict::NotToldApart, "{:?}", verdicts(&report));

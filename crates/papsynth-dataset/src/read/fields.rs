@@ -56,6 +56,8 @@ pub struct FieldFile {
     pub group: String,
     /// Size of a pixel, µm, where the files say it.
     pub pixel_um: Option<f64>,
+    /// Which slide it is of, where the files say it: fields of one slide are stained alike.
+    pub slide: Option<u64>,
     image: PathBuf,
     nuclei: NucleiFile,
     /// The largest grey level, where the files say it.
@@ -107,7 +109,9 @@ impl FieldFile {
         let full = self.white.unwrap_or_else(|| if image.white == u16::MAX { deep() } else { image.white });
         let nuclei = match &self.nuclei {
             NucleiFile::Unknown => FieldNuclei::Unknown,
-            NucleiFile::Points(path) => FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?),
+            NucleiFile::Points(path) => {
+                FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?)
+            }
             NucleiFile::Labels(path) => {
                 let labels = read_label_map(path, limits)?;
                 let size = |width: usize, len: usize| [width, len / width.max(1)];
@@ -133,7 +137,9 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
         return of_dataset(folder);
     }
     let images = match image_files(folder) {
-        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => image_files(&folder.join("images"))?,
+        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => {
+            image_files(&folder.join("images"))?
+        }
         other => other?,
     };
     let masks = if folder.join("masks").is_dir() { image_files(&folder.join("masks"))? } else { BTreeMap::new() };
@@ -150,7 +156,15 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
             None if points.exists() => NucleiFile::Points(points),
             None => NucleiFile::Unknown,
         };
-        FieldFile { group: groups.remove(&name).unwrap_or_default(), name, pixel_um: None, image, nuclei, white: None }
+        FieldFile {
+            group: groups.remove(&name).unwrap_or_default(),
+            name,
+            pixel_um: None,
+            slide: None,
+            image,
+            nuclei,
+            white: None,
+        }
     };
     Ok(images.into_iter().map(field).collect())
 }
@@ -171,6 +185,7 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
             name: layout::frame_name(index),
             group: String::new(),
             pixel_um: Some(frame.pixel_um),
+            slide: Some(frame.slide),
             image: folder.path(&image),
             nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
             white: Some(white(frame.bits)),
@@ -206,7 +221,9 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
         match (number(&y), number(&x)) {
             (Some(y), Some(x)) => points.push([x, y]),
             _ if line == 1 && y == "y" && x == "x" => {}
-            _ => return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") }),
+            _ => {
+                return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") });
+            }
         }
     }
     Ok(points)
@@ -223,7 +240,8 @@ fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
 
 /// Lines of two values.
 fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| Problem::Broken { format: "CSV", message: e.to_string() })?;
@@ -238,6 +256,8 @@ fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -252,7 +272,10 @@ mod tests {
 
     #[test]
     fn groups_need_their_columns() {
-        assert_eq!(groups(b"frame,grade\na,N\nb,H\n").unwrap(), BTreeMap::from([("a".into(), "N".into()), ("b".into(), "H".into())]));
+        assert_eq!(
+            groups(b"frame,grade\na,N\nb,H\n").unwrap(),
+            BTreeMap::from([("a".into(), "N".into()), ("b".into(), "H".into())])
+        );
         assert!(groups(b"a,N\n").is_err());
         assert!(groups(b"").is_err());
     }
@@ -264,5 +287,17 @@ mod tests {
         assert_eq!(separate(map(&[255, 255, 0, 255]), &limits).unwrap(), [1, 1, 0, 2]);
         assert_eq!(separate(map(&[7, 7, 0, 9]), &limits).unwrap(), [7, 7, 0, 9]);
         assert_eq!(separate(map(&[0; 4]), &limits).unwrap(), [0; 4]);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_table_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..60), text in "[-0-9.,yx\\n \"]{0,40}") {
+            for bytes in [&bytes[..], text.as_bytes()] {
+                if let Ok(points) = points(bytes) {
+                    prop_assert!(points.iter().flatten().all(|v| v.is_finite()));
+                }
+                let _ = groups(bytes);
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Free cells and their cytoplasm.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 
 use super::maps::Maps;
 use crate::number::{nearest, whole};
@@ -12,7 +13,7 @@ use crate::table::{Family, Row};
 pub(crate) const COVERED: f32 = 0.03;
 
 /// Areas of cells, µm².
-const AREAS_UM2: [f64; 2] = [150.0, 8000.0];
+const AREAS_UM2: RangeInclusive<f64> = 150.0..=8000.0;
 
 /// Less solid things are clumps.
 const SOLID: f64 = 0.75;
@@ -70,7 +71,7 @@ pub(crate) fn cells<'a>(maps: &Maps, nuclei: &'a [Region], pixel_um: f64) -> Vec
     let um2 = pixel_um * pixel_um;
     let free = |region: &Region| -> Option<usize> {
         let area = region.pixels.len() as f64 * um2;
-        if area < AREAS_UM2[0] || area > AREAS_UM2[1] || region.at_border(maps.height) {
+        if !AREAS_UM2.contains(&area) || region.at_border(maps.height) {
             return None;
         }
         let mut ids = region.pixels.iter().map(|p| of[*p as usize]).filter(|id| *id > 0);
@@ -99,7 +100,8 @@ impl<'a> Cell<'a> {
         }
         let away = distance_inside(&elsewhere, wide);
         let place = |i: usize| {
-            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            let (x, y) =
+                (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
             (inside[i] && away[i] > NUCLEUS_MARGIN).then(|| (y * maps.width + x, f64::from(depths[i] / deepest)))
         };
         let cytoplasm: Vec<(usize, f64)> = (0..inside.len()).filter_map(place).collect();
@@ -161,7 +163,11 @@ impl<'a> Cell<'a> {
 
         let pixels = || self.cytoplasm.iter().map(|c| c.0);
         for (band, name) in ["1", "2", "4", "8", "16"].into_iter().enumerate() {
-            row.put(Family::Texture, format!("cytoplasm power at {name} px over median"), maps.power(pixels(), band) / unit);
+            row.put(
+                Family::Texture,
+                format!("cytoplasm power at {name} px over median"),
+                maps.power(pixels(), band) / unit,
+            );
         }
         let inner = || self.cytoplasm.iter().filter(|c| c.1 > 0.2).map(|c| c.0);
         let slopes: Vec<f64> = inner().map(|p| f64::from(maps.slope[p])).collect();
@@ -170,7 +176,12 @@ impl<'a> Cell<'a> {
         row.put(Family::Texture, "dark spots in cytoplasm, um-2", dark / um2);
         row.put(Family::Texture, "pale spots in cytoplasm, um-2", pale / um2);
         let of_sector = |s: usize| {
-            let values: Vec<f64> = self.cytoplasm.iter().filter(|c| self.sector(c.0, maps.width) == s).map(|c| f64::from(maps.absorbance[c.0])).collect();
+            let values: Vec<f64> = self
+                .cytoplasm
+                .iter()
+                .filter(|c| self.sector(c.0, maps.width) == s)
+                .map(|c| f64::from(maps.absorbance[c.0]))
+                .collect();
             if values.is_empty() { f64::NAN } else { mean(&values) / unit }
         };
         let sectors: Vec<f64> = (0..SECTORS).map(of_sector).filter(|v| v.is_finite()).collect();
@@ -187,7 +198,11 @@ impl<'a> Cell<'a> {
         rim.sort_unstable_by(f64::total_cmp);
         let known = rim.len() >= super::edges::LEAST;
         for q in [0.25, 0.5] {
-            row.put(Family::Edges, format!("sigma of the cell's rim, px, quantile {q}"), if known { of_sorted(&rim, q) } else { f64::NAN });
+            row.put(
+                Family::Edges,
+                format!("sigma of the cell's rim, px, quantile {q}"),
+                if known { of_sorted(&rim, q) } else { f64::NAN },
+            );
         }
         row.put(Family::Edges, "steep part of the rim", rim.len() as f64 / (TAU * radius));
         row
@@ -205,8 +220,10 @@ impl<'a> Cell<'a> {
         let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
         let (inner, outer) = (distance_inside(&inside, wide), distance_inside(&outside, wide));
         let place = |i: usize| {
-            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
-            (x < self.region.width && y < height && inner[i] <= NEAR && outer[i] <= NEAR).then(|| y * self.region.width + x)
+            let (x, y) =
+                (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            (x < self.region.width && y < height && inner[i] <= NEAR && outer[i] <= NEAR)
+                .then(|| y * self.region.width + x)
         };
         (0..inside.len()).filter_map(place).collect()
     }
@@ -232,7 +249,10 @@ impl Outline {
             let is_corner = |i: &usize| {
                 let own = sign * turns[*i];
                 let others = (1..=step).flat_map(|k| [(*i + k) % n, (*i + n - k) % n]);
-                own > CORNER_DEG && others.enumerate().all(|(k, j)| if k % 2 == 0 { own >= sign * turns[j] } else { own > sign * turns[j] })
+                own > CORNER_DEG
+                    && others
+                        .enumerate()
+                        .all(|(k, j)| if k % 2 == 0 { own >= sign * turns[j] } else { own > sign * turns[j] })
             };
             (0..n).filter(is_corner).count() as f64
         };
@@ -254,7 +274,14 @@ mod tests {
         let (width, height) = (260, 220);
         let at = |i: usize| crate::number::single(240.0 * libm::pow(10.0, -a((i % width) as f64, (i / width) as f64)));
         let grey = (0..width * height).map(at).collect();
-        Maps::new(&Picture { name: String::new(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing })
+        Maps::new(&Picture {
+            name: String::new(),
+            group: String::new(),
+            grey,
+            width,
+            full_scale: 255.0,
+            nuclei: Known::Nothing,
+        })
     }
 
     fn disc(maps: &Maps, x: f64, y: f64, radius: f64) -> Region {
@@ -268,7 +295,13 @@ mod tests {
     fn a_free_cell_has_its_profile_size_and_place() {
         // Thin at the rim, and twice as dark in the middle.
         let depth = |x: f64, y: f64| 1.0 - distance([x, y], [120.0, 110.0]) / 70.0;
-        let maps = maps(|x, y| if depth(x, y) > 0.0 { 0.1 + 0.1 * depth(x, y) + if distance([x, y], [127.0, 110.0]) < 10.0 { 0.4 } else { 0.0 } } else { 0.0 });
+        let maps = maps(|x, y| {
+            if depth(x, y) > 0.0 {
+                0.1 + 0.1 * depth(x, y) + if distance([x, y], [127.0, 110.0]) < 10.0 { 0.4 } else { 0.0 }
+            } else {
+                0.0
+            }
+        });
         let nuclei = [disc(&maps, 127.0, 110.0, 10.0)];
         let cells = cells(&maps, &nuclei, PIXEL_UM);
         assert_eq!(cells.len(), 1);
@@ -290,7 +323,9 @@ mod tests {
 
     #[test]
     fn cells_with_two_nuclei_none_or_at_the_border_are_left_out() {
-        let body = |x: f64, y: f64| if distance([x, y], [120.0, 110.0]) < 60.0 || distance([x, y], [0.0, 0.0]) < 50.0 { 0.2 } else { 0.0 };
+        let body = |x: f64, y: f64| {
+            if distance([x, y], [120.0, 110.0]) < 60.0 || distance([x, y], [0.0, 0.0]) < 50.0 { 0.2 } else { 0.0 }
+        };
         let maps = maps(body);
         let count = |nuclei: &[Region]| cells(&maps, nuclei, PIXEL_UM).len();
         let own = disc(&maps, 120.0, 110.0, 9.0);
@@ -310,7 +345,9 @@ mod tests {
         let square = outline(&|x, y| within(x, 40.0, 160.0) && within(y, 40.0, 160.0));
         assert_eq!((square.corners, square.notches), (4.0, 0.0));
         assert!(square.straight > 0.6, "{square:?}");
-        let cross = outline(&|x, y| (within(x, 20.0, 180.0) && within(y, 70.0, 130.0)) || (within(y, 20.0, 180.0) && within(x, 70.0, 130.0)));
+        let cross = outline(&|x, y| {
+            (within(x, 20.0, 180.0) && within(y, 70.0, 130.0)) || (within(y, 20.0, 180.0) && within(x, 70.0, 130.0))
+        });
         assert_eq!((cross.corners, cross.notches), (8.0, 4.0));
         let disc = outline(&|x, y| distance([x, y], [100.0, 100.0]) < 40.0);
         assert_eq!((disc.corners, disc.notches), (0.0, 0.0));

@@ -74,7 +74,14 @@ mod tests {
                 crate::number::single(240.0 * libm::pow(10.0, -a))
             };
             let grey = (0..width * height).map(at).collect();
-            let picture = Picture { name: String::new(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing };
+            let picture = Picture {
+                name: String::new(),
+                group: String::new(),
+                grey,
+                width,
+                full_scale: 255.0,
+                nuclei: Known::Nothing,
+            };
             let maps = Maps::new(&picture);
             let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
             assert!(sigmas.len() > 80, "{} places", sigmas.len());

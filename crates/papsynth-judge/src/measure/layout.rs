@@ -74,7 +74,8 @@ mod tests {
 
     #[test]
     fn lattices_are_regular_and_pairs_are_clustered() {
-        let lattice: Vec<[f64; 2]> = (0..48).map(|i| [80.0 + 160.0 * f64::from(i % 8), 80.0 + 160.0 * f64::from(i / 8)]).collect();
+        let lattice: Vec<[f64; 2]> =
+            (0..48).map(|i| [80.0 + 160.0 * f64::from(i % 8), 80.0 + 160.0 * f64::from(i / 8)]).collect();
         assert!(clark_evans(&lattice, 1280.0, 960.0) > 1.8);
         assert_eq!(ripley(&lattice, 1280.0, 960.0, 100.0), 0.0);
         let pairs: Vec<[f64; 2]> = lattice.iter().flat_map(|p| [*p, [p[0] + 5.0, p[1]]]).collect();

@@ -47,7 +47,10 @@ impl Noise {
         blocks.truncate((blocks.len() * 4).div_ceil(5));
         let n = blocks.len() as f64;
         let mean = |f: &dyn Fn(&Self) -> f64| blocks.iter().map(f).sum::<f64>() / n;
-        (n > 0.0).then(|| Self { variance: mean(&|b| b.variance), products: std::array::from_fn(|i| mean(&|b| b.products[i])) })
+        (n > 0.0).then(|| Self {
+            variance: mean(&|b| b.variance),
+            products: std::array::from_fn(|i| mean(&|b| b.products[i])),
+        })
     }
 
     /// Correlation at a lag. The surface that was taken off makes it too small by up to 6/32² = 0.006.
@@ -71,7 +74,9 @@ mod tests {
         // Uniform over ±3: variance 3.
         let white: Vec<f64> = (0..width * height).map(|_| below(600_001, &mut rng) as f64 / 1e5 - 3.0).collect();
         let measured = |of: &dyn Fn(usize, usize) -> f64| {
-            let grey: Vec<f32> = (0..width * height).map(|i| crate::number::single(200.0 + 0.01 * (i % width) as f64 + of(i % width, i / width))).collect();
+            let grey: Vec<f32> = (0..width * height)
+                .map(|i| crate::number::single(200.0 + 0.01 * (i % width) as f64 + of(i % width, i / width)))
+                .collect();
             let places = (0..height).step_by(BLOCK).flat_map(|y| (0..width).step_by(BLOCK).map(move |x| (x, y)));
             let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&grey, width, x, y)).collect();
             Noise::mean(&mut blocks).unwrap()

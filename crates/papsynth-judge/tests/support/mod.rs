@@ -50,9 +50,17 @@ impl Toy {
             let room = |length: usize, u: f64| radius + 4.0 + u * (length as f64 - 2.0 * radius - 8.0);
             let centre = [room(self.width, uniform(&mut rng)), room(self.height, uniform(&mut rng))];
             let off = 0.15 * radius;
-            let nucleus = [centre[0] + off * normal(&mut rng).clamp(-2.0, 2.0), centre[1] + off * normal(&mut rng).clamp(-2.0, 2.0)];
+            let nucleus = [
+                centre[0] + off * normal(&mut rng).clamp(-2.0, 2.0),
+                centre[1] + off * normal(&mut rng).clamp(-2.0, 2.0),
+            ];
             discs.push(Disc { centre, radius, a: stain * 0.15 * (1.0 + 0.2 * normal(&mut rng)), grain: [0.1, 0.2] });
-            discs.push(Disc { centre: nucleus, radius: own, a: stain * self.nucleus_a, grain: [grain / self.nucleus_a, 0.9] });
+            discs.push(Disc {
+                centre: nucleus,
+                radius: own,
+                a: stain * self.nucleus_a,
+                grain: [grain / self.nucleus_a, 0.9],
+            });
             points.push(nucleus);
         }
         let mut grey = Vec::with_capacity(self.width * self.height);
@@ -67,7 +75,14 @@ impl Toy {
             }
         }
         let name = format!("toy {seed}");
-        Picture { name, group: String::new(), grey, width: self.width, full_scale: 255.0, nuclei: Known::Points(points) }
+        Picture {
+            name,
+            group: String::new(),
+            grey,
+            width: self.width,
+            full_scale: 255.0,
+            nuclei: Known::Points(points),
+        }
     }
 
     /// Fields of seeds that follow each other.
