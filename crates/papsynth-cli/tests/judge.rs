@@ -1,5 +1,6 @@
 //! `papsynth judge` on fields of our own.
 
+#[allow(dead_code, reason = "each test uses its part")]
 mod support;
 
 use std::fs;
@@ -52,7 +53,9 @@ fn fields_of_another_seed_pass_and_other_fields_do_not() {
     assert_eq!((report["judge_report"].as_u64(), report["verdict"].as_str()), (Some(1), Some("not-told-apart")));
     assert_eq!(report["gauge"]["nuclei_from"], "masks");
     assert_eq!(report["gauge"]["pixel_um"], 0.33);
-    assert_eq!(report["two_sample"].as_array().unwrap().len(), 3);
+    let names: Vec<&str> =
+        report["two_sample"].as_array().unwrap().iter().map(|t| t["name"].as_str().unwrap()).collect();
+    assert!(names.contains(&"nuclei") && names.contains(&"patches"), "{names:?}");
 
     // Uniform noise; the fields themselves, blurred; nuclei of another grade.
     copies(&bench, "a", "noise", |_, _, i| {
