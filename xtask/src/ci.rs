@@ -7,22 +7,22 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, deps, equations, external, publish, shell, test, wasm};
+use crate::{Chore, browser, dataset, deps, equations, external, publish, shell, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
     usage: "",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, a data set, other people's \
-              readers, wasm32, packages. All steps run even if one fails; each tells its time. Where CI is set, a step that \
-              cannot run for want of Python or of the real material (PAPSYNTH_REFERENCE) is a failure.",
+              readers, the study in a browser, wasm32, packages. All steps run even if one fails; each tells its time. Where CI \
+              is set, a step that cannot run for want of Python, Chromium or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
 /// Cheap ones first. The golden images are part of the tests.
-const STEPS: [Step; 12] = [
+const STEPS: [Step; 13] = [
     ("format", |workspace| cargo(workspace, &["fmt", "--all", "--check"])),
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
@@ -34,6 +34,7 @@ const STEPS: [Step; 12] = [
     ("tests", |workspace| chore(workspace, &test::CHORE)),
     ("data set", |workspace| chore(workspace, &dataset::CHORE)),
     ("external readers", |workspace| chore(workspace, &external::CHORE)),
+    ("browser", |workspace| chore(workspace, &browser::CHORE)),
     ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
     ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("licences", licences),

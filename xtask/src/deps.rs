@@ -11,8 +11,8 @@ pub(crate) const CHORE: Chore = Chore {
     name: "deps",
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
-    details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the program all \
-              of them, the judge nobody, the chores nobody. Dependencies of tests count too, so that every crate can be \
+    details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the study the data set, the \
+               judge nobody, the program all of them, the chores nobody. Dependencies of tests count too, so that every crate can be \
               taken, tested and published alone.",
     run,
 };
@@ -24,12 +24,13 @@ enum Role {
     Engine,
     Dataset,
     Judge,
+    Study,
     Program,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 14] = [
+const PLACES: [(&str, Role); 15] = [
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -42,6 +43,7 @@ const PLACES: [(&str, Role); 14] = [
     ("papsynth", Role::Engine),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
+    ("papsynth-study", Role::Study),
     ("papsynth-cli", Role::Program),
     ("xtask", Role::Chores),
 ];
@@ -58,8 +60,10 @@ impl Role {
             Self::Technique | Self::Judge | Self::Chores => &[],
             Self::Engine => &[Self::Technique],
             Self::Dataset => &[Self::Engine],
+            // It shows files, whoever made them.
+            Self::Study => &[Self::Dataset],
             // It measures microscopes and cameras, which are no business of the engine.
-            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge],
+            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Study],
         }
     }
 }

@@ -6,6 +6,7 @@
 
 mod arguments;
 mod bench;
+mod browser;
 mod ci;
 mod dataset;
 mod deps;
@@ -17,6 +18,7 @@ mod outcome;
 mod peers;
 mod publish;
 mod python;
+mod realism;
 mod shell;
 mod test;
 mod wasm;
@@ -48,9 +50,11 @@ const CHORES: &[Chore] = &[
     golden::CHORE,
     bench::CHORE,
     figures::CHORE,
+    realism::CHORE,
     equations::CHORE,
     deps::CHORE,
     external::CHORE,
+    browser::CHORE,
     wasm::CHORE,
     publish::CHORE,
     ci::CHORE,

@@ -16,6 +16,15 @@ pub(crate) enum Python {
 }
 
 impl Python {
+    /// The Python of this machine, for programs that need none but its own library.
+    pub(crate) fn system() -> Self {
+        let answers = |name: &&str| shell::answers(Command::new(name).arg("--version"));
+        match ["python3", "python"].into_iter().find(answers) {
+            Some(name) => Self::Ready(name.into()),
+            None => Self::Missing("there is no Python on this machine".to_owned()),
+        }
+    }
+
     /// Makes the environment `target/python/NAME`, or takes the one from the last time if it holds the same packages.
     ///
     /// `requirements` is the text of a requirements file. An environment that cannot be made is not an error: a
@@ -27,9 +36,9 @@ impl Python {
         if fs::read_to_string(&stamp).is_ok_and(|installed| installed == requirements) && python.exists() {
             return Ok(Self::Ready(python));
         }
-        let system = ["python3", "python"].into_iter().find(|name| shell::answers(Command::new(name).arg("--version")));
-        let Some(system) = system else {
-            return Ok(Self::Missing("there is no Python on this machine".to_owned()));
+        let system = match Self::system() {
+            Self::Ready(python) => python,
+            missing => return Ok(missing),
         };
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
         if let Err(error) = shell::run(Command::new(system).args(["-m", "venv", "--clear"]).arg(&folder)) {

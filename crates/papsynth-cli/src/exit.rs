@@ -138,6 +138,10 @@ impl Failure {
         Self { exit: Exit::Input, complaint: Box::new(complaint) }
     }
 
+    pub(crate) fn io(complaint: Complaint) -> Self {
+        Self { exit: Exit::Io, complaint: Box::new(complaint) }
+    }
+
     pub(crate) fn interrupted(complaint: Complaint) -> Self {
         Self { exit: Exit::Interrupted, complaint: Box::new(complaint) }
     }

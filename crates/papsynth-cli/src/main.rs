@@ -16,6 +16,7 @@ mod recipe_file;
 mod report;
 mod schema;
 mod setup;
+mod study;
 mod text_file;
 
 use std::process::ExitCode;
@@ -60,6 +61,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Judge(args) => judge::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
+        Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))

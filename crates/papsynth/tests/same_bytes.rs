@@ -77,7 +77,8 @@ fn another_speckle_moves_no_nucleus() {
             .objects
             .iter()
             .filter(|o| o.kind != Kind::Speckle)
-            .map(|o| (o.id, o.part, o.amodal.clone()))
+            // Ids follow the kinds; all else stays.
+            .map(|o| (o.kind, o.part, o.amodal.clone()))
             .collect::<Vec<_>>()
     };
     assert_eq!(others(&few), others(&more));

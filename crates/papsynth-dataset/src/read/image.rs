@@ -65,30 +65,44 @@ impl GreyImage {
 
 /// An image in grey levels or in colour.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct LevelImage {
-    pub(crate) width: usize,
+pub struct LevelImage {
+    /// Columns.
+    pub width: usize,
     /// 1, or 3 for red, green and blue.
-    pub(crate) channels: usize,
+    pub channels: usize,
     /// Levels `0..=white`, row by row, the channels of a pixel side by side.
-    pub(crate) levels: Vec<u16>,
-    pub(crate) white: u16,
+    pub levels: Vec<u16>,
+    /// The largest level that the file could hold: 255 or 65535.
+    pub white: u16,
 }
 
 impl LevelImage {
-    pub(crate) fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
-        parse(path, limits, |bytes| {
-            let raster = decode(bytes, limits, Meaning::Brightness)?;
-            if raster.channels != Channels::Rgb {
-                let GreyImage { width, grey: levels, white } = GreyImage::of(raster)?;
-                return Ok(Self { width, channels: 1, levels, white });
-            }
-            let width = raster.width;
-            let (levels, white) = levels(raster.samples)?;
-            Ok(Self { width, channels: 3, levels, white })
-        })
+    /// Decodes a PNG or TIFF file.
+    ///
+    /// # Errors
+    /// If the bytes are not a whole image of opaque pixels within the limits.
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
+        let raster = decode(bytes, limits, Meaning::Brightness)?;
+        if raster.channels != Channels::Rgb {
+            let GreyImage { width, grey: levels, white } = GreyImage::of(raster)?;
+            return Ok(Self { width, channels: 1, levels, white });
+        }
+        let width = raster.width;
+        let (levels, white) = levels(raster.samples)?;
+        Ok(Self { width, channels: 3, levels, white })
     }
 
-    pub(crate) fn height(&self) -> usize {
+    /// Reads a PNG or TIFF file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is not a whole image of opaque pixels within the limits.
+    pub fn read(path: &Path, limits: &Limits) -> Result<Self, Error> {
+        parse(path, limits, |bytes| Self::decode(bytes, limits))
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
         self.levels.len() / (self.width * self.channels).max(1)
     }
 

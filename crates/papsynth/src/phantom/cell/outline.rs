@@ -168,4 +168,3 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
         })
         .collect()
 }
-

@@ -1,0 +1,258 @@
+//! Which fields there are in a folder: a papsynth data set, a folder of data sets, or a folder of pictures.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use papsynth_dataset::read::{Limits, image_files, natural_order};
+use papsynth_dataset::{FrameRecord, FrameSummary, Problem};
+
+use crate::error::Error;
+
+/// What says that a folder is a data set.
+const MANIFEST: &str = "manifest.json";
+
+/// Largest record, recipe or table that is read, bytes.
+const LARGEST_TEXT: u64 = 1 << 26;
+
+/// A field that may be shown.
+#[derive(Debug, Clone)]
+pub(crate) struct Field {
+    /// Its path below the folder that was given, with `/` between folders.
+    pub(crate) name: String,
+    /// Where it lies; in that folder, whatever links lead there.
+    pub(crate) path: PathBuf,
+    /// What is known of it if it is a frame of a papsynth data set.
+    pub(crate) frame: Option<Frame>,
+}
+
+/// A frame of a data set.
+#[derive(Debug, Clone)]
+pub(crate) struct Frame {
+    /// The folder of the data set.
+    pub(crate) root: PathBuf,
+    /// The frame in a few numbers.
+    pub(crate) summary: FrameSummary,
+    /// The recipe of the data set, a line a field.
+    pub(crate) recipe: Arc<BTreeMap<String, toml::Value>>,
+}
+
+/// A folder that nothing outside is read through.
+pub(crate) struct Root {
+    /// As it was given, for messages.
+    given: PathBuf,
+    /// Without links.
+    real: PathBuf,
+}
+
+impl Root {
+    pub(crate) fn new(folder: &Path) -> Result<Self, Error> {
+        let real = fs::canonicalize(folder).map_err(Error::io("read", folder))?;
+        if !real.is_dir() {
+            return Err(Error::folder(folder, "is a file; a folder of pictures, or a papsynth data set, is expected"));
+        }
+        Ok(Self { given: folder.to_owned(), real })
+    }
+
+    /// The folder, as it was given.
+    pub(crate) fn path(&self) -> &Path {
+        &self.given
+    }
+
+    /// A path in the folder without links, if it stays there.
+    pub(crate) fn inside(&self, path: &Path) -> Result<PathBuf, Error> {
+        let real = fs::canonicalize(path).map_err(Error::io("read", path))?;
+        match real.starts_with(&self.real) {
+            true => Ok(real),
+            false => Err(Error::Outside { path: path.to_owned(), folder: self.given.clone() }),
+        }
+    }
+
+    /// All fields in the folder, in the natural order of their names.
+    pub(crate) fn fields(&self) -> Result<Vec<Field>, Error> {
+        let mut fields = Vec::new();
+        if self.real.join(MANIFEST).exists() {
+            self.add_frames(&self.real, "", &mut fields)?;
+        } else {
+            let mut sets = Vec::new();
+            for entry in fs::read_dir(&self.real).map_err(Error::io("read", &self.given))? {
+                let path = entry.map_err(Error::io("read", &self.given))?.path();
+                if path.join(MANIFEST).exists() {
+                    sets.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), path));
+                }
+            }
+            sets.sort_by(|(a, _), (b, _)| natural_order(a, b));
+            for (name, path) in &sets {
+                self.add_frames(&self.inside(path)?, &format!("{name}/"), &mut fields)?;
+            }
+            if sets.is_empty() {
+                self.add_pictures(&mut fields)?;
+            }
+        }
+        match fields.is_empty() {
+            true => Err(Error::folder(&self.given, "the data set has no whole frame; at least 1 is expected")),
+            false => Ok(fields),
+        }
+    }
+
+    fn add_pictures(&self, fields: &mut Vec<Field>) -> Result<(), Error> {
+        let files = image_files(&self.real)?;
+        let mut names: Vec<_> = files.into_iter().collect();
+        names.sort_by(|(a, _), (b, _)| natural_order(a, b));
+        for (_, path) in names {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            fields.push(Field { name, path: self.inside(&path)?, frame: None });
+        }
+        Ok(())
+    }
+
+    /// The whole frames of one data set.
+    fn add_frames(&self, root: &Path, prefix: &str, fields: &mut Vec<Field>) -> Result<(), Error> {
+        let folder = root.join("frames");
+        let mut records = Vec::new();
+        for entry in fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
+            let path = entry.map_err(Error::io("read", &folder))?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let index = name.strip_suffix(".json").filter(|stem| stem.bytes().all(|b| b.is_ascii_digit()));
+            if index.is_some() {
+                records.push((name, path));
+            }
+        }
+        records.sort_by(|(a, _), (b, _)| natural_order(a, b));
+        let recipe = Arc::new(recipe(&self.text(&root.join("recipe.toml"))?));
+        for (_, path) in records {
+            let record = FrameRecord::from_json(self.text(&path)?.as_bytes())
+                .map_err(|problem| papsynth_dataset::Error::Input { path: path.clone(), problem })?;
+            // The record has looked that its paths stay below the data set; links are looked at here.
+            let Some(image) = record.files.iter().find(|file| file.path.starts_with("images/")) else {
+                return Err(Error::folder(&path, "names no image"));
+            };
+            fields.push(Field {
+                name: format!("{prefix}{}", image.path),
+                path: self.inside(&root.join(&image.path))?,
+                frame: Some(Frame { root: root.to_owned(), summary: record.summary, recipe: Arc::clone(&recipe) }),
+            });
+        }
+        Ok(())
+    }
+
+    /// A text in the folder.
+    pub(crate) fn text(&self, path: &Path) -> Result<String, Error> {
+        let bytes = bytes(&self.inside(path)?, LARGEST_TEXT)?;
+        String::from_utf8(bytes).map_err(|_| Error::folder(path, "is no text; UTF-8 is expected"))
+    }
+}
+
+/// The bytes of a file of at most `limit` bytes.
+pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
+    let failed = Error::io("read", path);
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| match file.metadata()?.is_file() {
+        // A pipe may never end.
+        false => Err(io::Error::other("it is no file")),
+        true => file.take(limit.saturating_add(1)).read_to_end(&mut bytes),
+    });
+    let read = read.map_err(failed)? as u64;
+    if read > limit {
+        let problem = Problem::FileSize { bytes: read, limit };
+        return Err(papsynth_dataset::Error::Input { path: path.to_owned(), problem }.into());
+    }
+    Ok(bytes)
+}
+
+/// What is accepted as an image.
+pub(crate) fn limits() -> Limits {
+    Limits::default()
+}
+
+/// A recipe as one value a line, such as `layout.count.uniform = [5.0, 11.0]`. One that cannot be read has none: it is only
+/// looked at to sort answers by.
+fn recipe(text: &str) -> BTreeMap<String, toml::Value> {
+    fn add(prefix: &str, value: toml::Value, lines: &mut BTreeMap<String, toml::Value>) {
+        match value {
+            toml::Value::Table(table) => {
+                for (key, value) in table {
+                    let name = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
+                    add(&name, value, lines);
+                }
+            }
+            value => {
+                lines.insert(prefix.to_owned(), value);
+            }
+        }
+    }
+    let mut lines = BTreeMap::new();
+    if let Ok(table) = toml::from_str::<toml::Table>(text) {
+        add("", toml::Value::Table(table), &mut lines);
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::{Scratch, picture};
+
+    #[test]
+    fn pictures_are_listed_in_their_natural_order() {
+        let scratch = Scratch::new("fields");
+        for name in ["f10.png", "f9.png", "f1.png", ".hidden.png"] {
+            fs::write(scratch.join(name), picture(1, 64, 64)).unwrap();
+        }
+        fs::write(scratch.join("notes.txt"), "no picture").unwrap();
+        let fields = Root::new(scratch.path()).unwrap().fields().unwrap();
+        assert_eq!(fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>(), ["f1.png", "f9.png", "f10.png"]);
+        assert!(fields.iter().all(|f| f.frame.is_none()));
+    }
+
+    #[test]
+    fn folders_that_are_none_are_refused() {
+        let scratch = Scratch::new("no-fields");
+        let error = |path: &Path| Root::new(path).and_then(|root| root.fields()).unwrap_err();
+        assert!(error(&scratch.join("missing")).to_string().contains("missing"));
+        assert!(!error(&scratch.join("missing")).is_io());
+        error(scratch.path());
+        fs::write(scratch.join("file"), "").unwrap();
+        assert!(error(&scratch.join("file")).to_string().contains("a folder of pictures"));
+        fs::create_dir_all(scratch.join("set/frames")).unwrap();
+        fs::write(scratch.join("set/manifest.json"), "{}").unwrap();
+        fs::write(scratch.join("set/recipe.toml"), "").unwrap();
+        assert!(error(&scratch.join("set")).to_string().contains("no whole frame"));
+        fs::write(scratch.join("set/frames/000000.json"), "[1, 2").unwrap();
+        assert!(error(&scratch.join("set")).to_string().contains("000000.json"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_out_of_the_folder_are_refused_and_links_within_are_not() {
+        use std::os::unix::fs::symlink;
+        let scratch = Scratch::new("links");
+        let (folder, elsewhere) = (scratch.join("folder"), scratch.join("folder-elsewhere"));
+        fs::create_dir_all(&folder).unwrap();
+        fs::create_dir_all(&elsewhere).unwrap();
+        fs::write(folder.join("a.png"), picture(1, 64, 64)).unwrap();
+        fs::write(elsewhere.join("secret.png"), picture(2, 64, 64)).unwrap();
+        symlink(folder.join("a.png"), folder.join("b.png")).unwrap();
+        // The folder itself may be a link.
+        symlink(&folder, scratch.join("link")).unwrap();
+        assert_eq!(Root::new(&scratch.join("link")).unwrap().fields().unwrap().len(), 2);
+        symlink(elsewhere.join("secret.png"), folder.join("c.png")).unwrap();
+        let error = Root::new(&folder).unwrap().fields().unwrap_err();
+        assert!(matches!(&error, Error::Outside { path, .. } if path.ends_with("c.png")), "{error}");
+        fs::remove_file(folder.join("c.png")).unwrap();
+        // A whole data set elsewhere.
+        fs::write(elsewhere.join(MANIFEST), "{}").unwrap();
+        symlink(&elsewhere, folder.join("set")).unwrap();
+        assert!(matches!(Root::new(&folder).unwrap().fields().unwrap_err(), Error::Outside { .. }));
+    }
+
+    #[test]
+    fn recipes_become_lines() {
+        let lines = recipe("version = 1\n[layout.count]\nuniform = [1.0, 2.0]\n[cells.a]\nsize = 1\n");
+        let shown: Vec<_> = lines.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+        assert_eq!(shown, ["cells.a.size = 1", "layout.count.uniform = [1.0, 2.0]", "version = 1"]);
+        assert!(recipe("not [ toml").is_empty());
+    }
+}

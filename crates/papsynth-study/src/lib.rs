@@ -1,0 +1,31 @@
+#![doc = include_str!("../README.md")]
+
+mod breakdown;
+mod design;
+mod error;
+mod fields;
+mod key;
+mod normal;
+mod parameters;
+mod patch;
+mod picture;
+mod plan;
+mod results;
+mod saved;
+mod score;
+mod session;
+#[cfg(test)]
+mod support;
+mod table;
+mod web;
+
+pub use breakdown::Group;
+pub use design::{Grey, Order, RANDOM, Side, Stage, StudyParams, Task, order};
+pub use error::Error;
+pub use rand_core::Rng;
+pub use results::{Claim, Exposures, Pool, Row, Summary};
+pub use saved::{Answer, Exposure};
+pub use score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
+pub use session::{Session, State};
+pub use table::{breakdown_table, table};
+pub use web::Server;

@@ -1,0 +1,274 @@
+//! A field as grey levels, and where in it a patch may be taken.
+
+use papsynth_dataset::read::{LevelImage, Stack};
+use rand_core::Rng;
+
+use crate::error::Error;
+use crate::fields::{Field, bytes, limits};
+use crate::key::below;
+
+/// Rows and columns at the border of a field that no patch holds, on either side: where planes were combined, or an image
+/// was put straight, they may be black.
+const MARGIN_PX: usize = 8;
+
+/// Every how many-th pixel of every how many-th row is looked at to judge a patch.
+const STRIDE_PX: usize = 4;
+
+/// What counts as glass: the level that 95 % are darker than, so that specks of light do not matter.
+const GLASS_QUANTILE: f64 = 0.95;
+
+/// If a patch is covered all over, the glass is at least so bright as this part of the field's: light falls off towards the
+/// corners by less.
+const LEAST_GLASS: f32 = 0.85;
+
+/// Something lies where it is darker than this part of the glass; noise and uneven light are less.
+const SOMETHING: f32 = 0.92;
+
+/// A patch is shown if something lies on so much of it.
+const LEAST_COVER: f64 = 0.2;
+
+/// Patches of one field share at most so much of their area.
+const MOST_OVERLAP: f64 = 0.25;
+
+/// Places that are tried in a field for each patch that is looked for.
+const TRIES: usize = 60;
+
+/// Left and top of patches.
+pub(crate) type Places = Vec<[usize; 2]>;
+
+/// A field in grey levels.
+#[derive(Debug, Clone)]
+pub(crate) struct Picture {
+    pub(crate) width: usize,
+    /// Row by row.
+    pub(crate) levels: Vec<f32>,
+}
+
+/// A picture as it stands in its file.
+#[derive(Debug)]
+pub(crate) struct Raw {
+    pub(crate) picture: Picture,
+    /// The bytes it was read from.
+    pub(crate) bytes: Vec<u8>,
+    /// Whether the file holds more than 8 bits.
+    pub(crate) is_deep: bool,
+}
+
+impl Raw {
+    /// Reads a field. Of an image in colour, green: the channel that sees most of the stain, and the nearest to the 570 nm of the
+    /// paper. Of a stack, the plane in the middle.
+    pub(crate) fn read(field: &Field) -> Result<Self, Error> {
+        let limits = limits();
+        let bytes = bytes(&field.path, limits.max_file_bytes)?;
+        let refuse = |problem| papsynth_dataset::Error::Input { path: field.path.clone(), problem };
+        let is_stack = field.frame.as_ref().is_some_and(|frame| frame.summary.planes_um.len() > 1);
+        if is_stack {
+            let Stack { width, mut planes } = Stack::decode(&bytes, &limits).map_err(refuse)?;
+            let middle = planes.len() / 2;
+            let levels = if planes.is_empty() { Vec::new() } else { planes.swap_remove(middle) };
+            return Ok(Self { picture: Picture { width, levels }, bytes, is_deep: true });
+        }
+        let LevelImage { width, channels, levels, white } = LevelImage::decode(&bytes, &limits).map_err(refuse)?;
+        let green = if channels > 1 { 1 } else { 0 };
+        let levels = levels.into_iter().skip(green).step_by(channels).map(f32::from).collect();
+        Ok(Self { picture: Picture { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
+    }
+}
+
+impl Picture {
+    pub(crate) fn height(&self) -> usize {
+        self.levels.len() / self.width.max(1)
+    }
+
+    /// The largest level.
+    pub(crate) fn most(&self) -> f32 {
+        self.levels.iter().copied().fold(0.0, f32::max)
+    }
+
+    /// The level of the glass.
+    pub(crate) fn glass(&self) -> f32 {
+        glass(&mut self.sample([0, 0], [self.width, self.height()]))
+    }
+
+    /// The picture with pixels `factor` times as large, at least 1: each holds the mean of what lay on it, as a camera of
+    /// larger pixels would have it.
+    pub(crate) fn reduced(self, factor: f64) -> Self {
+        if factor <= 1.0 {
+            return self;
+        }
+        let height = self.height();
+        let columns = weights(self.width, factor);
+        let rows = weights(height, factor);
+        let width = columns.len();
+        let mut narrow = Vec::with_capacity(width * height);
+        for row in self.levels.chunks_exact(self.width.max(1)) {
+            narrow.extend(
+                columns.iter().map(|(first, parts)| {
+                    parts.iter().zip(&row[*first..]).map(|(part, level)| part * level).sum::<f32>()
+                }),
+            );
+        }
+        let mut levels = vec![0.0_f32; width * rows.len()];
+        for (out, (first, parts)) in levels.chunks_exact_mut(width.max(1)).zip(&rows) {
+            for (part, row) in parts.iter().zip(narrow.chunks_exact(width).skip(*first)) {
+                out.iter_mut().zip(row).for_each(|(out, level)| *out += part * level);
+            }
+        }
+        Self { width, levels }
+    }
+
+    /// Levels of a rectangle, every [`STRIDE_PX`]-th of either way.
+    fn sample(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> Vec<f32> {
+        let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(height).step_by(STRIDE_PX);
+        rows.flat_map(|row| row[x..x + width].iter().copied().step_by(STRIDE_PX)).collect()
+    }
+
+    /// The levels of a square, if it lies in the picture.
+    pub(crate) fn square(&self, [x, y]: [usize; 2], side: usize) -> Option<Vec<f32>> {
+        if x.checked_add(side)? > self.width || y.checked_add(side)? > self.height() {
+            return None;
+        }
+        let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(side);
+        Some(rows.flat_map(|row| row[x..x + side].iter().copied()).collect())
+    }
+
+    /// Up to `wanted` places of patches, left and top, in the order in which they were found: anywhere at random where
+    /// something lies on the patch and earlier ones are overlapped little. The same rule for both sides, and of ratios of levels
+    /// alone, so that exposure does not matter.
+    pub(crate) fn places<R: Rng + ?Sized>(&self, side: usize, wanted: usize, rng: &mut R) -> Places {
+        let mut places = Places::new();
+        let free = |length: usize| length.checked_sub(side + 2 * MARGIN_PX);
+        let (Some(right), Some(down)) = (free(self.width), free(self.height())) else { return places };
+        let glass = self.glass();
+        for _ in 0..TRIES.saturating_mul(wanted) {
+            if places.len() == wanted {
+                break;
+            }
+            let place = [MARGIN_PX + below(right + 1, rng), MARGIN_PX + below(down + 1, rng)];
+            if places.iter().all(|other| overlap(place, *other, side) <= MOST_OVERLAP)
+                && self.cover(place, side, glass) >= LEAST_COVER
+            {
+                places.push(place);
+            }
+        }
+        places
+    }
+
+    /// On how much of a patch something lies.
+    fn cover(&self, place: [usize; 2], side: usize, field_glass: f32) -> f64 {
+        let mut sample = self.sample(place, [side, side]);
+        let glass = glass(&mut sample).max(LEAST_GLASS * field_glass);
+        sample.iter().filter(|&&level| level < SOMETHING * glass).count() as f64 / sample.len().max(1) as f64
+    }
+}
+
+/// The part of the area that two squares share.
+fn overlap(a: [usize; 2], b: [usize; 2], side: usize) -> f64 {
+    let shared = |k: usize| side.saturating_sub(a[k].abs_diff(b[k])) as f64;
+    shared(0) * shared(1) / (side * side) as f64
+}
+
+/// The level that [`GLASS_QUANTILE`] of a sample are darker than.
+fn glass(sample: &mut [f32]) -> f32 {
+    if sample.is_empty() {
+        return 0.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a fraction of a length")]
+    let place = ((sample.len() - 1) as f64 * GLASS_QUANTILE) as usize;
+    *sample.select_nth_unstable_by(place, f32::total_cmp).1
+}
+
+/// For each larger pixel along a line of `length` smaller ones: the first that it covers, and the part of its light that each
+/// gives.
+fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a length")]
+    let whole = |x: f64| x as usize;
+    let count = whole(length as f64 / factor);
+    (0..count)
+        .map(|k| {
+            let (from, to) = (k as f64 * factor, (k + 1) as f64 * factor);
+            let first = whole(from);
+            let last = whole(to.ceil()).min(length);
+            #[expect(clippy::cast_possible_truncation, reason = "parts of a pixel")]
+            let part = |i: usize| (((to.min((i + 1) as f64)) - from.max(i as f64)).max(0.0) / factor) as f32;
+            (first, (first..last).map(part).collect())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> Picture {
+        Picture { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
+    }
+
+    fn rng() -> Xoshiro256PlusPlus {
+        Xoshiro256PlusPlus::seed_from_u64(3)
+    }
+
+    #[test]
+    fn larger_pixels_hold_the_mean_of_what_lay_on_them() {
+        let constant = field(37, 23, |_, _| 7.0).reduced(1.32);
+        assert_eq!((constant.width, constant.height()), (28, 17));
+        assert!(constant.levels.iter().all(|level| (level - 7.0).abs() < 1e-5));
+        // A slope stays the slope at the centres.
+        let slope = field(40, 12, |x, y| x as f32 + 3.0 * y as f32).reduced(1.5);
+        for (i, level) in slope.levels.iter().enumerate() {
+            let centre = |k: usize| 1.5 * (k as f32 + 0.5) - 0.5;
+            let wanted = centre(i % slope.width) + 3.0 * centre(i / slope.width);
+            // The mean of whole pixels that are cut is not quite that of the slope within them.
+            assert!((level - wanted).abs() < 0.7, "{i}: {level} for {wanted}");
+        }
+        let halves = field(4, 2, |x, _| x as f32).reduced(2.0);
+        assert_eq!(halves.levels, [0.5, 2.5]);
+        assert_eq!(field(4, 2, |x, _| x as f32).reduced(1.0).width, 4);
+    }
+
+    #[test]
+    fn patches_have_something_on_them_and_hardly_overlap() {
+        // Discs of half the light on uneven glass.
+        let picture = field(900, 700, |x, y| {
+            let light = 230.0 - 0.02 * x as f32;
+            let (dx, dy) = ((x % 300) as f32 - 150.0, (y % 300) as f32 - 150.0);
+            if dx * dx + dy * dy < 80.0 * 80.0 { 0.5 * light } else { light }
+        });
+        let places = picture.places(200, 8, &mut rng());
+        assert_eq!(places.len(), 8);
+        let glass = picture.glass();
+        for (k, &[x, y]) in places.iter().enumerate() {
+            assert!(
+                (MARGIN_PX..=900 - 200 - MARGIN_PX).contains(&x) && (MARGIN_PX..=700 - 200 - MARGIN_PX).contains(&y)
+            );
+            assert!(picture.cover([x, y], 200, glass) >= LEAST_COVER);
+            assert!(places[..k].iter().all(|other| overlap([x, y], *other, 200) <= MOST_OVERLAP));
+        }
+        assert_eq!(places, picture.places(200, 8, &mut rng()), "the same seed gives the same places");
+        // Exposure does not matter.
+        let darker = Picture { width: picture.width, levels: picture.levels.iter().map(|l| l * 0.5).collect() };
+        assert_eq!(places, darker.places(200, 8, &mut rng()));
+    }
+
+    #[test]
+    fn empty_glass_is_not_shown_and_covered_patches_are() {
+        let uneven = field(600, 600, |x, y| 200.0 - 0.04 * (x + y) as f32 + ((x * 7 + y * 13) % 5) as f32);
+        assert!(uneven.places(200, 3, &mut rng()).is_empty());
+        // Half of the field under a cell larger than a patch.
+        let covered = field(1200, 500, |x, _| if x < 600 { 120.0 } else { 230.0 });
+        let places = covered.places(200, 4, &mut rng());
+        assert_eq!(places.len(), 4);
+        assert!(places.iter().all(|[x, _]| *x < 600));
+    }
+
+    #[test]
+    fn small_fields_give_no_place() {
+        for (width, height) in [(0, 0), (1, 1), (215, 300), (300, 215)] {
+            assert!(field(width, height, |_, _| 1.0).places(200, 2, &mut rng()).is_empty());
+        }
+        assert_eq!(field(216, 216, |x, _| if x < 100 { 1.0 } else { 2.0 }).places(200, 2, &mut rng()), [[8, 8]]);
+    }
+}

@@ -1,0 +1,503 @@
+//! Which patch is shown in which trial, and the patches themselves.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::design::{Grey, Side, Stage, StudyParams, order};
+use crate::error::Error;
+use crate::fields::{Field, Root, bytes, limits};
+use crate::key::{Key, hex, shuffle};
+use crate::parameters::{Objects, Parameters, varied};
+use crate::patch;
+use crate::picture::{Picture, Places, Raw};
+
+/// Pixel sizes that differ by less than this part are the same.
+const SAME_PIXEL: f64 = 0.005;
+
+/// The level that bright glass becomes with [`Grey::Glass`]: bright, and far enough from white for light specks and noise.
+const GLASS_LEVEL: f32 = 230.0;
+
+/// Bits of a grey level that cameras have.
+const BITS: [u32; 5] = [8, 10, 12, 14, 16];
+
+/// Stands for a full scale until all fields of the side have been seen.
+const UNKNOWN: f32 = 0.0;
+
+/// A field that patches are taken from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FieldRecord {
+    pub(crate) side: Side,
+    /// Its path in the folder.
+    pub(crate) name: String,
+    /// Of its file, hexadecimal.
+    pub(crate) sha256: String,
+    /// The level of white of its camera.
+    pub(crate) full_scale: f32,
+    /// The level of its bright glass.
+    pub(crate) glass: f32,
+    /// How many of its pixels go on the length of one that is shown.
+    pub(crate) reduce: f64,
+}
+
+/// A patch of a field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Patch {
+    pub(crate) side: Side,
+    /// Which of the plan's fields.
+    pub(crate) field: usize,
+    /// Left, in pixels as they are shown.
+    pub(crate) x_px: usize,
+    /// Top.
+    pub(crate) y_px: usize,
+    /// What is known of it.
+    pub(crate) parameters: Parameters,
+}
+
+/// A trial.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Trial {
+    pub(crate) stage: Stage,
+    /// One patch, or two from left to right.
+    pub(crate) patches: Vec<Patch>,
+}
+
+/// All that a study shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Plan {
+    pub(crate) fields: Vec<FieldRecord>,
+    pub(crate) trials: Vec<Trial>,
+    /// What whoever reads the results should know.
+    pub(crate) notes: Vec<String>,
+}
+
+/// The two folders that were given.
+pub(crate) struct Folders {
+    roots: [Root; 2],
+    fields: [Vec<Field>; 2],
+}
+
+impl Folders {
+    pub(crate) fn new(real: &Path, synthetic: &Path) -> Result<Self, Error> {
+        let roots = [Root::new(real)?, Root::new(synthetic)?];
+        let fields = [roots[0].fields()?, roots[1].fields()?];
+        Ok(Self { roots, fields })
+    }
+
+    fn root(&self, side: Side) -> &Root {
+        &self.roots[place(side)]
+    }
+
+    fn fields(&self, side: Side) -> &[Field] {
+        &self.fields[place(side)]
+    }
+}
+
+fn place(side: Side) -> usize {
+    match side {
+        Side::Real => 0,
+        Side::Synthetic => 1,
+    }
+}
+
+impl Plan {
+    /// Draws a study: fields by the seed alone, so that all subjects see the same ones; patches, order and noise by the subject,
+    /// too.
+    pub(crate) fn draw(params: &StudyParams, folders: &Folders) -> Result<Self, Error> {
+        let mut notes = Vec::new();
+        let chosen = choose(params, folders, &mut notes);
+        let hashes = chosen.iter().map(|(_, field)| hash(field)).collect::<Result<Vec<_>, _>>()?;
+        let key = Key::new(params.seed, &params.subject, hashes.iter());
+        let orders = order(params, &mut key.stream("order", 0));
+        let needed =
+            Side::BOTH.map(|side| orders.iter().flat_map(|o| &o.sides).filter(|shown| **shown == side).count());
+        let reduce = reductions(params, &chosen, &mut notes);
+        let (fields, places) = survey(params, &chosen, hashes, &reduce, needed, &key)?;
+
+        let mut hands = [Vec::new(), Vec::new()];
+        for side in Side::BOTH {
+            let (hand, needed) = (&mut hands[place(side)], needed[place(side)]);
+            let mut turns: Vec<usize> = (0..fields.len()).filter(|index| fields[*index].side == side).collect();
+            shuffle(&mut turns, &mut key.stream("turns", place(side)));
+            *hand = deal(&turns, &places, needed);
+            if hand.len() < needed {
+                let (side, fields, found) = (side.name(), turns.len(), hand.len());
+                return Err(Error::TooFew { side, fields, found, needed });
+            }
+            shuffle(hand, &mut key.stream("patches", place(side)));
+        }
+        let known = Known::read(folders, &chosen, &mut notes);
+        let mut patch = |side: Side| {
+            let (field, [x_px, y_px]) = hands[place(side)].pop()?;
+            let reduce = fields[field].reduce;
+            let parameters =
+                known.of(field, [x_px, y_px].map(|at| at as f64 * reduce), params.patch_px as f64 * reduce);
+            Some(Patch { side, field, x_px, y_px, parameters })
+        };
+        let trials = orders
+            .into_iter()
+            .map(|order| Trial {
+                stage: order.stage,
+                patches: order.sides.into_iter().filter_map(&mut patch).collect(),
+            })
+            .collect();
+        Ok(Self { fields, trials, notes })
+    }
+
+    /// What random numbers of this plan hang on.
+    pub(crate) fn key(&self, params: &StudyParams) -> Key {
+        Key::new(params.seed, &params.subject, self.fields.iter().map(|field| &field.sha256))
+    }
+
+    /// The patches as they are sent: for each trial one or two PNG files.
+    pub(crate) fn patches(&self, params: &StudyParams, folders: &Folders) -> Result<Vec<Vec<Vec<u8>>>, Error> {
+        let key = self.key(params);
+        let mut shown: Vec<Vec<Vec<u8>>> =
+            self.trials.iter().map(|trial| vec![Vec::new(); trial.patches.len()]).collect();
+        // Field by field, since only one is in memory at a time.
+        for (index, record) in self.fields.iter().enumerate() {
+            let picture = record.picture(params, folders)?;
+            for (number, trial) in self.trials.iter().enumerate() {
+                for (slot, patch) in trial.patches.iter().enumerate().filter(|(_, patch)| patch.field == index) {
+                    let levels = picture.square([patch.x_px, patch.y_px], params.patch_px);
+                    let levels = levels.ok_or_else(|| record.changed(folders))?;
+                    let mut rng = key.stream("noise", patch_number(number, slot));
+                    shown[number][slot] =
+                        patch::png(&patch::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
+                }
+            }
+        }
+        Ok(shown)
+    }
+
+    /// The name that a patch is asked for by: a hash of its place in the study alone, whatever is on it.
+    pub(crate) fn patch_name(&self, key: &Key, trial: usize, slot: usize) -> String {
+        key.name("patch", patch_number(trial, slot))
+    }
+}
+
+/// A number for each place that a patch can be shown at.
+fn patch_number(trial: usize, slot: usize) -> usize {
+    2 * trial + slot
+}
+
+impl FieldRecord {
+    /// The field as it is shown, before noise.
+    fn picture(&self, params: &StudyParams, folders: &Folders) -> Result<Picture, Error> {
+        let field = folders.fields(self.side).iter().find(|field| field.name == self.name);
+        let raw = Raw::read(field.ok_or_else(|| self.changed(folders))?)?;
+        if hex(&Sha256::digest(&raw.bytes)) != self.sha256 {
+            return Err(self.changed(folders));
+        }
+        let mut picture = raw.picture.reduced(self.reduce);
+        let scale = match params.grey {
+            Grey::AsIs => full_scale(8) / self.full_scale,
+            Grey::Glass => GLASS_LEVEL / self.glass,
+        };
+        picture.levels.iter_mut().for_each(|level| *level *= scale);
+        Ok(picture)
+    }
+
+    fn changed(&self, folders: &Folders) -> Error {
+        let path = folders.root(self.side).path().join(&self.name);
+        Error::folder(
+            &path,
+            "has changed since the study of this subject began; --subject with another name begins a new one",
+        )
+    }
+}
+
+/// White of so many bits.
+fn full_scale(bits: u32) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "at most 24 bits")]
+    let white = ((1_u32 << bits.clamp(1, 24)) - 1) as f32;
+    white
+}
+
+fn hash(field: &Field) -> Result<String, Error> {
+    Ok(hex(&Sha256::digest(bytes(&field.path, limits().max_file_bytes)?)))
+}
+
+/// The fields that are shown: as many of each side as are asked for, or all.
+fn choose<'a>(params: &StudyParams, folders: &'a Folders, notes: &mut Vec<String>) -> Vec<(Side, &'a Field)> {
+    let mut chosen = Vec::new();
+    for side in Side::BOTH {
+        let all = folders.fields(side);
+        let key = Key::new(params.seed, "", all.iter().map(|field| field.name.as_bytes()));
+        let mut indices: Vec<usize> = (0..all.len()).collect();
+        shuffle(&mut indices, &mut key.stream("fields", place(side)));
+        indices.truncate(params.fields);
+        indices.sort_unstable();
+        if all.len() < params.fields {
+            let (name, count, wanted) = (side.name(), all.len(), params.fields);
+            notes.push(format!("{name}: {count} of {wanted} fields are there; patches come from these"));
+        }
+        chosen.extend(indices.into_iter().map(|index| (side, &all[index])));
+    }
+    chosen
+}
+
+/// Looks at every field: what is to be known of it, and where patches may be taken.
+fn survey(
+    params: &StudyParams,
+    chosen: &[(Side, &Field)],
+    hashes: Vec<String>,
+    reduce: &[f64],
+    needed: [usize; 2],
+    key: &Key,
+) -> Result<(Vec<FieldRecord>, Vec<Places>), Error> {
+    let mut fields = Vec::with_capacity(chosen.len());
+    let mut places = Vec::with_capacity(chosen.len());
+    // The largest level of each side's pictures of more than 8 bits that do not say how many.
+    let mut deepest = [0.0_f32; 2];
+    for (index, ((side, field), sha256)) in chosen.iter().zip(hashes).enumerate() {
+        let raw = Raw::read(field)?;
+        let full_scale = match &field.frame {
+            Some(frame) => full_scale(frame.summary.bits),
+            None if raw.is_deep => UNKNOWN,
+            None => full_scale(8),
+        };
+        if full_scale == UNKNOWN {
+            let deepest = &mut deepest[place(*side)];
+            *deepest = deepest.max(raw.picture.most());
+        }
+        let picture = raw.picture.reduced(reduce[index]);
+        places.push(picture.places(params.patch_px, needed[place(*side)], &mut key.stream("places", index)));
+        fields.push(FieldRecord {
+            side: *side,
+            name: field.name.clone(),
+            sha256,
+            full_scale,
+            // Black glass would have no scale.
+            glass: picture.glass().max(1.0),
+            reduce: reduce[index],
+        });
+    }
+    for field in fields.iter_mut().filter(|field| field.full_scale == UNKNOWN) {
+        let most = deepest[place(field.side)];
+        field.full_scale = BITS.map(full_scale).into_iter().find(|full| *full >= most).unwrap_or(most);
+    }
+    Ok((fields, places))
+}
+
+/// How much each field is reduced, so that all have pixels of one size: that of the coarsest.
+fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<String>) -> Vec<f64> {
+    let own = |side: Side, field: &Field| {
+        params.pixel_um(side).or_else(|| field.frame.as_ref().map(|frame| frame.summary.pixel_um))
+    };
+    let sizes: Option<Vec<f64>> = chosen.iter().map(|(side, field)| own(*side, field)).collect();
+    let Some(sizes) = sizes else {
+        notes.push("the size of a pixel is not known of both sides: nothing is resampled".to_owned());
+        return vec![1.0; chosen.len()];
+    };
+    let coarsest = sizes.iter().copied().fold(0.0, f64::max);
+    let reduce: Vec<f64> =
+        sizes.iter().map(|size| if coarsest / size < 1.0 + SAME_PIXEL { 1.0 } else { coarsest / size }).collect();
+    for side in Side::BOTH {
+        let finer = chosen.iter().zip(&reduce).filter(|((own, _), reduce)| *own == side && **reduce > 1.0).count();
+        if finer > 0 {
+            notes.push(format!("{}: {finer} fields are resampled to pixels of {coarsest} µm", side.name()));
+        }
+    }
+    reduce
+}
+
+/// Patches of the fields in turn, so that all give about as many: for each the field and the place.
+fn deal(turns: &[usize], places: &[Places], needed: usize) -> Vec<(usize, [usize; 2])> {
+    let rounds = turns.iter().map(|&field| places[field].len()).max().unwrap_or(0);
+    let all = (0..rounds)
+        .flat_map(|round| turns.iter().filter_map(move |&field| places[field].get(round).map(|place| (field, *place))));
+    all.take(needed).collect()
+}
+
+/// What is known of the fields, for patches.
+struct Known<'a> {
+    objects: BTreeMap<usize, (&'a Field, Objects)>,
+    varied: Vec<Parameters>,
+}
+
+impl<'a> Known<'a> {
+    /// Reads what data sets know. Without it nothing is missing but the breakdown, so that it is a note and no error.
+    fn read(folders: &Folders, chosen: &[(Side, &'a Field)], notes: &mut Vec<String>) -> Self {
+        let mut objects = BTreeMap::new();
+        for (index, (side, field)) in chosen.iter().enumerate() {
+            let Some(frame) = &field.frame else { continue };
+            match Objects::read(folders.root(*side), frame) {
+                Ok(found) => {
+                    objects.insert(index, (*field, found));
+                }
+                Err(error) => notes.push(format!("the objects of {} are not known: {error}", field.name)),
+            }
+        }
+        let mut all = vec![Parameters::new(); chosen.len()];
+        for side in Side::BOTH {
+            let own: Vec<usize> = (0..chosen.len()).filter(|index| chosen[*index].0 == side).collect();
+            let fields: Vec<&Field> = own.iter().map(|index| chosen[*index].1).collect();
+            own.iter().zip(varied(&fields)).for_each(|(index, parameters)| all[*index] = parameters);
+        }
+        Self { objects, varied: all }
+    }
+
+    fn of(&self, field: usize, place: [f64; 2], side: f64) -> Parameters {
+        let mut parameters = self.varied[field].clone();
+        if let Some((Field { frame: Some(frame), .. }, objects)) = self.objects.get(&field) {
+            parameters.extend(objects.of_patch(frame, place, side));
+        }
+        parameters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::fs;
+
+    use super::*;
+    use crate::design::Task;
+    use crate::support::{Scratch, picture, study_folders};
+
+    fn params() -> StudyParams {
+        StudyParams { trials: 12, patch_px: 48, ..StudyParams::default() }
+    }
+
+    #[test]
+    fn patches_are_dealt_evenly_and_are_all_different() {
+        let scratch = Scratch::new("plan");
+        let folders = study_folders(&scratch, 4, 3);
+        let plan = Plan::draw(&params(), &folders).unwrap();
+        assert_eq!(plan.trials.len(), 14);
+        let mut uses = BTreeMap::new();
+        let mut seen = BTreeSet::new();
+        for patch in plan.trials.iter().flat_map(|trial| &trial.patches) {
+            assert_eq!(plan.fields[patch.field].side, patch.side);
+            *uses.entry(patch.field).or_insert(0) += 1;
+            assert!(seen.insert((patch.field, patch.x_px, patch.y_px)));
+        }
+        // Seven of each side over four and three fields.
+        let counts: Vec<i32> = (0..7).map(|field| uses[&field]).collect();
+        assert!(
+            counts[..4].iter().all(|n| (1..=2).contains(n)) && counts[4..].iter().all(|n| (2..=3).contains(n)),
+            "{counts:?}"
+        );
+        assert!(plan.notes.iter().any(|note| note.starts_with("real: 4 of 25 fields")), "{:?}", plan.notes);
+    }
+
+    #[test]
+    fn a_seed_a_subject_and_the_fields_decide_everything() {
+        let scratch = Scratch::new("plan-seed");
+        let folders = study_folders(&scratch, 3, 3);
+        let draw = |params: &StudyParams| Plan::draw(params, &folders).unwrap();
+        let first = draw(&params());
+        assert_eq!(first, draw(&params()));
+        let png = |plan: &Plan| plan.patches(&params(), &folders).unwrap();
+        assert_eq!(png(&first), png(&first));
+        let sides = |plan: &Plan| plan.trials.iter().map(|trial| trial.patches[0].side).collect::<Vec<_>>();
+        let other = StudyParams { subject: "2".to_owned(), ..params() };
+        assert_ne!(sides(&first), sides(&draw(&other)));
+        assert_ne!(sides(&first), sides(&draw(&StudyParams { seed: 3, ..params() })));
+        // The same names, other pixels.
+        fs::write(scratch.join("real/f0.png"), picture(99, 300, 240)).unwrap();
+        let changed = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
+        assert_ne!(first, Plan::draw(&params(), &changed).unwrap());
+        let error = first.patches(&params(), &changed).unwrap_err().to_string();
+        assert!(error.contains("f0.png: has changed since"), "{error}");
+    }
+
+    #[test]
+    fn fields_are_chosen_for_all_subjects_alike() {
+        let scratch = Scratch::new("plan-fields");
+        let folders = study_folders(&scratch, 6, 6);
+        let few = StudyParams { fields: 3, ..params() };
+        let plan = Plan::draw(&few, &folders).unwrap();
+        let names = |plan: &Plan| plan.fields.iter().map(|f| (f.side, f.name.clone())).collect::<Vec<_>>();
+        assert_eq!(plan.fields.len(), 6);
+        assert_eq!(
+            names(&plan),
+            names(&Plan::draw(&StudyParams { subject: "2".to_owned(), ..few.clone() }, &folders).unwrap())
+        );
+        assert_ne!(names(&plan), names(&Plan::draw(&StudyParams { seed: 1, ..few }, &folders).unwrap()));
+        assert!(!plan.notes.iter().any(|note| note.contains("fields are there")));
+    }
+
+    #[test]
+    fn two_alternatives_show_one_of_each_side() {
+        let scratch = Scratch::new("plan-2afc");
+        let folders = study_folders(&scratch, 4, 4);
+        let pairs = StudyParams { task: Task::TwoAlternatives, ..params() };
+        let plan = Plan::draw(&pairs, &folders).unwrap();
+        assert!(
+            plan.trials
+                .iter()
+                .all(|trial| { trial.patches.len() == 2 && trial.patches[0].side != trial.patches[1].side })
+        );
+        let key = plan.key(&pairs);
+        let names: BTreeSet<String> = (0..14).flat_map(|t| [0, 1].map(|slot| plan.patch_name(&key, t, slot))).collect();
+        assert_eq!(names.len(), 28);
+    }
+
+    #[test]
+    fn too_few_patches_are_told_of() {
+        let scratch = Scratch::new("plan-few");
+        let folders = study_folders(&scratch, 1, 1);
+        let error = Plan::draw(&StudyParams { trials: 2000, ..params() }, &folders).unwrap_err();
+        assert!(matches!(error, Error::TooFew { side: "real", fields: 1, needed: 1001, .. }), "{error}");
+        let error = Plan::draw(&StudyParams { patch_px: 1024, ..params() }, &folders).unwrap_err();
+        assert!(matches!(error, Error::TooFew { found: 0, .. }), "{error}");
+    }
+
+    #[test]
+    fn the_finer_side_is_resampled_if_both_sizes_are_known() {
+        let scratch = Scratch::new("plan-pixel");
+        let folders = study_folders(&scratch, 2, 2);
+        let few = StudyParams { trials: 4, ..params() };
+        let both = StudyParams { real_pixel_um: Some(0.33), synthetic_pixel_um: Some(0.25), ..few.clone() };
+        let plan = Plan::draw(&both, &folders).unwrap();
+        for field in &plan.fields {
+            let wanted = if field.side == Side::Real { 1.0 } else { 0.33 / 0.25 };
+            assert_eq!(field.reduce, wanted);
+        }
+        assert!(
+            plan.notes.iter().any(|note| note == "synthetic: 2 fields are resampled to pixels of 0.33 µm"),
+            "{:?}",
+            plan.notes
+        );
+        plan.patches(&both, &folders).unwrap();
+        let one = StudyParams { real_pixel_um: Some(0.33), ..few };
+        assert!(Plan::draw(&one, &folders).unwrap().fields.iter().all(|field| field.reduce == 1.0));
+    }
+
+    #[test]
+    fn glass_takes_exposure_away_and_as_is_keeps_it() {
+        let scratch = Scratch::new("plan-grey");
+        let folders = study_folders(&scratch, 2, 2);
+        let mean = |grey: Grey, dark: bool| {
+            let params = StudyParams { grey, noise_dn: 0.0, trials: 4, ..params() };
+            let plan = Plan::draw(&params, &folders).unwrap();
+            let picture = plan.fields[if dark { 0 } else { 2 }].picture(&params, &folders).unwrap();
+            picture.glass()
+        };
+        // The support's real fields are exposed darker.
+        assert!((mean(Grey::Glass, true) - 230.0).abs() < 1.0 && (mean(Grey::Glass, false) - 230.0).abs() < 1.0);
+        assert!(mean(Grey::AsIs, false) - mean(Grey::AsIs, true) > 10.0);
+    }
+
+    #[test]
+    fn deep_pictures_are_scaled_by_their_camera() {
+        assert_eq!([8, 12, 16].map(full_scale), [255.0, 4095.0, 65535.0]);
+        let scratch = Scratch::new("plan-deep");
+        crate::support::write_deep(&scratch.join("real/a.png"), 300, 240, 3500);
+        crate::support::write_deep(&scratch.join("real/b.png"), 300, 240, 900);
+        fs::create_dir_all(scratch.join("synthetic")).unwrap();
+        fs::write(scratch.join("synthetic/a.png"), picture(1, 300, 240)).unwrap();
+        let folders = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
+        let plan = Plan::draw(&StudyParams { trials: 4, ..params() }, &folders).unwrap();
+        // One camera of 12 bits took both.
+        assert_eq!(plan.fields.iter().map(|field| field.full_scale).collect::<Vec<_>>(), [4095.0, 4095.0, 255.0]);
+    }
+}

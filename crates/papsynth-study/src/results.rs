@@ -1,0 +1,252 @@
+//! What came out, of one subject and of all.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::breakdown::{Group, breakdown};
+use crate::design::{RANDOM, Side, Stage, StudyParams, Task};
+use crate::error::Error;
+use crate::plan::{Plan, Trial};
+use crate::saved::{Answered, Saved, read_all};
+use crate::score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
+
+/// A row of Table 1.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Who looked.
+    pub subject: String,
+    /// TP, FP, TN, FN.
+    pub counts: Counts,
+    /// Real images that were taken for real.
+    pub sensitivity: Proportion,
+    /// Synthetic images that were taken for synthetic.
+    pub specificity: Proportion,
+    /// Right answers.
+    pub accuracy: Proportion,
+    /// d′ and criterion.
+    pub detection: Detection,
+}
+
+impl Row {
+    /// The row of these counts.
+    #[must_use]
+    pub fn new(subject: &str, counts: Counts, task: Task) -> Self {
+        Self {
+            subject: subject.to_owned(),
+            counts,
+            sensitivity: counts.sensitivity(),
+            specificity: counts.specificity(),
+            accuracy: counts.accuracy(),
+            detection: counts.detection(task),
+        }
+    }
+}
+
+/// How long patches were shown.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Exposures {
+    /// How long they were to be shown, ms.
+    pub asked_ms: u32,
+    /// The shortest that was given, ms.
+    pub shortest_ms: f64,
+    /// The median.
+    pub median_ms: f64,
+    /// The longest.
+    pub longest_ms: f64,
+    /// Trials whose patch was sent more than once.
+    pub shown_again: usize,
+}
+
+/// What it takes to claim more.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Claim {
+    /// Half the width of an interval of 95 %.
+    pub half_width: f64,
+    /// Trials that give it for a fraction of ½.
+    pub trials: u64,
+}
+
+impl Claim {
+    fn five_points() -> Self {
+        Self { half_width: CLAIM_HALF_WIDTH, trials: trials_for(CLAIM_HALF_WIDTH) }
+    }
+}
+
+/// The results of one subject.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// What was asked.
+    pub study: StudyParams,
+    /// Whether everything has been answered.
+    pub finished: bool,
+    /// The subject's row.
+    pub row: Row,
+    /// What a coin says to the same trials.
+    pub random: Row,
+    /// How long patches were shown; nothing if none was.
+    pub exposure: Option<Exposures>,
+    /// How many trials a claim of ±5 points needs.
+    pub claim: Claim,
+    /// Right answers by parameter and by field.
+    pub breakdown: Vec<Group>,
+    /// What else to know.
+    pub notes: Vec<String>,
+}
+
+impl Summary {
+    pub(crate) fn of(saved: &Saved) -> Self {
+        let Saved { params, plan, answers, .. } = saved;
+        let counted: Vec<Judged> = counted(saved).collect();
+        Self {
+            study: params.clone(),
+            finished: saved.is_finished(),
+            row: Row::new(&params.subject, counts(&counted), params.task),
+            random: random(saved),
+            exposure: exposures(params, answers),
+            claim: Claim::five_points(),
+            breakdown: breakdown(&counted),
+            notes: plan.notes.clone(),
+        }
+    }
+}
+
+/// The results of all subjects in a folder.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pool {
+    /// What was asked.
+    pub task: Task,
+    /// A row for each subject that has finished.
+    pub subjects: Vec<Row>,
+    /// Their counts together.
+    pub pooled: Row,
+    /// What a coin says to the first one's trials.
+    pub random: Row,
+    /// Mean sensitivity over subjects, and its interval of 95 % by Student's t, as the paper states it.
+    pub mean_sensitivity: Option<(f64, Interval)>,
+    /// Mean specificity, alike.
+    pub mean_specificity: Option<(f64, Interval)>,
+    /// Mean accuracy, alike.
+    pub mean_accuracy: Option<(f64, Interval)>,
+    /// How many trials a claim of ±5 points needs.
+    pub claim: Claim,
+    /// Right answers of all by parameter and by field.
+    pub breakdown: Vec<Group>,
+    /// What else to know.
+    pub notes: Vec<String>,
+}
+
+impl Pool {
+    /// Reads the results in a folder, a folder for each subject.
+    ///
+    /// # Errors
+    /// If there is no finished study, one cannot be read, or they asked different things.
+    pub fn read(out: &Path) -> Result<Self, Error> {
+        let (finished, unfinished): (Vec<_>, Vec<_>) = read_all(out)?.into_iter().partition(Saved::is_finished);
+        let Some(first) = finished.first() else {
+            let message = match unfinished.len() {
+                0 => "there is no study in it; expected a folder that `papsynth study --out` has written to".to_owned(),
+                count => format!("none of {count} studies is finished; the command that began one goes on with it"),
+            };
+            return Err(Error::folder(out, message));
+        };
+        let task = first.params.task;
+        if let Some(other) = finished.iter().find(|saved| saved.params.task != task) {
+            let [one, two] = [first, other].map(|saved| (&saved.params.subject, saved.params.task.name()));
+            let message =
+                format!("subject {} was asked {}, subject {} {}; these are not pooled", one.0, one.1, two.0, two.1);
+            return Err(Error::folder(out, message));
+        }
+        let mut notes: Vec<String> = unfinished
+            .iter()
+            .map(|saved| {
+                let (done, all) = (saved.answers.len(), saved.plan.trials.len());
+                format!("subject {} is left out: {done} of {all} trials are answered", saved.params.subject)
+            })
+            .collect();
+        let conditions = |saved: &Saved| StudyParams { subject: String::new(), seed: 0, ..saved.params.clone() };
+        if finished.iter().any(|saved| conditions(saved) != conditions(first)) {
+            notes.push("not all subjects were shown patches under the same conditions".to_owned());
+        }
+        let fields = |saved: &Saved| saved.plan.fields.iter().map(|f| f.sha256.clone()).collect::<BTreeSet<_>>();
+        if finished.iter().any(|saved| fields(saved) != fields(first)) {
+            notes.push("not all subjects were shown patches of the same fields".to_owned());
+        }
+        let subjects: Vec<Row> = finished
+            .iter()
+            .map(|saved| Row::new(&saved.params.subject, counts(&counted(saved).collect::<Vec<_>>()), task))
+            .collect();
+        let all: Vec<Judged> = finished.iter().flat_map(counted).collect();
+        let mean = |part: fn(&Row) -> Proportion| {
+            mean_over_subjects(&subjects.iter().filter_map(|row| part(row).value()).collect::<Vec<_>>())
+        };
+        Ok(Self {
+            task,
+            pooled: Row::new("pooled", counts(&all), task),
+            random: random(first),
+            mean_sensitivity: mean(|row| row.sensitivity),
+            mean_specificity: mean(|row| row.specificity),
+            mean_accuracy: mean(|row| row.accuracy),
+            claim: Claim::five_points(),
+            breakdown: breakdown(&all),
+            notes,
+            subjects,
+        })
+    }
+}
+
+/// A trial and what was said to it.
+#[derive(Clone, Copy)]
+pub(crate) struct Judged<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) trial: &'a Trial,
+    pub(crate) answered: &'a Answered,
+}
+
+impl Judged<'_> {
+    /// Whether the first patch is real.
+    pub(crate) fn is_positive(&self) -> bool {
+        self.trial.patches.first().is_some_and(|patch| patch.side == Side::Real)
+    }
+
+    pub(crate) fn is_correct(&self) -> bool {
+        self.is_positive() == self.answered.answer.is_positive()
+    }
+}
+
+pub(crate) fn answered(saved: &Saved) -> impl Iterator<Item = Judged<'_>> {
+    let pairs = saved.plan.trials.iter().zip(&saved.answers);
+    pairs.map(|(trial, answered)| Judged { plan: &saved.plan, trial, answered })
+}
+
+fn counted(saved: &Saved) -> impl Iterator<Item = Judged<'_>> {
+    answered(saved).filter(|judged| judged.trial.stage == Stage::Counted)
+}
+
+fn counts(judged: &[Judged]) -> Counts {
+    let mut counts = Counts::default();
+    judged.iter().for_each(|one| counts.count(one.is_positive(), one.answered.answer.is_positive()));
+    counts
+}
+
+/// The random row: a coin for each trial that was answered.
+fn random(saved: &Saved) -> Row {
+    use rand_core::Rng;
+    let mut coin = saved.plan.key(&saved.params).stream("random row", 0);
+    let mut counts = Counts::default();
+    counted(saved).for_each(|one| counts.count(one.is_positive(), coin.next_u64() >> 63 == 1));
+    Row::new(RANDOM, counts, saved.params.task)
+}
+
+fn exposures(params: &StudyParams, answers: &[Answered]) -> Option<Exposures> {
+    let mut given: Vec<f64> = answers.iter().map(|answered| answered.exposure.exposure_ms).collect();
+    given.sort_by(f64::total_cmp);
+    Some(Exposures {
+        asked_ms: params.exposure_ms,
+        shortest_ms: *given.first()?,
+        median_ms: *given.get(given.len() / 2)?,
+        longest_ms: *given.last()?,
+        shown_again: answers.iter().filter(|answered| answered.showings > 1).count(),
+    })
+}

@@ -1,0 +1,320 @@
+//! Arithmetic of answers: Table 1 of the paper, intervals, signal detection.
+
+use serde::{Deserialize, Serialize};
+
+use crate::design::Task;
+use crate::normal::{Z_95, density, deviate, student};
+
+/// Half the width of the interval that a claim about realism is usually made with: ±5 points.
+pub const CLAIM_HALF_WIDTH: f64 = 0.05;
+
+/// The four counts of Table 1. As in the paper, a real image is a positive and a synthetic one a negative.
+///
+/// Of two alternatives, a positive is a pair whose real image stands on the left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Counts {
+    /// True positives: real, and taken for real.
+    pub tp: u64,
+    /// False positives: synthetic, and taken for real.
+    pub fp: u64,
+    /// True negatives: synthetic, and taken for synthetic.
+    pub tn: u64,
+    /// False negatives: real, and taken for synthetic.
+    #[serde(rename = "fn")]
+    pub fn_: u64,
+}
+
+impl Counts {
+    /// Counts one answer.
+    pub fn count(&mut self, is_positive: bool, said_positive: bool) {
+        let cell = match (is_positive, said_positive) {
+            (true, true) => &mut self.tp,
+            (false, true) => &mut self.fp,
+            (false, false) => &mut self.tn,
+            (true, false) => &mut self.fn_,
+        };
+        *cell += 1;
+    }
+
+    /// The counts of both together.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self { tp: self.tp + other.tp, fp: self.fp + other.fp, tn: self.tn + other.tn, fn_: self.fn_ + other.fn_ }
+    }
+
+    /// Number of answers.
+    #[must_use]
+    pub fn trials(&self) -> u64 {
+        self.tp + self.fp + self.tn + self.fn_
+    }
+
+    /// TP / (TP + FN): real images that were taken for real.
+    #[must_use]
+    pub fn sensitivity(&self) -> Proportion {
+        Proportion { hits: self.tp, of: self.tp + self.fn_ }
+    }
+
+    /// TN / (TN + FP): synthetic images that were taken for synthetic.
+    #[must_use]
+    pub fn specificity(&self) -> Proportion {
+        Proportion { hits: self.tn, of: self.tn + self.fp }
+    }
+
+    /// (TP + TN) / all: right answers.
+    #[must_use]
+    pub fn accuracy(&self) -> Proportion {
+        Proportion { hits: self.tp + self.tn, of: self.trials() }
+    }
+
+    /// Sensitivity d′ and criterion c of signal detection.
+    ///
+    /// H = (TP + ½) / (TP + FN + 1) and F = (FP + ½) / (FP + TN + 1): the log-linear correction (Hautus 1995,
+    /// [doi:10.3758/BF03203619](https://doi.org/10.3758/BF03203619)), which is always made, so that rates of 0 and 1 are no
+    /// exception. Then d′ = Φ⁻¹(H) − Φ⁻¹(F), divided by √2 of two alternatives, and c = −(Φ⁻¹(H) + Φ⁻¹(F)) / 2: negative if
+    /// "real" (or "left") is said too readily. The interval of d′ is that of Gourevitch and Galanter (1967,
+    /// [doi:10.1007/BF02289402](https://doi.org/10.1007/BF02289402)).
+    #[must_use]
+    pub fn detection(&self, task: Task) -> Detection {
+        let rate = |hits: u64, of: u64| (hits as f64 + 0.5) / (of as f64 + 1.0);
+        let (positives, negatives) = (self.tp + self.fn_, self.fp + self.tn);
+        let (hits, alarms) = (rate(self.tp, positives), rate(self.fp, negatives));
+        let (z_hits, z_alarms) = (deviate(hits), deviate(alarms));
+        let variance = |rate: f64, z: f64, of: u64| {
+            let height = density(z);
+            rate * (1.0 - rate) / ((of as f64 + 1.0) * height * height)
+        };
+        let scale = match task {
+            Task::YesNo => 1.0,
+            Task::TwoAlternatives => std::f64::consts::FRAC_1_SQRT_2,
+        };
+        let d_prime = scale * (z_hits - z_alarms);
+        let error = scale * (variance(hits, z_hits, positives) + variance(alarms, z_alarms, negatives)).sqrt();
+        Detection {
+            d_prime,
+            d_prime_interval: Interval { low: d_prime - Z_95 * error, high: d_prime + Z_95 * error },
+            criterion: -0.5 * (z_hits + z_alarms),
+        }
+    }
+}
+
+/// What signal detection says of the answers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Detection {
+    /// Distance between real and synthetic in standard deviations; 0 if they are not told apart.
+    pub d_prime: f64,
+    /// Its interval of 95 %.
+    pub d_prime_interval: Interval,
+    /// Bias: 0 if there is none.
+    pub criterion: f64,
+}
+
+/// So many of so many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Proportion {
+    /// How many did.
+    pub hits: u64,
+    /// How many could.
+    pub of: u64,
+}
+
+/// From a least to a largest value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// The least.
+    pub low: f64,
+    /// The largest.
+    pub high: f64,
+}
+
+impl Proportion {
+    /// The fraction, or nothing of nothing.
+    #[must_use]
+    pub fn value(&self) -> Option<f64> {
+        (self.of > 0).then(|| self.hits as f64 / self.of as f64)
+    }
+
+    /// Wilson's score interval of 95 % ([doi:10.1080/01621459.1927.10502953](https://doi.org/10.1080/01621459.1927.10502953)):
+    /// (p + z²/2n ± z √(p(1−p)/n + z²/4n²)) / (1 + z²/n). Of nothing it reaches from 0 to 1.
+    #[must_use]
+    pub fn wilson(&self) -> Interval {
+        let Some(p) = self.value() else { return Interval { low: 0.0, high: 1.0 } };
+        let n = self.of as f64;
+        let z2 = Z_95 * Z_95;
+        let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
+        let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / (1.0 + z2 / n);
+        // Rounding must not lead out of what a fraction can be, nor past the fraction itself.
+        Interval { low: (centre - half).clamp(0.0, p), high: (centre + half).clamp(p, 1.0) }
+    }
+}
+
+impl Serialize for Proportion {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Shown {
+            hits: u64,
+            of: u64,
+            value: Option<f64>,
+            wilson_95: Interval,
+        }
+        Shown { hits: self.hits, of: self.of, value: self.value(), wilson_95: self.wilson() }.serialize(serializer)
+    }
+}
+
+/// How many trials it takes until a fraction near ½ is known to ± `half_width`: z² / 4w², to the nearest whole number, 384
+/// for ±5 points. (Wilson's interval, a little narrower, is within it there.)
+#[must_use]
+pub fn trials_for(half_width: f64) -> u64 {
+    let exact = Z_95 * Z_95 / (4.0 * half_width * half_width);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number; saturates")]
+    let whole = (exact + 0.5) as u64;
+    whole
+}
+
+/// Mean of one number a subject, and its interval of 95 % over subjects by Student's t; the paper states it of sensitivity.
+/// Nothing of fewer than two subjects.
+#[must_use]
+pub fn mean_over_subjects(values: &[f64]) -> Option<(f64, Interval)> {
+    let n = values.len() as f64;
+    if values.len() < 2 {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    let error = (squares / (n - 1.0) / n).sqrt();
+    let half = student(0.975, values.len() as u64 - 1) * error;
+    Some((mean, Interval { low: mean - half, high: mean + half }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Table 1 of the paper: counts, and sensitivity and specificity as printed.
+    const TABLE_1: [([u64; 4], [f64; 2]); 7] = [
+        ([35, 29, 37, 17], [0.67, 0.56]),
+        ([39, 29, 29, 21], [0.65, 0.50]),
+        ([50, 16, 38, 14], [0.78, 0.70]),
+        ([49, 20, 36, 13], [0.79, 0.64]),
+        ([51, 17, 39, 11], [0.82, 0.70]),
+        ([58, 32, 21, 7], [0.89, 0.40]),
+        ([37, 31, 24, 26], [0.54, 0.48]),
+    ];
+
+    fn row(subject: usize) -> Counts {
+        let [tp, fp, tn, fn_] = TABLE_1[subject].0;
+        Counts { tp, fp, tn, fn_ }
+    }
+
+    fn rounded(value: f64, digits: f64) -> f64 {
+        (value * digits).round() / digits
+    }
+
+    #[test]
+    fn the_paper_s_six_subjects_come_out_as_printed() {
+        for (subject, (_, [sensitivity, specificity])) in TABLE_1.iter().enumerate().take(6) {
+            let counts = row(subject);
+            assert_eq!(counts.trials(), 118);
+            assert_eq!(rounded(counts.sensitivity().value().unwrap(), 100.0), *sensitivity, "subject {}", subject + 1);
+            assert_eq!(rounded(counts.specificity().value().unwrap(), 100.0), *specificity, "subject {}", subject + 1);
+        }
+    }
+
+    #[test]
+    fn the_paper_s_random_row_is_misprinted() {
+        // Its counts give .59 and .44; .54 and .48 are printed.
+        let counts = row(6);
+        assert_eq!(counts.trials(), 118);
+        assert_eq!(rounded(counts.sensitivity().value().unwrap(), 100.0), 0.59);
+        assert_eq!(rounded(counts.specificity().value().unwrap(), 100.0), 0.44);
+        // What is printed are the predictive values of the same counts.
+        assert_eq!(rounded(37.0 / (37.0 + 31.0), 100.0), 0.54);
+        assert_eq!(rounded(24.0 / (24.0 + 26.0), 100.0), 0.48);
+    }
+
+    #[test]
+    fn the_paper_s_subjects_pooled() {
+        let pooled = (0..6).map(row).fold(Counts::default(), Counts::plus);
+        let accuracy = pooled.accuracy();
+        assert_eq!(accuracy, Proportion { hits: 482, of: 708 });
+        assert_eq!(rounded(accuracy.value().unwrap(), 1000.0), 0.681);
+        let Interval { low, high } = accuracy.wilson();
+        assert_eq!([rounded(low, 1000.0), rounded(high, 1000.0)], [0.646, 0.714]);
+    }
+
+    #[test]
+    fn the_paper_s_mean_sensitivity_and_its_interval() {
+        // "Mean: 0.7667, 95% confidence interval [0.671, 0.863]", of the printed numbers.
+        let printed = TABLE_1[..6].iter().map(|(_, [sensitivity, _])| *sensitivity).collect::<Vec<_>>();
+        let (mean, Interval { low, high }) = mean_over_subjects(&printed).unwrap();
+        assert_eq!([rounded(mean, 1e4), rounded(low, 1e3), rounded(high, 1e3)], [0.7667, 0.671, 0.863]);
+        assert!(mean_over_subjects(&printed[..1]).is_none());
+    }
+
+    #[test]
+    fn wilson_solves_its_own_equation() {
+        // Its ends are the p with |p̂ − p| = z √(p(1−p)/n).
+        for of in [1, 2, 7, 118, 5000] {
+            for hits in (0..=of).step_by(1 + usize::try_from(of / 9).unwrap()) {
+                let proportion = Proportion { hits, of };
+                let (value, Interval { low, high }) = (proportion.value().unwrap(), proportion.wilson());
+                assert!(0.0 <= low && low <= value && value <= high && high <= 1.0);
+                for end in [low, high] {
+                    let deviation = Z_95 * (end * (1.0 - end) / of as f64).sqrt();
+                    assert!(((value - end).abs() - deviation).abs() < 1e-9, "{hits} of {of}: {end}");
+                }
+            }
+        }
+        assert_eq!(Proportion::default().wilson(), Interval { low: 0.0, high: 1.0 });
+        assert_eq!(Proportion::default().value(), None);
+    }
+
+    #[test]
+    fn d_prime_and_criterion() {
+        let detect = |tp, fp, tn, fn_, task| Counts { tp, fp, tn, fn_ }.detection(task);
+        // Worked by hand: H = 35.5/53, F = 29.5/67.
+        let first = row(0).detection(Task::YesNo);
+        let (z_hits, z_alarms) = (deviate(35.5 / 53.0), deviate(29.5 / 67.0));
+        assert!((first.d_prime - (z_hits - z_alarms)).abs() < 1e-12);
+        assert!((first.d_prime - 0.589).abs() < 1e-3 && (first.criterion + 0.144).abs() < 1e-3, "{first:?}");
+        // Chance is 0; perfect is finite; a yes-sayer has a criterion below 0.
+        assert!(detect(30, 30, 30, 30, Task::YesNo).d_prime.abs() < 1e-12);
+        let perfect = detect(59, 0, 59, 0, Task::YesNo);
+        assert!(perfect.d_prime.is_finite() && perfect.d_prime > 4.0 && perfect.criterion.abs() < 1e-12);
+        assert!(detect(59, 59, 0, 0, Task::YesNo).criterion < -2.0);
+        assert!(detect(0, 0, 0, 0, Task::YesNo).d_prime == 0.0);
+        // Two alternatives are easier by √2, so that the same counts mean less.
+        let two = detect(50, 16, 38, 14, Task::TwoAlternatives).d_prime;
+        let one = detect(50, 16, 38, 14, Task::YesNo).d_prime;
+        assert!((one / two - std::f64::consts::SQRT_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_interval_of_d_prime_covers() {
+        use rand_core::{Rng, SeedableRng};
+        // Observers of a known d′ = 1: 95 % of 2000 intervals, within 4 standard errors.
+        let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(11);
+        let [real, synthetic] = [0.691_462_461, 0.308_537_539];
+        let (mut covered, runs) = (0, 2000);
+        for _ in 0..runs {
+            let mut counts = Counts::default();
+            for trial in 0..118 {
+                let is_real = trial % 2 == 0;
+                let u = (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+                counts.count(is_real, u < if is_real { real } else { synthetic });
+            }
+            let Interval { low, high } = counts.detection(Task::YesNo).d_prime_interval;
+            covered += i32::from(low <= 1.0 && 1.0 <= high);
+        }
+        let error = (0.95_f64 * 0.05 / f64::from(runs)).sqrt();
+        assert!((f64::from(covered) / f64::from(runs) - 0.95).abs() < 4.0 * error, "{covered} of {runs}");
+    }
+
+    #[test]
+    fn a_claim_of_five_points_takes_384_trials() {
+        assert_eq!(trials_for(CLAIM_HALF_WIDTH), 384);
+        let Interval { low, high } = Proportion { hits: 192, of: 384 }.wilson();
+        assert!(high - low <= 2.0 * CLAIM_HALF_WIDTH);
+        assert!(trials_for(0.0) == u64::MAX);
+    }
+}

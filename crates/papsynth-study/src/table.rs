@@ -1,0 +1,179 @@
+//! Results as tables: every trial for other programs, rows and groups for a terminal.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use crate::breakdown::{FIELD, Group};
+use crate::design::{Side, Stage, Task};
+use crate::parameters::Value;
+use crate::plan::Patch;
+use crate::results::{Row, answered};
+use crate::saved::{Answered, Saved};
+use crate::score::{Interval, Proportion};
+
+/// Every trial that was answered, as a table.
+pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
+    let names: BTreeSet<&String> =
+        saved.plan.trials.iter().flat_map(|trial| &trial.patches).flat_map(|patch| patch.parameters.keys()).collect();
+    let mut lines = Vec::with_capacity(saved.answers.len() + 1);
+    let fixed = [
+        "subject",
+        "trial",
+        "stage",
+        "design",
+        "truth",
+        "answer",
+        "correct",
+        "exposure_ms",
+        "frames",
+        "longest_frame_ms",
+        "pixel_ratio",
+        "showings",
+        "response_ms",
+        "real_field",
+        "real_x_px",
+        "real_y_px",
+        "synthetic_field",
+        "synthetic_x_px",
+        "synthetic_y_px",
+    ];
+    lines.push(fixed.iter().map(|name| (*name).to_owned()).chain(names.iter().map(|name| (*name).clone())).collect());
+    let params = &saved.params;
+    for (number, one) in answered(saved).enumerate() {
+        let of = |side: Side| one.trial.patches.iter().find(|patch| patch.side == side);
+        let field = |patch: Option<&Patch>| {
+            let name = patch.and_then(|patch| saved.plan.fields.get(patch.field)).map(|field| field.name.clone());
+            [name, patch.map(|patch| patch.x_px.to_string()), patch.map(|patch| patch.y_px.to_string())]
+                .map(Option::unwrap_or_default)
+        };
+        let truth = match (params.task, one.is_positive()) {
+            (Task::YesNo, true) => "real",
+            (Task::YesNo, false) => "synthetic",
+            (Task::TwoAlternatives, true) => "left",
+            (Task::TwoAlternatives, false) => "right",
+        };
+        let stage = match one.trial.stage {
+            Stage::Training => "training",
+            Stage::Counted => "counted",
+        };
+        let Answered { answer, response_ms, exposure, showings } = one.answered;
+        let mut line: Vec<String> = vec![
+            params.subject.clone(),
+            (number + 1).to_string(),
+            stage.to_owned(),
+            params.task.name().to_owned(),
+            truth.to_owned(),
+            answer.name().to_owned(),
+            u8::from(one.is_correct()).to_string(),
+            exposure.exposure_ms.to_string(),
+            exposure.frames.to_string(),
+            exposure.longest_frame_ms.to_string(),
+            exposure.pixel_ratio.to_string(),
+            showings.to_string(),
+            response_ms.to_string(),
+        ];
+        line.extend(field(of(Side::Real)));
+        line.extend(field(of(Side::Synthetic)));
+        let known = of(Side::Synthetic).map(|patch| &patch.parameters);
+        line.extend(names.iter().map(|name| match known.and_then(|known| known.get(*name)) {
+            Some(Value::Number(number)) => number.to_string(),
+            Some(Value::Text(text)) => text.clone(),
+            None => String::new(),
+        }));
+        lines.push(line);
+    }
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for line in lines {
+        let written: Result<(), csv::Error> = writer.write_record(&line);
+        debug_assert!(written.is_ok(), "memory takes every byte, and all lines are of one length: {written:?}");
+    }
+    writer.into_inner().unwrap_or_default()
+}
+
+/// Rows as a table for a terminal, with the intervals of 95 % below their numbers' names.
+#[must_use]
+pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
+    let rows: Vec<&Row> = rows.into_iter().collect();
+    let wide = rows.iter().map(|row| row.subject.len()).max().unwrap_or(0).max("subject".len());
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        out,
+        "{:<wide$}  {:>4}  {:>4}  {:>4}  {:>4}   {:<15}   {:<15}   {:<15}  {:>5}  {:>5}",
+        "subject", "TP", "FP", "TN", "FN", "sensitivity", "specificity", "accuracy", "d′", "c"
+    );
+    for row in rows {
+        let Row { subject, counts, detection, .. } = row;
+        let [sensitivity, specificity, accuracy] =
+            [row.sensitivity, row.specificity, row.accuracy].map(|proportion| fraction(&proportion));
+        let _ = writeln!(
+            out,
+            "{subject:<wide$}  {:>4}  {:>4}  {:>4}  {:>4}   {sensitivity:<15}   {specificity:<15}   {accuracy:<15}  {:>5.2}  {:>5.2}",
+            counts.tp,
+            counts.fp,
+            counts.tn,
+            counts.fn_,
+            // No minus before 0.00.
+            detection.d_prime + 0.0,
+            detection.criterion + 0.0,
+        );
+    }
+    out
+}
+
+/// A fraction with its interval, such as `.681 (.646–.714)`.
+fn fraction(proportion: &Proportion) -> String {
+    let Interval { low, high } = proportion.wilson();
+    match proportion.value() {
+        Some(value) => format!("{} ({}–{})", three(value), three(low), three(high)),
+        None => "–".to_owned(),
+    }
+}
+
+/// Three digits, without the zero that a fraction below 1 begins with.
+fn three(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.strip_prefix('0').unwrap_or(&text).to_owned()
+}
+
+/// The breakdown by parameter as a table for a terminal, without that by field.
+#[must_use]
+pub fn breakdown_table(groups: &[Group]) -> String {
+    let shown: Vec<&Group> = groups.iter().filter(|group| group.parameter != FIELD).collect();
+    let width = |text: fn(&Group) -> &str| shown.iter().map(|group| text(group).chars().count()).max().unwrap_or(0);
+    let (name, value) = (width(|group| &group.parameter), width(|group| &group.value));
+    let mut out = String::new();
+    let mut before = "";
+    for group in shown {
+        let parameter = if group.parameter == before { "" } else { &group.parameter };
+        before = &group.parameter;
+        let Proportion { hits, of } = group.correct;
+        let _ = writeln!(
+            out,
+            "{parameter:<name$}  {:<value$}  {:>4} of {:<4}  {}",
+            group.value,
+            hits,
+            of,
+            fraction(&group.correct)
+        );
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::breakdown::short;
+    use crate::score::Counts;
+
+    #[test]
+    fn tables_show_the_numbers_as_papers_do() {
+        let counts = Counts { tp: 282, fp: 143, tn: 200, fn_: 83 };
+        let text = table([&Row::new("pooled", counts, Task::YesNo)]);
+        assert!(text.lines().nth(1).unwrap().contains(".681 (.646–.714)"), "{text}");
+        let row = Row::new("1", Counts { tp: 2, ..Counts::default() }, Task::YesNo);
+        assert!(table([&row]).contains("1.000 (.342–1.000)"));
+        assert!(table([&row]).contains('–'));
+        assert_eq!([0.0, 0.1234, 12.34, 1234.5].map(short), ["0", "0.123", "12.3", "1234"]);
+    }
+}

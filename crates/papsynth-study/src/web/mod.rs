@@ -1,0 +1,6 @@
+//! The page and its server, on loopback alone.
+
+mod desk;
+mod server;
+
+pub use server::Server;

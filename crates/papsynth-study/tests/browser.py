@@ -1,0 +1,403 @@
+"""Goes through the experiment in a real browser, with keyboard and mouse, and holds the results against what it did.
+
+Usage: browser.py PAPSYNTH CHROMIUM REAL SYNTHETIC FOLDER
+
+FOLDER is emptied; results and screenshots go there. Chromium is spoken to through a pipe
+(--remote-debugging-pipe), so that Python's own library is enough.
+"""
+
+import base64
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+EXPOSURE_MS = 200
+LONG_EXPOSURE_MS = 800
+PATIENCE_S = 30
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-dev-shm-usage", "--hide-scrollbars",
+    "--no-default-browser-check", "--window-size=1280,800", "--remote-debugging-pipe",
+]
+
+
+class Study:
+    """The program, serving one subject."""
+
+    def __init__(self, program, words):
+        self.process = subprocess.Popen(
+            [program, "study", *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        self.address = None
+        for line in self.process.stdout:
+            if found := re.search(r"http://127\.0\.0\.1:\d+/", line):
+                self.address = found[0]
+                return
+        raise SystemExit(f"the program ended: {self.process.stderr.read()}")
+
+    def interrupt(self):
+        self.process.send_signal(signal.SIGINT)
+        out, _ = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, out
+
+
+class Browser:
+    """Chromium and one page of it."""
+
+    def __init__(self, chromium):
+        self.profile = tempfile.mkdtemp()
+        theirs_in, ours_out = os.pipe()
+        ours_in, theirs_out = os.pipe()
+        # It reads commands from descriptor 3 and writes to 4.
+        shell = f'exec "$@" 3<&{theirs_in} 4>&{theirs_out}'
+        self.process = subprocess.Popen(
+            ["sh", "-c", shell, "sh", chromium, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
+            pass_fds=(theirs_in, theirs_out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )
+        os.close(theirs_in)
+        os.close(theirs_out)
+        self.out, self.into = os.fdopen(ours_out, "wb", 0), os.fdopen(ours_in, "rb")
+        self.count, self.buffer, self.events, self.session = 0, b"", [], None
+        self.collected, self.received = set(), []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.call(f"{domain}.enable")
+
+    def read(self):
+        while b"\0" not in self.buffer:
+            more = self.into.read1(1 << 16)
+            if not more:
+                raise SystemExit("the browser ended")
+            self.buffer += more
+        message, self.buffer = self.buffer.split(b"\0", 1)
+        return json.loads(message)
+
+    def call(self, method, **params):
+        self.count += 1
+        message = {"id": self.count, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        self.out.write(json.dumps(message).encode() + b"\0")
+        while True:
+            message = self.read()
+            if message.get("id") == self.count:
+                if "error" in message:
+                    raise RuntimeError(f"{method}: {message['error']}")
+                return message["result"]
+            if "method" in message:
+                self.events.append(message)
+
+    def run(self, script):
+        try:
+            outcome = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        except RuntimeError:
+            return None  # The page is being loaded.
+        assert "exceptionDetails" not in outcome, outcome
+        return outcome["result"].get("value")
+
+    def screen(self):
+        return self.run("document.body?.dataset.screen")
+
+    def wait(self, screen):
+        self.until(f"document.body?.dataset.screen === '{screen}'", lambda: f"the screen is {self.screen()}")
+
+    def until(self, condition, otherwise=lambda: ""):
+        end = time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
+            if self.run(condition):
+                return
+            time.sleep(0.01)
+        raise SystemExit(f"waited for {condition}; {otherwise()}")
+
+    def press(self, key):
+        codes = {" ": ("Space", 32), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
+        code, number = codes.get(key, (f"Key{key.upper()}", ord(key.upper()[0])))
+        fields = {"key": key, "code": code, "windowsVirtualKeyCode": number}
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **fields, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **fields)
+
+    def click(self, selector):
+        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])(document.querySelector('{selector}').getBoundingClientRect())")
+        for kind in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
+
+    def picture(self, path):
+        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+
+    def open(self, address):
+        self.call("Page.navigate", url=address)
+
+    def when(self, screen, script):
+        """Has the page do something the next time that it shows a screen, at once, however busy the machine is."""
+        self.run(f"""new MutationObserver((_, observer) => {{
+            if (document.body.dataset.screen !== '{screen}') return;
+            observer.disconnect();
+            {script}
+        }}).observe(document.body, {{ attributes: true }})""")
+
+    def reload(self):
+        self.run("window.old = true")
+        self.call("Page.reload")
+        self.until("!window.old && document.body?.dataset.screen !== 'loading'")
+
+    def collect(self):
+        """Keeps what was received since the last time: a page that is loaded anew forgets it."""
+        events = {e["method"]: [] for e in self.events}
+        for event in self.events:
+            events[event["method"]].append(event["params"])
+        done = {e["requestId"] for e in events.get("Network.loadingFinished", [])} - self.collected
+        for event in events.get("Network.responseReceived", []):
+            if event["requestId"] not in done:
+                continue
+            self.collected.add(event["requestId"])
+            try:
+                body = self.call("Network.getResponseBody", requestId=event["requestId"])
+            except RuntimeError:
+                continue  # Forgotten already.
+            raw = base64.b64decode(body["body"]) if body["base64Encoded"] else body["body"].encode()
+            self.received.append((event["response"]["url"], event["response"]["mimeType"], raw))
+
+    def requests(self):
+        return [e["params"]["request"]["url"] for e in self.events if e["method"] == "Network.requestWillBeSent"]
+
+    def complaints(self):
+        errors = [e["params"] for e in self.events if e["method"] == "Runtime.exceptionThrown"]
+        return errors + [
+            e["params"]["entry"] for e in self.events
+            # While the program is away, nobody answers.
+            if e["method"] == "Log.entryAdded" and "ERR_CONNECTION" not in e["params"]["entry"]["text"]
+            and "ERR_EMPTY_RESPONSE" not in e["params"]["entry"]["text"]
+        ]
+
+    def close(self):
+        self.session = None
+        self.call("Browser.close")
+        self.process.wait(timeout=PATIENCE_S)
+        shutil.rmtree(self.profile, ignore_errors=True)
+
+
+def chunks(png):
+    """Kinds and lengths of the chunks of a PNG."""
+    at, found = 8, []
+    while at < len(png):
+        (length,) = struct.unpack(">I", png[at : at + 4])
+        found.append((png[at + 4 : at + 8], length))
+        at += 12 + length
+    return found
+
+
+def check_secrets(browser, address, names):
+    """Nothing that was sent before the end tells what is real, and nothing came from elsewhere."""
+    urls = browser.requests()
+    assert urls and all(url.startswith((address, "data:", "about:")) for url in urls), urls
+    kinds = set()
+    words = [*names, "truth", "real_field", "sha256", '"side"', '"seed"', "/out/", "session.json"]
+    received = browser.received
+    patches = [raw for url, _, raw in received if "/patch/" in url and raw.startswith(b"\x89PNG")]
+    assert len(patches) >= 12, len(patches)
+    assert len({len(raw) for raw in patches}) == 1, "sizes differ"
+    for raw in patches:
+        kinds.add(tuple(chunks(raw)))
+    assert len(kinds) == 1 and {kind for kind, _ in next(iter(kinds))} == {b"IHDR", b"IDAT", b"IEND"}, kinds
+    shapes = set()
+    for url, mime, raw in received:
+        if url.endswith("/result") or "/patch/" in url:
+            continue
+        text = raw.decode()
+        for word in words:
+            assert word not in text, f"{url} says {word}"
+        if url.endswith(("/state", "/shown", "/answer")) and mime == "application/json":
+            shapes.add(tuple(json.loads(text)))
+    assert all("patches" in shape or shape == ("error",) for shape in shapes) and len(shapes) <= 2, shapes
+
+
+def rows_of(folder):
+    with open(folder / "trials.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def wilson(hits, of):
+    z, p = 1.959963984540054, hits / of
+    centre, half = p + z * z / (2 * of), z * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
+    return [(centre - half) / (1 + z * z / of), (centre + half) / (1 + z * z / of)]
+
+
+def check_results(folder, given, keys, showings, exposure_ms):
+    rows = rows_of(folder)
+    assert [row["answer"] for row in rows] == given, ([row["answer"] for row in rows], given)
+    assert [int(row["showings"]) for row in rows] == showings, [row["showings"] for row in rows]
+    for row in rows:
+        exposure, frames = float(row["exposure_ms"]), int(row["frames"])
+        assert exposure_ms - 20 <= exposure <= exposure_ms + 500 and frames >= 2, row
+        assert 0 < float(row["response_ms"]) < 1e5 and float(row["pixel_ratio"]) == 1, row
+        assert row["correct"] == str(int(row["truth"] == row["answer"]))
+    counted = [row for row in rows if row["stage"] == "counted"]
+    positive, negative = keys
+    count = lambda truth, answer: sum(row["truth"] == truth and row["answer"] == answer for row in counted)
+    counts = {
+        "tp": count(positive, positive), "fp": count(negative, positive),
+        "tn": count(negative, negative), "fn": count(positive, negative),
+    }
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["finished"] and summary["row"]["counts"] == counts, (summary["row"], counts)
+    accuracy = summary["row"]["accuracy"]
+    assert accuracy["hits"] == counts["tp"] + counts["tn"] and accuracy["of"] == len(counted)
+    for ours, theirs in zip(wilson(accuracy["hits"], accuracy["of"]), accuracy["wilson_95"].values()):
+        assert abs(ours - theirs) < 1e-9
+    return summary, rows
+
+
+def yes_no(program, browser, real, synthetic, folder):
+    words = [real, synthetic, "--out", folder / "out", "--subject", "ann", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
+    study = Study(program, words)
+    address, given, showings = study.address, [], []
+    browser.open(address)
+    browser.wait("welcome")
+    browser.picture(folder / "welcome.png")
+    # A key while the patch is shown is too early, and must not count.
+    browser.when("patch", "document.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowLeft' }))")
+    browser.press(" ")
+    ways = [("press", "ArrowLeft", "real"), ("click", "#second", "synthetic"), ("press", "s", "synthetic"), ("click", "#first", "real")]
+    for trial in range(12):
+        again = 1
+        if trial == 3:
+            browser.wait("pause")
+            browser.run("delete document.hidden")
+            browser.picture(folder / "covered.png")
+            browser.click("#resume")
+            again = 2
+        if trial == 5:
+            browser.until("['patch', 'question'].includes(document.body.dataset.screen)")
+            browser.picture(folder / "patch.png")
+        browser.wait("question")
+        browser.collect()
+        if trial == 1:
+            browser.picture(folder / "question.png")
+        if trial == 4:
+            # Loaded anew while the question is asked: it is still asked, and the patch not shown again.
+            browser.run("reported.then(() => true)")
+            browser.reload()
+            browser.wait("question")
+        if trial == 2:
+            # The page is covered while the next patch is shown.
+            browser.when("patch", """
+                Object.defineProperty(document, "hidden", { get: () => true, configurable: true });
+                document.dispatchEvent(new Event("visibilitychange"));
+            """)
+        if trial == 6:
+            code, _ = study.interrupt()
+            assert code == 130, code
+        way, what, answer = ways[trial % 4]
+        getattr(browser, way)(what)
+        if trial == 6:
+            browser.wait("lost")
+            browser.picture(folder / "lost.png")
+            study = Study(program, words)
+            assert study.address == address, "the open page finds its server again"
+        given.append(answer)
+        showings.append(again)
+        if trial == 1:
+            browser.wait("pause")
+            browser.picture(folder / "pause.png")
+            browser.press(" ")
+        if trial == 7:
+            # Loaded anew between trials, perhaps while a patch was on its way.
+            browser.until("state.answered === 8")
+            browser.reload()
+            browser.wait("pause")
+            browser.press(" ")
+            showings.append(None)
+    browser.wait("result")
+    browser.collect()
+    browser.run("document.getElementById('more').open = true")
+    browser.picture(folder / "result.png")
+    subject = folder / "out/ann"
+    # Whether the patch had been sent before the page was loaded anew is a matter of moments.
+    at = showings.index(None)
+    showings[at : at + 2] = [int(rows_of(subject)[at]["showings"])]
+    assert showings[at] in (1, 2)
+    summary, _ = check_results(subject, given, ("real", "synthetic"), showings, EXPOSURE_MS)
+    shown = browser.run("[...document.querySelectorAll('#row tbody tr')].map(r => [...r.cells].map(c => c.firstChild.textContent))")
+    counts = summary["row"]["counts"]
+    assert shown[0][:5] == ["ann", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
+    assert shown[1][0] == "x"
+    names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [str(real), str(synthetic)]
+    check_secrets(browser, address, names)
+    code, out = study.interrupt()
+    assert code == 0 and "accuracy" in out, (code, out)
+
+
+def pairs(program, browser, real, synthetic, folder):
+    words = [real, synthetic, "--out", folder / "pairs", "--design", "2afc", "--trials", 4, "--training", 1,
+             "--exposure-ms", LONG_EXPOSURE_MS]
+    study = Study(program, words)
+    browser.open(study.address)
+    browser.wait("welcome")
+    browser.picture(folder / "pairs-welcome.png")
+    browser.click("#begin")
+    given = []
+    for trial in range(5):
+        if trial == 2:
+            # A picture of what is gone again is no harm.
+            browser.until("['patch', 'question'].includes(document.body.dataset.screen)")
+            browser.picture(folder / "pairs-patch.png")
+        browser.wait("question")
+        if trial == 2:
+            browser.picture(folder / "pairs-question.png")
+        what, answer = [("ArrowLeft", "left"), ("ArrowRight", "right")][trial % 2]
+        browser.press(what)
+        given.append(answer)
+        if trial == 0:
+            browser.wait("pause")
+            browser.press(" ")
+    browser.wait("result")
+    _, rows = check_results(folder / "pairs/1", given, ("left", "right"), [1] * 5, LONG_EXPOSURE_MS)
+    assert all(row["real_field"] and row["synthetic_field"] for row in rows)
+    assert study.interrupt()[0] == 0
+
+
+def montage(browser, folder):
+    """Four pages beside each other, for the README."""
+    names = ["welcome", "patch", "question", "result"]
+    pages = [base64.b64encode((folder / f"{name}.png").read_bytes()).decode() for name in names]
+    images = "".join(f'<img src="data:image/png;base64,{page}" width="638">' for page in pages)
+    browser.open("about:blank")
+    browser.until("location.href === 'about:blank'")
+    browser.run(f"""document.body.style = 'margin: 0; background: #555; display: flex; flex-wrap: wrap; gap: 4px';
+        document.body.innerHTML = '{images}'; Promise.all([...document.images].map((image) => image.decode())).then(() => true)""")
+    browser.picture(folder / "pages.png")
+
+
+def main():
+    program, chromium, real, synthetic, folder = sys.argv[1:]
+    real, synthetic, folder = Path(real), Path(synthetic), Path(folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    browser = Browser(chromium)
+    try:
+        yes_no(program, browser, real, synthetic, folder)
+        pairs(program, browser, real, synthetic, folder)
+        montage(browser, folder)
+        complaints = browser.complaints()
+        assert not complaints, complaints
+    finally:
+        browser.close()
+    pooled = subprocess.run([program, "study", "--results", folder / "out"], check=True, capture_output=True, text=True).stdout
+    assert "ann" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
+    print(f"the experiment went through in {Path(chromium).name}; screenshots are in {folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+//! Whether people could take part in a study.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::arguments::Arguments;
+use crate::outcome::Outcome;
+use crate::python::Python;
+use crate::workspace::Workspace;
+use crate::{Chore, dataset, shell};
+
+pub(crate) const CHORE: Chore = Chore {
+    name: "browser",
+    usage: "",
+    about: "goes through `papsynth study` in headless Chromium, with keyboard and mouse",
+    details: "Shortened, with the page and the program started anew in the middle; holds results against what was clicked, and looks \
+              that nothing left loopback and no answer was in what was sent. Screenshots go to target/browser/study. Where \
+              Chromium is missing it is installed, by root on Debian; else it is left out, with a sentence; a failure where CI \
+              is set.",
+    run,
+};
+
+/// What Chromium goes by on different systems.
+const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+    arguments.finish()?;
+    let script = workspace.root.join("crates/papsynth-study/tests/browser.py");
+    ensure!(script.exists(), "{} is missing", workspace.shown(&script));
+    let python = match Python::system() {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
+    };
+    let Some(chromium) = chromium() else {
+        return Outcome::skipped_unless_ci("there is no Chromium on this machine, nor a way to install it".to_owned());
+    };
+    let folder = workspace.target.join("browser");
+    let (synthetic, other, real) = (folder.join("synthetic"), folder.join("other"), folder.join("real"));
+    let small = ["--frames", "2", "--set", "field.width_px=640", "--set", "field.height_px=520"];
+    dataset::generate(workspace, &synthetic, small)?;
+    // What stands for real: pictures without truth, of another preset. Whether it is makes no difference to the page.
+    dataset::generate(workspace, &other, small.iter().chain(&["--preset", "high-grade", "--seed", "1"]))?;
+    copy_pictures(&other.join("images"), &real)?;
+    let program = workspace.target.join("release").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
+    ensure!(program.exists(), "{} was not built", workspace.shown(&program));
+    let mut command = Command::new(python);
+    command.arg(&script).arg(program).arg(chromium).args([&real, &synthetic, &folder.join("study")]);
+    shell::run(&mut command)?;
+    Ok(Outcome::Done)
+}
+
+/// The name of a Chromium that answers, installed if need be and possible.
+fn chromium() -> Option<&'static str> {
+    let find = || NAMES.into_iter().find(|name| shell::answers(Command::new(name).arg("--version")));
+    find().or_else(|| {
+        let is_root = shell::output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0");
+        if !is_root || !shell::answers(Command::new("apt-get").arg("--version")) {
+            return None;
+        }
+        let apt = |words: &[&str]| {
+            shell::run(Command::new("apt-get").args(words).env("DEBIAN_FRONTEND", "noninteractive")).ok()
+        };
+        apt(&["update", "--quiet"])?;
+        apt(&["install", "--quiet", "--yes", "--no-install-recommends", "chromium"])?;
+        find()
+    })
+}
+
+/// Copies the pictures of a folder into one that is empty before.
+fn copy_pictures(from: &Path, to: &Path) -> Result<()> {
+    if to.exists() {
+        fs::remove_dir_all(to).with_context(|| format!("cannot empty {}", to.display()))?;
+    }
+    fs::create_dir_all(to).with_context(|| format!("cannot make {}", to.display()))?;
+    for entry in fs::read_dir(from).with_context(|| format!("cannot read {}", from.display()))? {
+        let entry = entry?;
+        fs::copy(entry.path(), to.join(entry.file_name()))
+            .with_context(|| format!("cannot copy to {}", to.display()))?;
+    }
+    Ok(())
+}
