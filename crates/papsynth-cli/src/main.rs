@@ -8,6 +8,7 @@ mod generate;
 mod init;
 mod inspect;
 mod interrupt;
+mod judge;
 mod learn;
 mod nearest;
 mod preview;
@@ -58,6 +59,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Preview(args) => preview::run(&args),
         Verb::Learn(args) => learn::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
+        Verb::Judge(args) => judge::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {

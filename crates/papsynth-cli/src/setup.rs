@@ -55,9 +55,9 @@ impl Setup {
     }
 }
 
-/// The model of a file, or the one that ships.
+/// The model that ships, with the classes of a file.
 pub(crate) fn read_model(path: Option<&Path>) -> Result<Model, Failure> {
     let Some(path) = path else { return Ok(Model::builtin()) };
-    let (name, text) = text_file::read(path, LARGEST_MODEL, "a model, as `papsynth learn` writes it")?;
-    Model::from_json(&text).map_err(|error| Failure::input(Complaint::new(format!("{name}: {error}"))))
+    let (name, text) = text_file::read(path, LARGEST_MODEL, "a model or a class file")?;
+    Model::builtin().with(&text).map_err(|error| Failure::input(Complaint::new(format!("{name}: {error}"))))
 }

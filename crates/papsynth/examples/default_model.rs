@@ -20,7 +20,7 @@ use std::path::Path;
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
 use papsynth::model::{
-    CellClass, ChromatinStatistics, CytoplasmStatistics, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics,
+    CellClass, ChromatinStatistics, CytoplasmStatistics, Form, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics,
     Shapes,
 };
 
@@ -156,6 +156,9 @@ fn blank(facts: &Facts) -> CellClass {
             radius_um: LogNormal { median: round(libm::exp(facts.cell[0]) / 2.0), log_sd: facts.cell[1] },
             absorbance: LogNormal { median: facts.cytoplasm[0], log_sd: facts.cytoplasm[1] },
             rim_to_centre: RIM_TO_CENTRE.to_vec(),
+            form: Form::default(),
+            pliability: 1.0,
+            halo: None,
             shapes: shapes.clone(),
         },
         nucleus: NucleusStatistics {
@@ -164,6 +167,9 @@ fn blank(facts: &Facts) -> CellClass {
                 log_sd: facts.nucleus[1] / 2.0,
             },
             size_correlation: facts.correlation,
+            form: Form::default(),
+            nucleoli: 0.0,
+            polarity: 0.0,
             off_centre: Normal { mean: facts.off_centre[0], sd: facts.off_centre[1] },
             absorbance: Normal { mean: 0.33, sd: 0.09 },
             chromatin: ChromatinStatistics {

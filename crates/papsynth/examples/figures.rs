@@ -5,7 +5,7 @@
 use image::GrayImage;
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Chromatin, Layout, Number, PhotonNoise, Preset, Recipe};
+use papsynth::recipe::{CellMix, Chromatin, Debris, Layout, Number, PhotonNoise, Preset, Recipe};
 use papsynth::scene::Kind;
 use papsynth::truth::{ObjectTruth, Part};
 use papsynth::{Engine, Frame, Inputs};
@@ -70,10 +70,7 @@ fn sheet(pictures: &[GrayImage], columns: u32) -> GrayImage {
 fn empty() -> Recipe {
     let mut recipe = Preset::Lbc.recipe();
     recipe.cells.clear();
-    recipe.debris.leukocytes.clusters = 0.0.into();
-    recipe.debris.bacilli.clusters = 0.0.into();
-    recipe.debris.speckles.count = 0.0.into();
-    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe.debris = Debris::none();
     recipe.slide.depth_um = 0.0.into();
     recipe.slide.stacking_um = 0.0.into();
     recipe.layout = Layout::Uniform {};

@@ -8,7 +8,7 @@
 use image::{GrayImage, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Illumination, Imaging, Layout, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition};
+use papsynth::recipe::{Debris, Illumination, Imaging, Layout, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition};
 use papsynth::scene::{Body, Scene, SceneOptics};
 use papsynth::{Engine, Error, Inputs, Threads};
 
@@ -40,10 +40,7 @@ fn bare() -> Recipe {
     recipe.slide.depth_um = 0.0.into();
     recipe.slide.stacking_um = 0.0.into();
     recipe.cells.clear();
-    recipe.debris.leukocytes.clusters = 0.0.into();
-    recipe.debris.bacilli.clusters = 0.0.into();
-    recipe.debris.speckles.count = 0.0.into();
-    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
     recipe.background.scatter = 0.0.into();
     recipe.background.level = 0.8.into();

@@ -152,7 +152,7 @@ impl Detector {
         self.develop(levels, grey);
     }
 
-    /// What can be done with a whole frame alone: charge that crosses rows, and JPEG.
+    /// What can be done with a whole frame alone: charge that crosses rows.
     pub(crate) fn finish(&self, width: usize, keys: &[u64], grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
             let Developing { levels, saturated, frame, .. } = developing;
@@ -165,6 +165,10 @@ impl Detector {
             }
             self.develop(levels, grey);
         }
+    }
+
+    /// JPEG, of a finished frame.
+    pub(crate) fn compress(&self, width: usize, grey: &mut [u16]) {
         match (&self.jpeg, self.channels.len()) {
             (None, _) => {}
             (Some(jpeg), 1) => jpeg.frame(grey, width),

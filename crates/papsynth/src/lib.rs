@@ -5,11 +5,13 @@
     reason = "pixels are f32, and the recipe's check bounds every size and place far below what an integer holds"
 )]
 
+mod debris;
 mod detect;
 mod engine;
 mod error;
 mod exp10;
 mod frame;
+mod fuse;
 pub mod key;
 pub mod learn;
 pub mod model;

@@ -4,13 +4,14 @@ use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
 use crate::frame::{Finished, Plane};
+use crate::fuse;
 use crate::phantom::{self, Phantom, Studio};
 use crate::recipe::Restore;
 use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
 use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Passage, Slide};
-use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts};
+use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts, with_layers};
 
 /// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
 #[derive(Debug, Default)]
@@ -173,6 +174,7 @@ impl Rendering {
                 number += 1;
             }
         }
+        let mut objects = with_layers(objects);
         for group in Group::ALL {
             let chosen: Vec<usize> = (0..objects.len()).filter(|&i| objects[i].group() == group).collect();
             let painted: Vec<(u32, f64, &Mask)> =
@@ -200,18 +202,15 @@ impl Rendering {
             _ => "",
         };
         let (class, stain) = match &object.body {
-            Body::Cell(body) if piece.part == Part::Nucleus => (body.class.clone(), body.nucleus.absorbance),
-            Body::Cell(body) => (body.class.clone(), body.cytoplasm_absorbance),
-            Body::Leukocyte { absorbance, .. }
-            | Body::Bacillus { absorbance, .. }
-            | Body::Speckle { absorbance, .. }
-            | Body::OutOfFocus { absorbance, .. } => (kind.name().to_owned(), *absorbance),
+            Body::Cell(body) if piece.part == Part::Nucleus => (body.class.as_str(), body.nucleus.absorbance),
+            Body::Cell(body) => (body.class.as_str(), body.cytoplasm_absorbance),
+            other => (kind.name(), other.absorbance()),
         };
         ObjectTruth {
             id: object.id,
             part: piece.part,
             kind,
-            class,
+            class: class.to_owned(),
             bethesda: object.bethesda.clone(),
             traits: phantom.traits.join(";"),
             cluster: object.cluster,
@@ -228,7 +227,9 @@ impl Rendering {
                 .scene
                 .planes_um
                 .iter()
-                .map(|plane| self.scene.in_focus_um(*plane) - object.depth_um)
+                .map(|plane| {
+                    self.scene.in_focus_um(self.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um
+                })
                 .collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
         }
@@ -312,9 +313,14 @@ impl<'a> Exposure<'a> {
 
     /// What is done to a whole frame.
     fn finish(&mut self) {
-        let Plane { grey, saturated, .. } = &mut *self.plane;
+        let Plane { grey, noise_free, saturated, .. } = &mut *self.plane;
         let width = self.rendering.scene.view.width;
         self.rendering.detector.finish(width, &self.keys, grey, self.developing);
+        let scene = &self.rendering.scene;
+        if let Some(fusion) = &scene.fusion {
+            fuse::correlate(grey, noise_free, width, scene.channels(), fusion, scene.camera.bits);
+        }
+        self.rendering.detector.compress(width, grey);
         *saturated = self.developing.saturated();
     }
 }

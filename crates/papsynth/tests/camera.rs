@@ -2,7 +2,9 @@
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Binning, CameraPreset, Illumination, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition};
+use papsynth::recipe::{
+    Binning, CameraPreset, Debris, Illumination, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
+};
 use papsynth::{Engine, Frame, Inputs};
 
 /// An empty field under an even lamp.
@@ -11,10 +13,7 @@ fn empty() -> Recipe {
     recipe.field.width_px = 160.0.into();
     recipe.field.height_px = 128.0.into();
     recipe.cells.clear();
-    recipe.debris.leukocytes.clusters = 0.0.into();
-    recipe.debris.bacilli.clusters = 0.0.into();
-    recipe.debris.speckles.count = 0.0.into();
-    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
     recipe.background.scatter = 0.0.into();
     recipe.background.level = 0.8.into();

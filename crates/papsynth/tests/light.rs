@@ -4,7 +4,9 @@
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe};
+use papsynth::recipe::{
+    Debris, DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe,
+};
 use papsynth::recipe::{Rendition, Restore};
 use papsynth::scene::{Body, Kind};
 use papsynth::truth::Part;
@@ -30,10 +32,7 @@ fn small() -> Recipe {
 fn empty() -> Recipe {
     let mut recipe = small();
     recipe.cells.clear();
-    recipe.debris.leukocytes.clusters = 0.0.into();
-    recipe.debris.bacilli.clusters = 0.0.into();
-    recipe.debris.speckles.count = 0.0.into();
-    recipe.debris.out_of_focus.count = 0.0.into();
+    recipe.debris = Debris::none();
     recipe
 }
 
@@ -313,6 +312,7 @@ fn a_grey_stain_is_the_same_at_every_wavelength() {
     recipe.stain.nucleus = grey;
     recipe.stain.bacillus = grey;
     recipe.stain.speckle = grey;
+    recipe.debris = Preset::Paper2015.recipe().debris;
     recipe.stain.slide_balance = 0.0.into();
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.cell_balance = 0.0.into();
@@ -424,7 +424,14 @@ fn specks_of_either_form_have_the_size_they_were_given() {
             };
             assert!((speck.area_um2 * 16.0 - expected).abs() < 0.1 * expected, "{form:?}: {}", speck.area_um2 * 16.0);
         }
-        assert!(frame.finished.scene.objects.iter().all(|o| matches!(o.body, Body::Speckle { dilations: 2, .. })));
+        assert!(
+            frame
+                .finished
+                .scene
+                .objects
+                .iter()
+                .all(|o| matches!(o.body, Body::Speckle(speckle) if speckle.dilations == 2))
+        );
     }
 }
 
@@ -442,7 +449,7 @@ fn nuclei_from_images_are_not_blurred_twice() {
     }];
     let mut recipe = small();
     recipe.debris = empty().debris;
-    recipe.cells.remove("superficial");
+    recipe.cells.retain(|class, _| class == "intermediate");
     recipe.nucleus.pyknotic = 0.0.into();
     recipe.slide.depth_um = 0.0.into();
     recipe.slide.stacking_um = 0.0.into();

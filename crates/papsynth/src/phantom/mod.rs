@@ -1,21 +1,19 @@
 //! From a scene to phantoms: what each object absorbs when it is in focus, and the exact cover of its parts.
 //!
-//! One file a kind of object. A phantom depends on its object and on the object's own streams alone.
+//! Cells are made here, everything else in the file of its kind, in [`crate::debris`]. A phantom depends on its object and on the object's own streams alone.
 
-mod bacillus;
 mod cell;
 mod chromatin;
-mod leukocyte;
+mod form;
 mod nucleus;
-mod out_of_focus;
-mod pools;
-mod speckle;
+pub(crate) mod pools;
 mod studio;
 pub(crate) mod tile;
-mod wobble;
+pub(crate) mod wobble;
 
 use dye_spectra::Amounts;
 
+use crate::debris;
 use crate::scene::{Body, Object, Scene};
 use crate::truth::Part;
 
@@ -43,7 +41,7 @@ pub(crate) struct Piece {
 }
 
 /// What an object absorbs.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Phantom {
     /// Its parts, from the outside in.
     pub(crate) pieces: Vec<Piece>,
@@ -68,37 +66,41 @@ pub(crate) fn make(
             _ => None,
         })
         .collect();
-    let mut cells = cell::make(studio, scene, pools, &cells)?.into_iter();
-    Ok(objects
-        .iter()
-        .map(|object| match &object.body {
-            Body::Cell(_) => cells.next().unwrap_or_else(|| Phantom { pieces: Vec::new(), traits: Vec::new() }),
-            Body::Leukocyte { .. } => leukocyte::make(scene, object),
-            Body::Bacillus { .. } => bacillus::make(scene, object),
-            Body::Speckle { .. } => speckle::make(scene, object),
-            Body::OutOfFocus { .. } => out_of_focus::make(scene, object),
-        })
-        .collect())
+    let mut made = cell::make(studio, scene, pools, &cells)?;
+    for ((object, _), phantom) in cells.iter().zip(&mut made) {
+        debris::cover(scene, pools, object, phantom);
+    }
+    let mut cells = made.into_iter();
+    let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
+    Ok(objects.iter().map(&mut phantom).map(Option::unwrap_or_default).collect())
 }
 
 /// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.
-const LEAST_ABSORBANCE: f64 = 1e-6;
+pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
 
 /// Number of objects that are worth making together: the lanes of a batch of sheets.
 pub(crate) const BATCH: usize = 16;
 
 impl Phantom {
     /// A phantom without parts of its own.
-    fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
+    pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
         let piece = Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false, dyes, phase_rad: 0.0 };
         Self { pieces: vec![piece], traits: Vec::new() }
     }
 
     /// The same, through which light comes late.
-    fn refracting(mut self, phase_rad: f64, absorbance: f64) -> Self {
+    pub(crate) fn refracting(mut self, phase_rad: f64, absorbance: f64) -> Self {
         for piece in &mut self.pieces {
             piece.phase_rad = phase_rad / absorbance.max(LEAST_ABSORBANCE);
         }
+        self
+    }
+
+    /// The same with something in it that other dyes stain: it counts as part of the whole.
+    pub(crate) fn stained(mut self, absorbance: Tile, dyes: Amounts) -> Self {
+        let coverage = Tile { origin: absorbance.origin, width: 1, values: vec![0.0] };
+        let part = Part::Whole;
+        self.pieces.push(Piece { part, absorbance, coverage, area_px: 0.0, imaged: false, dyes, phase_rad: 0.0 });
         self
     }
 }

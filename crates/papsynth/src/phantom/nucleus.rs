@@ -1,12 +1,12 @@
 //! The nucleus of a cell: outline, chromatin, rim.
 
-use super::Piece;
+use super::{Piece, form};
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area};
-use super::wobble::placed;
+use super::wobble::{placed, wobbled_circle};
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::{CellBody, Object, Scene};
+use crate::scene::{CellBody, NucleusBody, Object, Scene};
 use crate::truth::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
@@ -38,7 +38,7 @@ pub(super) fn make(
     let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
-    let mut outline = drawn.descriptors.outline(POINTS);
+    let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }
@@ -68,11 +68,22 @@ pub(super) fn make(
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
     // An imaged donor shows the rim of its own nucleus.
     let rim_strength = if imaged { 0.0 } else { nucleus.rim as f32 };
+    let mut thickness = coverage.blank();
+    if imaged {
+        // A donor has its own.
+        thickness.values.fill(1.0);
+    } else {
+        dome(&mut thickness, &outline, nucleus);
+    }
     let mut absorbance = coverage.clone();
     for (i, value) in absorbance.values.iter_mut().enumerate() {
         let rim = (coverage.values[i] - inner.values[i]).max(0.0) * rim_strength;
-        let level = nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i];
+        let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
         *value *= level.max(PALEST * nucleus.absorbance as f32);
+    }
+    let mut own = scene.key.stream("cell", object.number, "nucleoli");
+    for _ in 0..nucleus.nucleoli {
+        add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
     }
     Ok(Piece {
         part: Part::Nucleus,
@@ -83,6 +94,53 @@ pub(super) fn make(
         dyes: nucleus.dyes,
         phase_rad: 0.0,
     })
+}
+
+/// Thickness of a nucleus relative to its mean: a plate of even thickness and an ellipsoid mixed, thicker towards one side.
+fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
+    let share = nucleus.dome;
+    /// Mean over a disc of the chord √(1 − ρ²) through a ball.
+    const MEAN_CHORD: f64 = 2.0 / 3.0;
+    // The ellipse of the outline's second moments: those of a curve's points about a circle of radius r are r²/2.
+    let centre = fsd_shape::centroid(outline);
+    let moment = |a: usize, b: usize| {
+        2.0 * outline.iter().map(|p| (p[a] - centre[a]) * (p[b] - centre[b])).sum::<f64>() / outline.len() as f64
+    };
+    let (xx, xy, yy) = (moment(0, 0), moment(0, 1), moment(1, 1));
+    let determinant = (xx * yy - xy * xy).max(f64::MIN_POSITIVE);
+    thickness.for_each(|p, value| {
+        let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
+        let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+        let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
+        let slant = (dx * nucleus.wedge[0] + dy * nucleus.wedge[1]) / determinant.sqrt().sqrt();
+        *value = ((1.0 - share + share * chord) * (1.0 + slant).max(0.0)) as f32;
+    });
+}
+
+/// Radius of a nucleolus, µm: from, to.
+const NUCLEOLUS_UM: [f64; 2] = [0.5, 1.1];
+
+/// Its absorbance relative to the nucleus's.
+const NUCLEOLUS: f64 = 0.8;
+
+/// A round, even, dark body inside a nucleus.
+fn add_nucleolus(
+    absorbance: &mut Tile,
+    outline: &[Point],
+    centre: Point,
+    strength: f64,
+    pixel_um: f64,
+    rng: &mut crate::key::Stream,
+) {
+    let radius = random::between(NUCLEOLUS_UM[0], NUCLEOLUS_UM[1], rng) / pixel_um;
+    let rim = outline[random::below(outline.len(), rng)];
+    let share = random::between(0.0, 0.6, rng);
+    let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
+    let mut cover = absorbance.blank();
+    cover.cover(&wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
+    for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
+        *value += cover * (NUCLEOLUS * strength) as f32;
+    }
 }
 
 /// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.

@@ -39,11 +39,35 @@ pub struct Focus {
     /// Travel of the stage to the middle plane, µm, -100 to 100; at 0 the middle of the slide is in focus, at more what
     /// lies nearer to the objective.
     pub centre_um: Number,
+    /// What becomes of the planes.
+    pub picture: Picture,
+    /// How much of its noise a fused picture shares with the next pixel of the row, 0 to 0.5.
+    pub fused_noise_across: Number,
+    /// The same with the next pixel of the column, 0 to 0.5.
+    pub fused_noise_down: Number,
+}
+
+/// What becomes of the planes of a focus stack.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Picture {
+    /// Each is a picture.
+    Planes,
+    /// They are fused to one picture of extended focus: everything as the plane that shows it sharpest, with noise that
+    /// neighbouring pixels share.
+    Extended,
 }
 
 impl Default for Focus {
     fn default() -> Self {
-        Self { planes: 1.0.into(), step_um: 0.5.into(), centre_um: 0.0.into() }
+        Self {
+            planes: 1.0.into(),
+            step_um: 0.5.into(),
+            centre_um: 0.0.into(),
+            picture: Picture::Planes,
+            fused_noise_across: 0.2.into(),
+            fused_noise_down: 0.4.into(),
+        }
     }
 }
 
@@ -450,8 +474,8 @@ impl Default for Camera {
         Self {
             pixel_um: 6.45.into(),
             bits: 8.0.into(),
-            full_well_e: 17_600.0.into(),
-            read_noise_e: 8.0.into(),
+            full_well_e: 32_600.0.into(),
+            read_noise_e: 138.0.into(),
             read_noise_rms_e: 0.0.into(),
             offset_dn: 0.0.into(),
             photon_noise: PhotonNoise::Exact,

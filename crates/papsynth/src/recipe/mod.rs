@@ -5,7 +5,6 @@
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
 mod check;
-mod debris;
 mod imaging;
 mod number;
 mod presets;
@@ -17,16 +16,19 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use crate::debris::{
+    Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
+    NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
+};
 pub use check::Problem;
-pub use debris::{Bacilli, Debris, Leukocytes, NucleusForm, OutOfFocus, SpeckForm, Speckles};
 pub use imaging::{
     Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,
-    Rendition, Subsampling,
+    Picture, Rendition, Subsampling,
 };
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use specimen::{
-    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
+    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
     Slide, Stain, TintMix,
 };
 

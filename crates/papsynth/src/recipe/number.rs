@@ -79,6 +79,12 @@ impl Number {
         Self::law(Law::LogNormal(median, log_sd))
     }
 
+    /// One of these values, all equally likely.
+    #[must_use]
+    pub fn choice(values: impl Into<Vec<f64>>) -> Self {
+        Self::law(Law::Choice(values.into()))
+    }
+
     fn law(law: Law) -> Self {
         Self::Drawn { law, min: f64::NEG_INFINITY, max: f64::INFINITY }
     }
@@ -89,6 +95,15 @@ impl Number {
         match self {
             Self::Drawn { law, min, max } => Self::Drawn { law, min: min.max(floor), max },
             Self::Fixed(value) => Self::Fixed(value.max(floor)),
+        }
+    }
+
+    /// Cuts the number above.
+    #[must_use]
+    pub fn at_most(self, ceiling: f64) -> Self {
+        match self {
+            Self::Drawn { law, min, max } => Self::Drawn { law, min, max: max.min(ceiling) },
+            Self::Fixed(value) => Self::Fixed(value.min(ceiling)),
         }
     }
 
@@ -127,6 +142,18 @@ impl Number {
     /// Draws a value and rounds it to a count.
     pub fn draw_count<R: Rng + ?Sized>(&self, rng: &mut R) -> usize {
         random::count(self.draw(rng))
+    }
+
+    /// What is wrong with this number where something is counted: what is written out must be whole, what is drawn from a
+    /// range is rounded.
+    pub(crate) fn fraction(&self) -> Option<String> {
+        let written: &[f64] = match self {
+            Self::Fixed(value) => &[*value],
+            Self::Drawn { law: Law::Choice(values), .. } => values,
+            Self::Drawn { .. } => &[],
+        };
+        let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
+        Some(format!("{value} is not a whole number"))
     }
 
     /// What is wrong with this number, if it must lie within `low..=high`.

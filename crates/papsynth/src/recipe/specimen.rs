@@ -31,7 +31,7 @@ impl Default for Slide {
             relief_um: 90.0.into(),
             median_um: 20.0.into(),
             stacking_um: 0.6.into(),
-            spacing_um: 9.0.into(),
+            spacing_um: Number::uniform(10.0, 18.0),
             fields: 16,
         }
     }
@@ -88,7 +88,7 @@ pub(super) mod defaults {
     }
 
     pub(crate) fn radius_um() -> Number {
-        Number::uniform(18.0, 45.0)
+        Number::uniform(14.0, 34.0)
     }
 
     pub(crate) fn width_um() -> Number {
@@ -118,6 +118,48 @@ pub struct CellMix {
     pub nucleus_stain: Number,
     /// How likely its cytoplasm is to take each tint.
     pub tints: TintMix,
+    /// How its cells lie together.
+    pub group: Group,
+}
+
+/// How cells of a class lie together.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Group {
+    /// The form of a group.
+    pub form: GroupForm,
+    /// Cells of a group, 1 to 1000; drawn for each group.
+    pub size: Number,
+    /// Distance between the middles of neighbours, relative to their diameter, 0.2 to 3: below 1 they overlap.
+    pub distance: Number,
+}
+
+impl Default for Group {
+    fn default() -> Self {
+        Self { form: GroupForm::Alone, size: 1.0.into(), distance: Number::uniform(0.75, 0.95) }
+    }
+}
+
+impl Group {
+    /// A group of a form, of so many cells.
+    #[must_use]
+    pub fn of(form: GroupForm, size: Number) -> Self {
+        Self { form, size, ..Self::default() }
+    }
+}
+
+/// The form of a group of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GroupForm {
+    /// Every cell has a place of its own, where the layout lets it lie.
+    Alone,
+    /// An irregular heap, each cell beside one that lies there already.
+    Heap,
+    /// One layer, cell beside cell as in a pavement seen from above: the honeycomb of endocervical cells.
+    Honeycomb,
+    /// A row of cells side by side, all turned the same way: the palisade of columnar cells.
+    Palisade,
 }
 
 /// How likely each tint of cytoplasm is, relative to the others.
@@ -154,6 +196,7 @@ impl Default for CellMix {
             cytoplasm_stain: 1.0.into(),
             nucleus_stain: 1.0.into(),
             tints: TintMix::default(),
+            group: Group::default(),
         }
     }
 }
@@ -220,6 +263,20 @@ pub struct Cytoplasm {
     pub excess: Number,
     /// Parts that lie doubled back.
     pub folds: Folds,
+    /// How nearly straight the sides of a cell run between its corners, 0 (not at all) to 1.
+    pub corners: Number,
+    /// Notches in its rim, 0 to 20.
+    pub notches: Number,
+    /// Tongues that stand out of its rim, 0 to 20.
+    pub tongues: Number,
+    /// Wrinkles of a cell, 0 to 100: narrow creases in which the sheet lies doubled.
+    pub wrinkles: Number,
+    /// Thickness that a wrinkle adds at its crest, relative to the flat sheet, 0 to 5.
+    pub wrinkle: Number,
+    /// Width of a wrinkle (standard deviation of its crest), µm, 0.05 to 5.
+    pub wrinkle_um: Number,
+    /// How much denser and more granular the cytoplasm is round the nucleus than outside, 0 to 2.
+    pub endoplasm: Number,
     /// First level of detail: strength of low-frequency Gaussian noise, relative to the cytoplasm's absorbance, 0 to 2.
     pub clouds: Number,
     /// Standard deviation of its smoothing, µm, 0.1 to 100.
@@ -238,6 +295,8 @@ pub struct Cytoplasm {
     pub granules: Number,
     /// Roughness of the rim, µm, 0 to 5: the edge is frayed over about this distance.
     pub fray_um: Number,
+    /// Distance over which the sheet thins out towards its rim, µm, 0 to 10.
+    pub rim_um: Number,
     /// How late light comes through a flat sheet, radians of phase, -3 to 3: thicker parts and folds in proportion. It shows
     /// as bright and dark rims that change places when the focus passes.
     pub phase_rad: Number,
@@ -250,15 +309,23 @@ impl Default for Cytoplasm {
             sheet: Sheet::Xpbd,
             excess: Number::uniform(1.04, 1.16),
             folds: Folds::default(),
-            clouds: Number::uniform(0.03, 0.10),
-            clouds_um: 3.0.into(),
+            corners: Number::uniform(0.15, 0.65),
+            notches: Number::uniform(0.0, 3.0),
+            tongues: Number::uniform(0.0, 2.4),
+            wrinkles: Number::log_normal(7.0, 0.6),
+            wrinkle: Number::log_normal(0.5, 0.45),
+            wrinkle_um: Number::uniform(0.18, 0.42),
+            endoplasm: Number::log_normal(0.16, 0.5),
+            clouds: Number::uniform(0.06, 0.22),
+            clouds_um: Number::uniform(2.5, 9.0),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
             flecks_threshold: Number::uniform(0.55, 0.85),
             cytoskeleton: Number::uniform(0.05, 0.18),
             grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::uniform(0.1, 0.6),
+            fray_um: Number::log_normal(0.55, 0.5),
+            rim_um: Number::log_normal(2.0, 0.4),
             phase_rad: Number::uniform(0.05, 0.15),
         }
     }
@@ -337,6 +404,11 @@ pub struct Nucleus {
     pub wrinkled: Number,
     /// Absorbance of the rim (the nuclear membrane) relative to the nucleus, 0 to 2.
     pub rim: Number,
+    /// Share of a nucleus's thickness that is domed, 0 (a plate) to 1 (an ellipsoid).
+    pub dome: Number,
+    /// How much thicker a nucleus is towards one side (standard deviation of the slope, relative to its thickness and
+    /// radius), 0 to 1.
+    pub wedge: Number,
 }
 
 impl Default for Nucleus {
@@ -354,7 +426,9 @@ impl Default for Nucleus {
             restore_feather_um: 0.3.into(),
             pyknotic: 0.05.into(),
             wrinkled: 0.15.into(),
-            rim: Number::uniform(0.0, 0.25),
+            rim: Number::uniform(0.0, 0.2),
+            dome: Number::uniform(0.3, 0.85),
+            wedge: 0.2.into(),
         }
     }
 }
@@ -400,7 +474,7 @@ impl Default for Stain {
             slide_nucleus: Number::log_normal(1.0, 0.08),
             field_cytoplasm: Number::log_normal(1.0, 0.2),
             field_nucleus: Number::log_normal(1.0, 0.09),
-            field_texture: Number::log_normal(1.0, 0.25),
+            field_texture: Number::log_normal(0.6, 0.28),
             slide_balance: 0.15.into(),
             field_balance: 0.05.into(),
             cell_balance: 0.12.into(),
@@ -443,6 +517,17 @@ impl DyeAmounts {
     #[must_use]
     pub const fn grey() -> Self {
         Self { neutral: 1.0, ..Self::none() }
+    }
+
+    /// Every amount with the name of its field.
+    pub(crate) fn named(&self) -> [(&'static str, f64); 5] {
+        [
+            ("haematein", self.haematein),
+            ("eosin_y", self.eosin_y),
+            ("light_green", self.light_green),
+            ("orange_g", self.orange_g),
+            ("neutral", self.neutral),
+        ]
     }
 
     /// In the order of [`dye_spectra::Dye::ALL`].

@@ -3,15 +3,16 @@
 use rand_core::Rng;
 
 use crate::key::Stream;
-use crate::model::{CellClass, Model};
+use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
-use crate::recipe::{CellMix, Recipe};
+use crate::recipe::{CellMix, Number, Recipe};
 
 use super::depth::Relief;
 use super::draw::FieldNumbers;
+use super::groups::Groups;
 use super::layout::{Places, weight_map};
 use super::stain::FieldStain;
-use super::{Body, CellBody, CellDetail, Fold, FoldForm, NucleusBody, Object, View, WeightMap};
+use super::{Body, CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Object, View, WeightMap};
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(
@@ -39,29 +40,46 @@ pub(super) fn draw_cells(
         field.key.stream("field", 0, "slide.relief").next_u64(),
     )?;
     let mut cells = Vec::with_capacity(total);
+    let mut groups_begun = 0;
     for ((name, mix), count) in recipe.cells.iter().zip(counts) {
         let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
+        let mut groups = Groups::new(&mix.group, groups_begun);
         for _ in 0..count {
             let number = cells.len() as u64;
-            let centre_um = places.next(&mut field.key.stream("cell", number, "place"))?;
-            let mut rng = field.key.stream("cell", number, "body");
-            let rotation_deg = random::between(0.0, 360.0, &mut rng);
             let own = |purpose: &str| field.key.stream("cell", number, purpose);
-            let body = draw_body(recipe, name, class, mix, stain, &mut rng, own);
+            let mut rng = own("body");
+            let any_deg = random::between(0.0, 360.0, &mut rng);
+            let mut body = draw_body(recipe, name, class, mix, stain, &mut rng, own);
             let stacking = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
+            let place = groups.next(body.radius_um, &mut places, &mut own("place"))?;
+            let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
+            body.nucleus.off_centre = polar(body.nucleus.off_centre, class.nucleus.polarity, rotation_deg);
             cells.push(Object {
                 id: 0,
                 number,
-                cluster: 0,
-                centre_um,
-                depth_um: relief.at(centre_um) + stacking,
+                cluster: place.group,
+                centre_um: place.centre_um,
+                depth_um: relief.at(place.centre_um) + stacking,
                 rotation_deg,
                 bethesda: class.bethesda.clone(),
+                coat: None,
                 body: Body::Cell(Box::new(body)),
             });
         }
+        groups_begun = groups.begun();
     }
     Ok(cells)
+}
+
+/// Turns a displacement towards one end of the cell's long axis: all the way at polarity 1.
+fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
+    if polarity <= 0.0 {
+        return off_centre;
+    }
+    let distance = libm::hypot(off_centre[0], off_centre[1]);
+    let any = libm::atan2(off_centre[1], off_centre[0]);
+    let angle = rotation_deg.to_radians() + (1.0 - polarity) * any;
+    [distance * libm::cos(angle), distance * libm::sin(angle)]
 }
 
 /// The message for a class that a model does not have.
@@ -96,8 +114,8 @@ fn draw_body(
         * libm::exp(cytoplasm.absorbance.log_sd * random::normal(rng))
         * stain.cytoplasm
         * mix.cytoplasm_stain.draw(rng);
-    let detail = draw_detail(recipe, rng);
-    let fold = draw_fold(recipe, rng);
+    let detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
+    let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
     // However far off its centre, the nucleus stays inside the cell.
     let distance = distance.min((0.85 - nucleus_um / radius_um).max(0.0));
@@ -118,8 +136,16 @@ fn draw_body(
         dyes: [0.0; dye_spectra::DYES],
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
+        dome: recipe.nucleus.dome.draw(&mut own("nucleus.dome")),
+        wedge: {
+            let mut rng = own("nucleus.wedge");
+            let wedge = recipe.nucleus.wedge.draw(&mut rng);
+            [0, 1].map(|_| wedge * random::normal(&mut rng))
+        },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
+        // About as many as there are on average, one more or less.
+        nucleoli: random::count(nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0)),
     };
     if pyknotic {
         // Shrunken, almost black, without structure.
@@ -137,6 +163,7 @@ fn draw_body(
         dyes,
         phase_rad: recipe.cytoplasm.phase_rad.draw(&mut own("phase")),
         detail,
+        halo: draw_halo(cytoplasm.halo.as_ref(), nucleus_um, radius_um, &mut own("halo")),
         fold,
         nucleus: body,
     }
@@ -150,13 +177,22 @@ fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
     (mean + sd * random::normal(rng)).max(share * mean)
 }
 
-fn draw_detail(recipe: &Recipe, rng: &mut Stream) -> CellDetail {
+fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn(&str) -> Stream) -> CellDetail {
     let cytoplasm = &recipe.cytoplasm;
     let excess = cytoplasm.excess.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
+    let own = |name: &str, number: &Number| number.draw(&mut own(name));
+    let pliable = |name: &str, number: &Number| pliability * own(name, number);
     CellDetail {
         excess,
+        corners: pliable("cytoplasm.corners", &cytoplasm.corners),
+        notches: random::count(pliable("cytoplasm.notches", &cytoplasm.notches)),
+        tongues: random::count(pliable("cytoplasm.tongues", &cytoplasm.tongues)),
+        wrinkles: random::count(pliable("cytoplasm.wrinkles", &cytoplasm.wrinkles)),
+        wrinkle: own("cytoplasm.wrinkle", &cytoplasm.wrinkle),
+        wrinkle_um: own("cytoplasm.wrinkle_um", &cytoplasm.wrinkle_um),
+        endoplasm: own("cytoplasm.endoplasm", &cytoplasm.endoplasm),
         clouds: cytoplasm.clouds.draw(rng),
         clouds_um: cytoplasm.clouds_um.draw(rng),
         flecks: cytoplasm.flecks.draw(rng),
@@ -165,14 +201,27 @@ fn draw_detail(recipe: &Recipe, rng: &mut Stream) -> CellDetail {
         grain: cytoplasm.grain.draw(rng),
         granules: if granular { granules } else { 0.0 },
         fray_um: cytoplasm.fray_um.draw(rng),
+        rim_um: own("cytoplasm.rim_um", &cytoplasm.rim_um),
     }
 }
 
-fn draw_fold(recipe: &Recipe, rng: &mut Stream) -> Option<Fold> {
+fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: &mut Stream) -> Option<Halo> {
+    /// Largest halo relative to its cell: a ring of cytoplasm is left outside it.
+    const LARGEST: f64 = 0.8;
+    let halo = halo.filter(|halo| random::chance(halo.probability, rng))?;
+    let radius = halo.radius.median * libm::exp(halo.radius.log_sd * random::normal(rng));
+    Some(Halo {
+        radius_um: (radius.max(1.1) * nucleus_um).min(LARGEST * cell_um),
+        clearing: (halo.clearing.mean + halo.clearing.sd * random::normal(rng)).clamp(0.0, 1.0),
+        rim: (halo.rim.mean + halo.rim.sd * random::normal(rng)).max(0.0),
+    })
+}
+
+fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold> {
     let folds = &recipe.cytoplasm.folds;
-    let roll = folds.roll.draw(rng);
-    let cigar = folds.cigar.draw(rng);
-    let flap = folds.flap.draw(rng);
+    let roll = pliability * folds.roll.draw(rng);
+    let cigar = pliability * folds.cigar.draw(rng);
+    let flap = pliability * folds.flap.draw(rng);
     let which = random::uniform(rng);
     let direction_deg = random::between(0.0, 360.0, rng);
     let depth = folds.depth.draw(rng);

@@ -1,23 +1,23 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
+use crate::debris::Ground;
 use crate::error::Error;
 use crate::key::{Key, Stream};
 use crate::model::Model;
 use crate::random;
-use crate::recipe::{Illumination, Light, Number, Optics, Recipe};
+use crate::recipe::{Illumination, Light, Number, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
-use super::debris::draw_debris;
 use super::stain::{FieldStain, slide_of};
 use super::{
-    Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
+    Fusion, Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
     View, WeightMap,
 };
 
 /// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of
 /// them a distribution changes none of the others.
-pub(super) struct FieldNumbers {
-    pub(super) key: Key,
+pub(crate) struct FieldNumbers {
+    pub(crate) key: Key,
 }
 
 impl FieldNumbers {
@@ -25,11 +25,11 @@ impl FieldNumbers {
         self.key.stream("field", 0, path)
     }
 
-    pub(super) fn draw(&self, path: &str, number: &Number) -> f64 {
+    pub(crate) fn draw(&self, path: &str, number: &Number) -> f64 {
         number.draw(&mut self.stream(path))
     }
 
-    pub(super) fn count(&self, path: &str, number: &Number) -> usize {
+    pub(crate) fn count(&self, path: &str, number: &Number) -> usize {
         number.draw_count(&mut self.stream(path))
     }
 }
@@ -50,7 +50,10 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     let fail = |message: String| Error::Image { index: key.index, message };
     let stain = FieldStain::draw(recipe, &field);
     let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
-    draw_debris(recipe, view, &field, &mut objects).map_err(fail)?;
+    recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects));
+    if u32::try_from(objects.len()).is_err() {
+        return Err(fail(format!("{} objects are more than labels can number; ask for fewer", objects.len())));
+    }
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }
@@ -59,6 +62,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         slide: slide_of(recipe, key),
         view,
         planes_um: planes(recipe, &field),
+        fusion: fusion(recipe, &field),
         background: background(recipe, &field),
         light: light(recipe, &field),
         optics: optics(recipe, &field),
@@ -83,12 +87,34 @@ fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     field.draw("camera.pixel_um", &camera.pixel_um) * binning as f64 / magnification
 }
 
-fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
+/// Number of planes, travel to the middle one, travel between them.
+fn stack(recipe: &Recipe, field: &FieldNumbers) -> (usize, f64, f64) {
     let count = field.count("focus.planes", &recipe.focus.planes).max(1);
     let step = field.draw("focus.step_um", &recipe.focus.step_um);
-    let centre = field.draw("focus.centre_um", &recipe.focus.centre_um);
+    (count, field.draw("focus.centre_um", &recipe.focus.centre_um), step)
+}
+
+fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
+    let (count, centre, step) = stack(recipe, field);
+    if recipe.focus.picture == Picture::Extended {
+        return vec![centre];
+    }
     let middle = (count - 1) as f64 / 2.0;
     (0..count).map(|plane| centre + (plane as f64 - middle) * step).collect()
+}
+
+fn fusion(recipe: &Recipe, field: &FieldNumbers) -> Option<Fusion> {
+    let focus = &recipe.focus;
+    let (planes, centre, step_um) = stack(recipe, field);
+    (focus.picture == Picture::Extended).then(|| Fusion {
+        first_um: centre - (planes - 1) as f64 / 2.0 * step_um,
+        step_um,
+        planes,
+        noise_correlation: [
+            field.draw("focus.fused_noise_across", &focus.fused_noise_across),
+            field.draw("focus.fused_noise_down", &focus.fused_noise_down),
+        ],
+    })
 }
 
 fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {

@@ -3,9 +3,9 @@
 //! The scene is the hinge between recipe and picture: nothing after it decides what exists.
 
 mod cells;
-mod debris;
 mod depth;
 mod draw;
+mod groups;
 mod layout;
 mod stain;
 mod weight;
@@ -14,45 +14,18 @@ use dye_spectra::Amounts;
 use serde::Serialize;
 
 use crate::key::Key;
-use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, SpeckForm, Subsampling};
+use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, Subsampling};
 
+pub use crate::debris::{
+    Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Kind,
+    Leukocyte, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
+};
 pub(crate) use cells::unknown_class;
+pub(crate) use draw::FieldNumbers;
 pub use draw::draw;
 pub(crate) use layout::check_layout;
+pub(crate) use stain::FieldStain;
 pub use weight::WeightMap;
-
-/// What kind of thing an object is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// An epithelial cell: cytoplasm and nucleus.
-    Cell,
-    /// A white blood cell.
-    Leukocyte,
-    /// A rod-shaped bacterium.
-    Bacillus,
-    /// A speck of dust or stain.
-    Speckle,
-    /// An object far outside the depth of the slide.
-    OutOfFocus,
-}
-
-impl Kind {
-    /// All kinds, in the order in which their objects are numbered.
-    pub const ALL: [Self; 5] = [Self::Cell, Self::Leukocyte, Self::Bacillus, Self::Speckle, Self::OutOfFocus];
-
-    /// The name of the kind, which is also the class of what has no class of its own.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cell => "cell",
-            Self::Leukocyte => "leukocyte",
-            Self::Bacillus => "bacillus",
-            Self::Speckle => "speckle",
-            Self::OutOfFocus => "out-of-focus",
-        }
-    }
-}
 
 /// One field of view: how it is imaged and what lies in it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,6 +39,8 @@ pub struct Scene {
     /// Travel of the stage to each focal plane, µm, in the order of the stack; larger where what is nearer to the objective
     /// is in focus.
     pub planes_um: Vec<f64>,
+    /// The planes that are fused to one picture of extended focus, if it is one: `planes_um` then holds their middle.
+    pub fusion: Option<Fusion>,
     /// The empty slide.
     pub background: SceneBackground,
     /// The light.
@@ -80,6 +55,29 @@ pub struct Scene {
     pub camera: SceneCamera,
     /// Every object, by id.
     pub objects: Vec<Object>,
+}
+
+/// Planes that are fused to one picture of extended focus.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fusion {
+    /// Travel of the stage to the first plane, µm.
+    pub first_um: f64,
+    /// Travel between planes, µm.
+    pub step_um: f64,
+    /// Number of planes.
+    pub planes: usize,
+    /// Correlation of the noise of a pixel with that of the next in its row and in its column.
+    pub noise_correlation: [f64; 2],
+}
+
+impl Fusion {
+    /// The plane nearest to a travel of the stage.
+    #[must_use]
+    pub fn nearest_um(&self, stage_um: f64) -> f64 {
+        let last = self.planes.saturating_sub(1) as f64;
+        let plane = libm::round((stage_um - self.first_um) / self.step_um.max(f64::MIN_POSITIVE)).clamp(0.0, last);
+        self.first_um + plane * self.step_um
+    }
 }
 
 /// The image and its pixels.
@@ -165,6 +163,14 @@ impl Scene {
             SceneOptics::BrightField(microscope) => plane_um * microscope.mount_index / microscope.immersion_index,
             SceneOptics::Gaussian { .. } => plane_um,
         }
+    }
+
+    /// Travel of the stage at which an object of a depth is seen in a plane: the plane's own or, where planes were fused, that
+    /// of the one which shows the object sharpest.
+    #[must_use]
+    pub fn seen_at_um(&self, plane_um: f64, depth_um: f64) -> f64 {
+        // Depth and travel are proportional.
+        self.fusion.map_or(plane_um, |fusion| fusion.nearest_um(depth_um / self.in_focus_um(1.0)))
     }
 
     /// Channels of the image: 1 or 3.
@@ -355,80 +361,11 @@ pub struct Object {
     pub rotation_deg: f64,
     /// Category of the Bethesda system, of a cell whose class has one; else empty.
     pub bethesda: String,
+    /// The bacteria that cover it, if it is a clue cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat: Option<Coat>,
     /// What it is.
     pub body: Body,
-}
-
-/// What an object is, its numbers drawn.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Body {
-    /// An epithelial cell.
-    Cell(Box<CellBody>),
-    /// A white blood cell.
-    Leukocyte {
-        /// Radius of the nucleus, µm.
-        radius_um: f64,
-        /// Number of lobes of the nucleus.
-        lobes: usize,
-        /// Range of the radial perturbation (α of Eq. 7).
-        alpha: f64,
-        /// Range of the angular perturbation (β of Eq. 7).
-        beta: f64,
-        /// Absorbance of the nucleus.
-        absorbance: f64,
-        /// Absorbance of the cytoplasm round it.
-        halo: f64,
-    },
-    /// A rod-shaped bacterium.
-    Bacillus {
-        /// Length, µm.
-        length_um: f64,
-        /// Width, µm.
-        width_um: f64,
-        /// Bend between its ends, degrees.
-        bend_deg: f64,
-        /// Absorbance.
-        absorbance: f64,
-        /// How late light comes through it, radians.
-        phase_rad: f64,
-    },
-    /// A speck of dust or stain.
-    Speckle {
-        /// How it was grown.
-        form: SpeckForm,
-        /// How often it was grown by a pixel.
-        dilations: usize,
-        /// Absorbance.
-        absorbance: f64,
-        /// How late light comes through it, radians.
-        phase_rad: f64,
-    },
-    /// An object far outside the depth of the slide.
-    OutOfFocus {
-        /// Radius, µm.
-        radius_um: f64,
-        /// Range of the radial perturbation (α of Eq. 7).
-        alpha: f64,
-        /// Range of the angular perturbation (β of Eq. 7).
-        beta: f64,
-        /// Absorbance.
-        absorbance: f64,
-    },
-}
-
-impl Body {
-    /// The kind of the object.
-    #[must_use]
-    pub fn kind(&self) -> Kind {
-        match self {
-            Self::Cell(_) => Kind::Cell,
-            Self::Leukocyte { .. } => Kind::Leukocyte,
-            Self::Bacillus { .. } => Kind::Bacillus,
-            Self::Speckle { .. } => Kind::Speckle,
-            Self::OutOfFocus { .. } => Kind::OutOfFocus,
-        }
-    }
 }
 
 /// An epithelial cell, its numbers drawn.
@@ -448,6 +385,8 @@ pub struct CellBody {
     pub phase_rad: f64,
     /// Strengths of the cytoplasm's detail.
     pub detail: CellDetail,
+    /// The cleared space round its nucleus.
+    pub halo: Option<Halo>,
     /// The part that lies doubled back.
     pub fold: Option<Fold>,
     /// Its nucleus.
@@ -459,6 +398,20 @@ pub struct CellBody {
 pub struct CellDetail {
     /// Area of the flat sheet relative to the cell's.
     pub excess: f64,
+    /// How nearly straight its sides run between its corners, 0 to 1.
+    pub corners: f64,
+    /// Notches in its rim.
+    pub notches: usize,
+    /// Tongues that stand out of it.
+    pub tongues: usize,
+    /// Wrinkles.
+    pub wrinkles: usize,
+    /// Thickness that they add, relative to the flat sheet.
+    pub wrinkle: f64,
+    /// Their width, µm.
+    pub wrinkle_um: f64,
+    /// How much denser and more granular the cytoplasm is round the nucleus.
+    pub endoplasm: f64,
     /// Low-frequency Gaussian noise.
     pub clouds: f64,
     /// Its smoothing, µm.
@@ -475,6 +428,19 @@ pub struct CellDetail {
     pub granules: f64,
     /// Roughness of the rim, µm.
     pub fray_um: f64,
+    /// Distance over which it thins out towards its rim, µm.
+    pub rim_um: f64,
+}
+
+/// The cleared space round the nucleus of a koilocyte.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Halo {
+    /// Its radius, µm.
+    pub radius_um: f64,
+    /// Share of the cytoplasm that is missing there.
+    pub clearing: f64,
+    /// How much denser the cytoplasm is at its edge.
+    pub rim: f64,
 }
 
 /// A part of a cell that lies doubled back on it.
@@ -519,8 +485,14 @@ pub struct NucleusBody {
     pub texture: f64,
     /// Absorbance of the rim relative to the nucleus.
     pub rim: f64,
+    /// Share of its thickness that is domed: 0 of a plate, 1 of an ellipsoid.
+    pub dome: f64,
+    /// How much thicker it is at its rim than in its middle, to the right and below.
+    pub wedge: [f64; 2],
     /// Small, dark, without structure.
     pub pyknotic: bool,
     /// Strength of wrinkles, 0 if it has none.
     pub wrinkle: f64,
+    /// Nucleoli.
+    pub nucleoli: usize,
 }

@@ -16,12 +16,12 @@ pub(super) fn slide_of(recipe: &Recipe, key: Key) -> u64 {
 }
 
 /// The stain of a field.
-pub(super) struct FieldStain<'a> {
+pub(crate) struct FieldStain<'a> {
     recipe: &'a Recipe,
     /// Factor on the absorbance of cytoplasm.
     pub(super) cytoplasm: f64,
     /// Factor on the absorbance of nuclei.
-    pub(super) nucleus: f64,
+    pub(crate) nucleus: f64,
     /// Factor on the contrast of the texture inside nuclei.
     pub(super) texture: f64,
     /// Factors on the amounts of dyes.
@@ -70,6 +70,11 @@ impl<'a> FieldStain<'a> {
         }
     }
 
+    /// The dyes of pale cytoplasm.
+    pub(crate) fn cyanophilic(&self) -> Amounts {
+        self.balanced(&self.recipe.stain.cyanophilic)
+    }
+
     /// The tint of a cell, and the dyes of its cytoplasm and its nucleus.
     pub(super) fn cell<R: Rng + ?Sized>(&self, tints: &TintMix, rng: &mut R) -> (Tint, Amounts, Amounts) {
         let stain = &self.recipe.stain;
@@ -88,7 +93,8 @@ impl<'a> FieldStain<'a> {
         (tint, shifted(dyes), shifted(&stain.nucleus))
     }
 
-    fn balanced(&self, dyes: &DyeAmounts) -> Amounts {
+    /// Dyes with this field's balance of them.
+    pub(crate) fn balanced(&self, dyes: &DyeAmounts) -> Amounts {
         let mut amounts = dyes.amounts();
         for (amount, factor) in amounts.iter_mut().zip(&self.balance) {
             *amount *= factor;

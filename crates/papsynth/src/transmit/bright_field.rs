@@ -16,7 +16,7 @@ use crate::exp10::exp10_from;
 use crate::phantom::Phantom;
 use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};
-use crate::scene::{SceneLight, SceneMicroscope, View};
+use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
 use crate::threads::{self, Threads};
 use crate::truth::{COVERED, Mask, Run};
 
@@ -166,7 +166,8 @@ impl BrightFieldPath {
 
     /// How widely an object is blurred in a plane, as the standard deviation of its cone of light, px.
     fn blur_px(&self, slide: Slide<'_>, index: usize, focus: FocusAt, group: &Group) -> f64 {
-        let (FocusAt::Stage(stage_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
+        let (FocusAt::Stage(plane_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
+        let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
         let microscope = light.lens.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
         microscope.cone_radius_um(-slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
@@ -247,10 +248,10 @@ impl BrightFieldPath {
 
     /// How deep an object lies and how far the stage has travelled, as the optics count them. Depth counts away from the
     /// objective there, and towards it here.
-    fn place(depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
+    fn place(scene: &Scene, depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
         match focus {
             FocusAt::Everywhere => [0.0, 0.0],
-            FocusAt::Stage(plane_um) => [-depth_um, plane_um - light.shift_um],
+            FocusAt::Stage(plane_um) => [-depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
         }
     }
 
@@ -258,7 +259,7 @@ impl BrightFieldPath {
     fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, String> {
         let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
         let of_light = |light: &ColouredLight| {
-            let [depth_um, stage_um] = Self::place(object.depth_um, at, light);
+            let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
             light.lens.imager.focus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
@@ -290,7 +291,7 @@ impl BrightFieldPath {
             let imager = &light.lens.imager;
             imager.expose(patch, focus, scratch, factor);
             if !loaded.restored.is_empty() {
-                let [depth_um, stage_um] = Self::place(object.depth_um, at, light);
+                let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
                 let focus = imager.refocus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))?;
                 imager.expose(patch, &focus, scratch, again);
                 restore(factor, again, &loaded.restored, window, n);

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use crate::exp10::exp10_from;
 use crate::phantom::tile::{Tile, lay_at};
 use crate::phantom::{Phantom, Piece};
-use crate::truth::COVERED;
+use crate::truth::{COVERED, Part};
 
 /// How dyes become absorbance.
 pub(super) enum Mixer {
@@ -86,7 +86,8 @@ impl Mixer {
     pub(super) fn shares(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
         let pieces = &phantom.pieces;
         let share = |piece: &Piece, strengths: &[f32], own: f32| {
-            if pieces.len() == 1 {
+            // What has no parts is all of it, whatever stains it.
+            if pieces.len() == 1 || piece.part == Part::Whole {
                 return 1.0;
             }
             let tile = &piece.absorbance;

@@ -141,7 +141,10 @@ impl GaussianPath {
         let sigma_px = match focus {
             FocusAt::Everywhere => 0.0,
             // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
-            FocusAt::Stage(plane) => self.px_per_um * (plane - scene.objects[index].depth_um).abs(),
+            FocusAt::Stage(plane) => {
+                let depth_um = scene.objects[index].depth_um;
+                self.px_per_um * (scene.seen_at_um(plane, depth_um) - depth_um).abs()
+            }
         };
         let gaussian = (sigma_px > SHARP_PX)
             .then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL))

@@ -1,6 +1,6 @@
 //! What the microscope of a recipe must fulfil.
 
-use super::super::{Camera, Illumination, Light, Number, Optics, Recipe};
+use super::super::{Camera, Illumination, Imaging, Light, Number, Optics, Picture, Recipe};
 use super::{Check, Problem};
 
 /// Most pixels that one plane may have: 2³⁰, a gigapixel.
@@ -34,8 +34,16 @@ pub(super) fn check(recipe: &Recipe, check: &mut Check) {
             ("planes", &focus.planes, 1.0, 1024.0),
             ("step_um", &focus.step_um, 1e-3, 100.0),
             ("centre_um", &focus.centre_um, -100.0, 100.0),
+            ("fused_noise_across", &focus.fused_noise_across, 0.0, 0.5),
+            ("fused_noise_down", &focus.fused_noise_down, 0.0, 0.5),
         ],
     );
+    let exact = matches!(recipe.optics, Optics::BrightField { imaging: Imaging::Abbe, .. });
+    if focus.picture == Picture::Extended && exact {
+        let message = "\"extended\" fuses planes object by object; expected `optics.imaging` = \"product\" with it, \
+                       or \"planes\"";
+        check.add("focus.picture", message.to_owned());
+    }
     check.numbers(
         "background",
         &[

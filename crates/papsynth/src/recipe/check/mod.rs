@@ -4,7 +4,8 @@ mod imaging;
 
 use std::fmt;
 
-use super::{Law, Layout, Number, RECIPE_VERSION, Recipe};
+use super::{Layout, Number, RECIPE_VERSION, Recipe};
+use crate::debris::MOST_PHASE_RAD;
 
 /// Something wrong with a recipe.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,9 +21,6 @@ impl fmt::Display for Problem {
         write!(f, "{}: {}", self.field, self.message)
     }
 }
-
-/// Most that light may be late: beyond it the transfer of phase is no longer near to linear.
-const MOST_PHASE_RAD: f64 = 3.0;
 
 struct Check {
     problems: Vec<Problem>,
@@ -48,13 +46,7 @@ impl Check {
     /// Where something is counted, what is written out must be whole; what is drawn from a range is rounded.
     fn whole(&mut self, section: &str, fields: &[(&str, &Number)]) {
         for (name, number) in fields {
-            let written: &[f64] = match number {
-                Number::Fixed(value) => &[*value],
-                Number::Drawn { law: Law::Choice(values), .. } => values,
-                Number::Drawn { .. } => &[],
-            };
-            if let Some(value) = written.iter().find(|value| value.is_finite() && value.floor() != **value) {
-                let message = format!("{value} is not a whole number");
+            if let Some(message) = number.fraction() {
                 self.problems.push(Problem { field: format!("{section}.{name}"), message });
             }
         }
@@ -126,6 +118,11 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ],
         );
         check.whole(&format!("cells.{class}"), &[("count", &mix.count)]);
+        check.numbers(
+            &format!("cells.{class}.group"),
+            &[("size", &mix.group.size, 1.0, 1000.0), ("distance", &mix.group.distance, 0.2, 3.0)],
+        );
+        check.whole(&format!("cells.{class}.group"), &[("size", &mix.group.size)]);
         let tints = &mix.tints;
         let weights = [
             ("cyanophilic", &tints.cyanophilic, 0.0, 1000.0),
@@ -142,6 +139,13 @@ fn cells(recipe: &Recipe, check: &mut Check) {
         "cytoplasm",
         &[
             ("excess", &cytoplasm.excess, 1.0, 2.0),
+            ("corners", &cytoplasm.corners, 0.0, 1.0),
+            ("notches", &cytoplasm.notches, 0.0, 20.0),
+            ("tongues", &cytoplasm.tongues, 0.0, 20.0),
+            ("wrinkles", &cytoplasm.wrinkles, 0.0, 100.0),
+            ("wrinkle", &cytoplasm.wrinkle, 0.0, 5.0),
+            ("wrinkle_um", &cytoplasm.wrinkle_um, 0.05, 5.0),
+            ("endoplasm", &cytoplasm.endoplasm, 0.0, 2.0),
             ("clouds", &cytoplasm.clouds, 0.0, 2.0),
             ("clouds_um", &cytoplasm.clouds_um, 0.1, 100.0),
             ("flecks", &cytoplasm.flecks, 0.0, 5.0),
@@ -151,6 +155,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("granular", &cytoplasm.granular, 0.0, 1.0),
             ("granules", &cytoplasm.granules, 0.0, 1000.0),
             ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
+            ("rim_um", &cytoplasm.rim_um, 0.0, 10.0),
             ("phase_rad", &cytoplasm.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
         ],
     );
@@ -177,6 +182,8 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("pyknotic", &nucleus.pyknotic, 0.0, 1.0),
             ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
             ("rim", &nucleus.rim, 0.0, 2.0),
+            ("dome", &nucleus.dome, 0.0, 1.0),
+            ("wedge", &nucleus.wedge, 0.0, 1.0),
         ],
     );
     check.whole("nucleus", &[("donors", &nucleus.donors)]);
@@ -214,82 +221,20 @@ fn cells(recipe: &Recipe, check: &mut Check) {
         ("bacillus", &stain.bacillus),
         ("speckle", &stain.speckle),
     ] {
-        let parts = [
-            ("haematein", dyes.haematein),
-            ("eosin_y", dyes.eosin_y),
-            ("light_green", dyes.light_green),
-            ("orange_g", dyes.orange_g),
-            ("neutral", dyes.neutral),
-        ];
-        for (dye, amount) in parts {
+        for (dye, amount) in dyes.named() {
             check.number(&format!("stain.{name}.{dye}"), &Number::Fixed(amount), 0.0, 100.0);
         }
     }
 }
 
 fn debris(recipe: &Recipe, check: &mut Check) {
-    let debris = &recipe.debris;
-    let leukocytes = &debris.leukocytes;
-    check.numbers(
-        "debris.leukocytes",
-        &[
-            ("clusters", &leukocytes.clusters, 0.0, 1e5),
-            ("per_cluster", &leukocytes.per_cluster, 1.0, 1e4),
-            ("cluster_um", &leukocytes.cluster_um, 0.0, 1000.0),
-            ("on_cells", &leukocytes.on_cells, 0.0, 1.0),
-            ("radius_um", &leukocytes.radius_um, 0.3, 20.0),
-            ("alpha", &leukocytes.alpha, 0.0, 0.5),
-            ("beta", &leukocytes.beta, 0.0, 0.5),
-            ("absorbance", &leukocytes.absorbance, 0.0, 4.0),
-            ("halo", &leukocytes.halo, 0.0, 4.0),
-        ],
-    );
-    check.whole("debris.leukocytes", &[("clusters", &leukocytes.clusters), ("per_cluster", &leukocytes.per_cluster)]);
-    let bacilli = &debris.bacilli;
-    check.numbers(
-        "debris.bacilli",
-        &[
-            ("clusters", &bacilli.clusters, 0.0, 1e5),
-            ("per_cluster", &bacilli.per_cluster, 1.0, 1e4),
-            ("cluster_um", &bacilli.cluster_um, 0.0, 1000.0),
-            ("on_cells", &bacilli.on_cells, 0.0, 1.0),
-            ("length_um", &bacilli.length_um, 0.3, 50.0),
-            ("width_um", &bacilli.width_um, 0.1, 5.0),
-            ("bend_deg", &bacilli.bend_deg, 0.0, 120.0),
-            ("absorbance", &bacilli.absorbance, 0.0, 4.0),
-            ("phase_rad", &bacilli.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
-        ],
-    );
-    check.whole("debris.bacilli", &[("clusters", &bacilli.clusters), ("per_cluster", &bacilli.per_cluster)]);
-    let speckles = &debris.speckles;
-    check.numbers(
-        "debris.speckles",
-        &[
-            ("count", &speckles.count, 0.0, 1e6),
-            ("dilations", &speckles.dilations, 0.0, 50.0),
-            ("absorbance", &speckles.absorbance, 0.0, 4.0),
-            ("phase_rad", &speckles.phase_rad, -MOST_PHASE_RAD, MOST_PHASE_RAD),
-        ],
-    );
-    check.whole("debris.speckles", &[("count", &speckles.count), ("dilations", &speckles.dilations)]);
-    let blobs = &debris.out_of_focus;
-    check.numbers(
-        "debris.out_of_focus",
-        &[
-            ("count", &blobs.count, 0.0, 1e5),
-            ("radius_um", &blobs.radius_um, 0.3, 500.0),
-            ("alpha", &blobs.alpha, 0.0, 0.5),
-            ("beta", &blobs.beta, 0.0, 0.5),
-            ("depth_um", &blobs.depth_um, 0.0, 1000.0),
-            ("absorbance", &blobs.absorbance, 0.0, 4.0),
-        ],
-    );
-    check.whole("debris.out_of_focus", &[("count", &blobs.count)]);
+    recipe.debris.check(&mut |section, field, message| check.add(&format!("debris.{section}.{field}"), message));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recipe::Law;
 
     #[test]
     fn a_bad_field_is_named_with_its_value_and_what_would_do() {

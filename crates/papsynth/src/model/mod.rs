@@ -4,6 +4,8 @@
 //! readable and versioned, with the counts and the provenance of what it was learned from. The model that ships
 //! holds numbers alone (means, covariances, spectra); one that you learn may hold donors, which are pixels.
 
+mod class_file;
+
 use std::collections::BTreeMap;
 
 use fsd_shape::ShapeStatistics;
@@ -14,8 +16,12 @@ use crate::error::Error;
 /// The version of models that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
 
+/// The classes that are told from those of the model that ships, by the numbers in which they differ.
+const BUILTIN_CLASSES: [&str; 2] =
+    [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
+
 /// The text of the model that ships.
-const BUILTIN: &str = include_str!("../model/default.json");
+const BUILTIN: &str = include_str!("../../model/default.json");
 
 /// A model: what cells of each class are like.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -87,8 +93,81 @@ pub struct CytoplasmStatistics {
     pub absorbance: LogNormal,
     /// Thickness from the rim to the middle in even steps of the distance from the rim, relative to its median.
     pub rim_to_centre: Vec<f64>,
+    /// How its outlines differ from those that were learned.
+    #[serde(default, skip_serializing_if = "Form::is_plain")]
+    pub form: Form,
+    /// How readily it folds, wrinkles and lies angular, 0 (a rounded, firm cell) to 1 (a thin sheet): a factor on what the
+    /// recipe asks.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub pliability: f64,
+    /// The cleared space round the nucleus, if the class has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub halo: Option<HaloStatistics>,
     /// Outlines.
     pub shapes: Shapes,
+}
+
+/// How outlines differ from those that were learned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Form {
+    /// Elongation |u₋₁|/|u₁| in the place of the learned one, 0 (round) to 0.9: an ellipse of half axes 1 ± this.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elongation: Option<Normal>,
+    /// How much wider one end is than the other, −0.3 to 0.3.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub taper: f64,
+    /// Factor on everything else about the outline, 0 (a smooth oval) to 3.
+    #[serde(skip_serializing_if = "is_one")]
+    pub unevenness: f64,
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        Self { elongation: None, taper: 0.0, unevenness: 1.0 }
+    }
+}
+
+impl Form {
+    fn is_plain(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn check(&self, path: &str) -> Result<(), String> {
+        if let Some(elongation) = &self.elongation {
+            elongation.check(&format!("{path}.elongation"), 0.0, 0.9)?;
+        }
+        within(&format!("{path}.taper"), self.taper, -0.3, 0.3)?;
+        within(&format!("{path}.unevenness"), self.unevenness, 0.0, 3.0)
+    }
+}
+
+/// What the cleared space round the nucleus of a koilocyte is like.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HaloStatistics {
+    /// Probability that a cell has one.
+    pub probability: f64,
+    /// Its radius relative to the nucleus's.
+    pub radius: LogNormal,
+    /// Share of the cytoplasm that is missing there, 0 to 1.
+    pub clearing: Normal,
+    /// How much denser the cytoplasm is at its edge.
+    pub rim: Normal,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 /// What the nucleus of a class is like.
@@ -101,8 +180,17 @@ pub struct NucleusStatistics {
     pub size_correlation: f64,
     /// Distance of its middle from the cell's, as a fraction of the cell's radius.
     pub off_centre: Normal,
+    /// How strictly it is displaced towards one end of the cell, as in columnar cells: 0 (in any direction) to 1.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub polarity: f64,
     /// Absorbance above the cytoplasm, mean over a nucleus.
     pub absorbance: Normal,
+    /// How its outlines differ from those that were learned.
+    #[serde(default, skip_serializing_if = "Form::is_plain")]
+    pub form: Form,
+    /// Nucleoli, on average.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub nucleoli: f64,
     /// Chromatin.
     pub chromatin: ChromatinStatistics,
     /// Outlines.
@@ -160,7 +248,35 @@ impl Model {
     /// Never: the file is part of the crate and its tests read it.
     #[must_use]
     pub fn builtin() -> Self {
-        Self::from_json(BUILTIN).expect("the model that ships is sound")
+        let learned = Self::from_json(BUILTIN).expect("the model that ships is sound");
+        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the classes that ship are sound"))
+    }
+
+    /// This model and the classes of a text, which take the place of classes of the same names.
+    ///
+    /// The text is a model as `papsynth learn` writes it, or a class file: TOML whose classes may each say which class they
+    /// are `like`, and after that only the numbers in which they differ.
+    ///
+    /// ```
+    /// # use papsynth::model::Model;
+    /// let text = r#"
+    ///     version = 1
+    ///     [classes.spindle]
+    ///     like = "intermediate"
+    ///     bethesda = "HSIL"
+    ///     cytoplasm.form = { elongation = { mean = 0.6, sd = 0.05 } }
+    /// "#;
+    /// let model = Model::builtin().with(text)?;
+    /// assert_eq!(model.classes["spindle"].nucleus, model.classes["intermediate"].nucleus);
+    /// # Ok::<(), papsynth::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As those of [`from_json`](Self::from_json), or if a class is like one that is not there.
+    pub fn with(&self, text: &str) -> Result<Self, Error> {
+        let model = class_file::merged(self, text).map_err(Error::Model)?;
+        model.check().map_err(Error::Model)?;
+        Ok(model)
     }
 
     /// Reads a model from its text.
@@ -211,10 +327,21 @@ impl CellClass {
         cytoplasm.radius_um.check("cytoplasm.radius_um", 0.5, 500.0)?;
         cytoplasm.absorbance.check("cytoplasm.absorbance", 1e-4, 4.0)?;
         profile("cytoplasm.rim_to_centre", &cytoplasm.rim_to_centre)?;
+        cytoplasm.form.check("cytoplasm.form")?;
+        nucleus.form.check("nucleus.form")?;
+        within("nucleus.nucleoli", nucleus.nucleoli, 0.0, 10.0)?;
+        within("cytoplasm.pliability", cytoplasm.pliability, 0.0, 1.0)?;
+        if let Some(halo) = &cytoplasm.halo {
+            within("cytoplasm.halo.probability", halo.probability, 0.0, 1.0)?;
+            halo.radius.check("cytoplasm.halo.radius", 1.0, 10.0)?;
+            halo.clearing.check("cytoplasm.halo.clearing", 0.0, 1.0)?;
+            halo.rim.check("cytoplasm.halo.rim", 0.0, 4.0)?;
+        }
         cytoplasm.shapes.check("cytoplasm.shapes")?;
         nucleus.radius_um.check("nucleus.radius_um", 0.2, 200.0)?;
         within("nucleus.size_correlation", nucleus.size_correlation, -1.0, 1.0)?;
         nucleus.off_centre.check("nucleus.off_centre", 0.0, 1.0)?;
+        within("nucleus.polarity", nucleus.polarity, 0.0, 1.0)?;
         nucleus.absorbance.check("nucleus.absorbance", 0.0, 4.0)?;
         let chromatin = &nucleus.chromatin;
         within("nucleus.chromatin.nu", chromatin.nu, 0.05, 20.0)?;

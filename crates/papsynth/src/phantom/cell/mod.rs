@@ -1,28 +1,23 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
 
 use cloth_verlet::{Crease, Sheet, Turn, View, crease_outline};
-use multiversion::multiversion;
-use voronoi_cytoskeleton::{LineParams, draw_into};
 
-use super::chromatin::interpolate;
-use super::nucleus;
-use super::pools::{Look, Pools, SIDE, Texels};
-use super::studio::{ClassStudio, Studio};
-use super::tile::{Point, Tile, area};
-use super::{Phantom, Piece};
+mod detail;
+mod outline;
+mod wrinkles;
+
+use crate::phantom::chromatin::interpolate;
+use crate::phantom::{form, nucleus};
+use crate::phantom::pools::Pools;
+use crate::phantom::studio::{ClassStudio, Studio};
+use crate::phantom::tile::{Point, Tile, area};
+use crate::phantom::{Phantom, Piece};
 use crate::key::Stream;
-use crate::random;
 use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
 use crate::truth::Part;
 
 /// Points of a cell's outline before its rim is roughened.
 const POINTS: usize = 180;
-
-/// Radius of a granule, µm (the standard deviation of its absorbance).
-const GRANULE_UM: f64 = 0.28;
-
-/// Absorbance of a granule relative to the cytoplasm's.
-const GRANULE: f64 = 0.75;
 
 /// Largest angle between the two creases of a cell that is folded from both sides, radians.
 const SKEW: f64 = 0.45;
@@ -67,10 +62,14 @@ impl<'a> Plan<'a> {
         let radius_px = body.radius_um / scene.grid().pixel_um;
         let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
         let centre = scene.grid().to_px(object.centre_um);
-        let outline = drawn.descriptors.outline(POINTS);
+        let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
+        let posed = formed.rotated(object.rotation_deg.to_radians());
+        let outline = posed.outline(POINTS);
         let middle = fsd_shape::centroid(&outline);
         let outline: Vec<Point> =
             outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
+        let own = &mut scene.key.stream("cell", object.number, "outline.corners");
+        let outline = outline::shaped(outline, &body.detail, own);
         let nucleus = nucleus::make(studio, class, scene, object, body, centre)?;
         let creases = body.fold.map_or(Vec::new(), |fold| creases(fold, &outline, centre, body, scene));
         Ok(Self { class, centre, outline, nucleus, creases })
@@ -147,7 +146,8 @@ fn finish(
     plan: Plan,
     sheet: Option<Sheet>,
 ) -> Result<Phantom, String> {
-    let mut rng = scene.key.stream("cell", object.number, "detail");
+    let own = |purpose: &str| scene.key.stream("cell", object.number, purpose);
+    let mut rng = own("detail");
     let pixel_um = scene.grid().pixel_um;
     let mut pieces = vec![plan.outline.clone()];
     for crease in &plan.creases {
@@ -155,7 +155,7 @@ fn finish(
         pieces = folded.map_err(|e| e.to_string())?.concat();
     }
     let rough: Vec<Vec<Point>> =
-        pieces.iter().map(|p| roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng)).collect();
+        pieces.iter().map(|p| outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng)).collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
     for piece in &rough {
         coverage.cover(piece);
@@ -175,17 +175,22 @@ fn finish(
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
-    add_detail(&mut absorbance, &coverage, body, pools, pixel_um, &mut rng);
+    detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
+    let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
+    wrinkles::add(&mut absorbance, &coverage, &plan.outline, &body.detail, pixel_um, &mut own("wrinkles"));
+    detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, body, pools, pixel_um, &mut own("endoplasm"));
+    detail::add_halo(&mut absorbance, nucleus, body, pixel_um, &mut own("halo"));
+    detail::add_detail(&mut absorbance, &coverage, body, pools, pixel_um, &mut rng);
     if body.detail.cytoskeleton > 0.0 {
-        add_cytoskeleton(studio, &mut absorbance, &plan.outline, body.detail.cytoskeleton, pixel_um, &mut rng)?;
+        detail::add_cytoskeleton(studio, &mut absorbance, &plan.outline, body.detail.cytoskeleton, pixel_um, &mut rng)?;
     }
-    add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
+    detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     for (value, cover) in absorbance.values.iter_mut().zip(&coverage.values) {
         // Eq. 12: A = κ·c·l.
-        *value *= cover * body.cytoplasm_absorbance.max(super::LEAST_ABSORBANCE) as f32;
+        *value *= cover * body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE) as f32;
     }
     let area_px = coverage.values.iter().map(|v| f64::from(*v)).sum();
-    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(super::LEAST_ABSORBANCE);
+    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE);
     let dyes = body.dyes;
     let cytoplasm = Piece { part: Part::Cytoplasm, absorbance, coverage, area_px, imaged: false, dyes, phase_rad };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
@@ -197,10 +202,11 @@ fn traits(body: &CellBody) -> Vec<&'static str> {
         FoldForm::Roll => "rolled",
         FoldForm::Cigar => "folded",
     });
+    let koilocytic = body.halo.map(|_| "koilocytic");
     let granular = (body.detail.granules > 0.0).then_some("granular");
     let pyknotic = body.nucleus.pyknotic.then_some("pyknotic");
     let wrinkled = (body.nucleus.wrinkle > 0.0).then_some("wrinkled");
-    [fold, granular, pyknotic, wrinkled].into_iter().flatten().collect()
+    [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 
 /// A sheet without folds: thick in the middle, thin at the rim.
@@ -214,146 +220,4 @@ fn flat(absorbance: &mut Tile, coverage: &Tile, profile: &[f64], centre: Point, 
         }
         index += 1;
     });
-}
-
-/// An outline whose points are pushed in and out a little, finely and unevenly: the frayed rim of a real cell.
-fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mut Stream) -> Vec<Point> {
-    if depth_px < 0.05 || outline.len() < 3 {
-        return outline.to_vec();
-    }
-    let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
-    let fine = fsd_shape::resample(outline, count);
-    // Slow waves say where the rim is frayed, quick ones how: a first-order autoregression of either.
-    let (mut slow, mut quick) = (random::normal(rng), random::normal(rng));
-    let step = |state: f64, memory: f64, rng: &mut Stream| {
-        memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
-    };
-    (0..count)
-        .map(|i| {
-            slow = step(slow, 0.985, rng);
-            quick = step(quick, 0.6, rng);
-            let [before, here, after] = [fine[(i + count - 1) % count], fine[i], fine[(i + 1) % count]];
-            let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
-            let length = (tx * tx + ty * ty).sqrt().max(1e-9);
-            let push = (0.5 * depth_px * quick * (0.35 + slow.max(0.0))).clamp(-2.0 * depth_px, 2.0 * depth_px);
-            [here[0] + push * ty / length, here[1] - push * tx / length]
-        })
-        .collect()
-}
-
-/// The first two levels of detail, and the grain: factors on the thickness.
-fn add_detail(
-    absorbance: &mut Tile,
-    coverage: &Tile,
-    body: &CellBody,
-    pools: &Pools<'_>,
-    pixel_um: f64,
-    rng: &mut Stream,
-) {
-    let detail = &body.detail;
-    let clouds = Look::clouds(detail.clouds_um / pixel_um, rng);
-    let flecks = Look::fine(pixel_um, rng);
-    let grain = Look::fine(pixel_um, rng);
-    let (cloud, fleck, grainy) = (detail.clouds as f32, detail.flecks as f32, detail.grain as f32);
-    let threshold = if fleck > 0.0 { pools.flecks().quantile(detail.flecks_threshold) } else { 0.0 };
-    let width = absorbance.width;
-    let mut buffers = vec![0.0_f32; 2 * width];
-    let mut texels: Texels = [0.0; SIDE + 1];
-    let rows = absorbance.values.chunks_exact_mut(width).zip(coverage.values.chunks_exact(width));
-    for (y, (row, cover)) in rows.enumerate() {
-        let Some((first, end)) = covered(cover) else { continue };
-        let (at, row) = ([first as f64, y as f64], &mut row[first..end]);
-        let (factor, field) = buffers.split_at_mut(width);
-        let (factor, field) = (&mut factor[..row.len()], &mut field[..row.len()]);
-        factor.fill(1.0);
-        if cloud > 0.0 {
-            pools.clouds().row_into(field, &clouds, at, &mut texels);
-            add_above(factor, field, cloud, None);
-        }
-        if fleck > 0.0 {
-            pools.flecks().row_into(field, &flecks, at, &mut texels);
-            add_above(factor, field, fleck, Some(threshold));
-        }
-        if grainy > 0.0 {
-            pools.grain().row_into(field, &grain, at, &mut texels);
-            add_above(factor, field, grainy, None);
-        }
-        multiply(row, factor);
-    }
-}
-
-/// Adds a field, or what of it lies above a threshold.
-#[multiversion(targets = "simd")]
-fn add_above(factor: &mut [f32], field: &[f32], strength: f32, threshold: Option<f32>) {
-    let zero = threshold.unwrap_or(0.0);
-    let least = threshold.unwrap_or(f32::NEG_INFINITY);
-    for (factor, &value) in factor.iter_mut().zip(field) {
-        let above = if value > least { value } else { least };
-        *factor += strength * (above - zero);
-    }
-}
-
-/// Multiplies by factors, of which those below 0 count as 0.
-#[multiversion(targets = "simd")]
-fn multiply(row: &mut [f32], factors: &[f32]) {
-    for (value, &factor) in row.iter_mut().zip(factors) {
-        *value *= if factor > 0.0 { factor } else { 0.0 };
-    }
-}
-
-/// From the first pixel of a row with a share to behind the last.
-fn covered(row: &[f32]) -> Option<(usize, usize)> {
-    let inside = |share: &f32| *share > 0.0;
-    Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
-}
-
-/// The third level of detail.
-fn add_cytoskeleton(
-    studio: &Studio,
-    absorbance: &mut Tile,
-    outline: &[Point],
-    strength: f64,
-    pixel_um: f64,
-    rng: &mut Stream,
-) -> Result<(), String> {
-    /// Width of a fibre, µm.
-    const FIBRE_UM: f64 = 0.3;
-    let origin = absorbance.origin.map(|o| o as f64);
-    let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
-    let rivers = studio.skeleton.grow(&local, rng).map_err(|e| e.to_string())?;
-    let mut lines = vec![0.0; absorbance.values.len()];
-    let line = LineParams { width_px: (FIBRE_UM / pixel_um).max(1.0), ..LineParams::default() };
-    draw_into(&mut lines, absorbance.width, &rivers, &line).map_err(|e| e.to_string())?;
-    for (value, line) in absorbance.values.iter_mut().zip(&lines) {
-        *value += strength as f32 * line;
-    }
-    Ok(())
-}
-
-/// Keratohyalin granules: small dark dots over all of the cell.
-fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: f64, pixel_um: f64, rng: &mut Stream) {
-    if per_100_um2 <= 0.0 {
-        return;
-    }
-    let area_um2 = coverage.values.iter().map(|v| f64::from(*v)).sum::<f64>() * pixel_um * pixel_um;
-    let wanted = random::count(per_100_um2 * area_um2 / 100.0);
-    let (width, height) = (absorbance.width, absorbance.height());
-    // As many tries as would put the wanted number inside a box that the cell fills.
-    let box_um2 = (width * height) as f64 * pixel_um * pixel_um;
-    for _ in 0..random::count(wanted as f64 * box_um2 / area_um2.max(1e-9)) {
-        let (x, y) = (random::between(0.0, width as f64, rng), random::between(0.0, height as f64, rng));
-        let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
-        let strength = GRANULE * random::between(0.3, 1.5, rng);
-        let reach = (3.0 * sigma).ceil();
-        #[expect(clippy::cast_possible_truncation, reason = "a few pixels round a place in a tile")]
-        let span = |at: f64| ((at - reach) as i64).max(0)..(at + reach) as i64 + 1;
-        for py in span(y).take_while(|py| *py < height as i64) {
-            for px in span(x).take_while(|px| *px < width as i64) {
-                let (dx, dy) = (px as f64 - x, py as f64 - y);
-                let value = strength * libm::exp(-(dx * dx + dy * dy) / (2.0 * sigma * sigma));
-                let at = usize::try_from(py).unwrap_or(0) * width + usize::try_from(px).unwrap_or(0);
-                absorbance.values[at] += value as f32;
-            }
-        }
-    }
 }

@@ -1,0 +1,176 @@
+//! The light of the empty slide, and what objects take from it.
+
+use crate::number::{nearest, single};
+use crate::statistics::{median, quantile};
+
+/// Side of the blocks whose medians the surface is fitted to, pixels.
+const BLOCK: usize = 8;
+
+/// Blocks that may be empty slide to begin with: within this part of the brightest.
+const FIRST_BAND: f64 = 0.08;
+
+/// Narrowest band that blocks of empty slide are sought in: two grey levels of 255.
+const NARROWEST_BAND: f64 = 0.008;
+
+/// Rounds of fitting and choosing; later ones change nothing that is seen.
+const ROUNDS: usize = 6;
+
+/// How strongly the surface is held flat, as a part of the blocks' number: too little to be seen with a tenth of them on empty
+/// slide, enough where only a corner is.
+const STIFFNESS: f64 = 1e-4;
+
+/// Least light that counts, as a part of full scale: half a level of 8 bits.
+const LEAST_LIGHT: f32 = 0.5 / 255.0;
+
+/// Terms 1, x, y, x², xy, y² over −1..1.
+const TERMS: usize = 6;
+
+/// A quadratic surface: the factors of 1, x, y, x², xy and y².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Surface(pub(crate) [f64; TERMS]);
+
+impl Surface {
+    /// By least squares through values at points of −1..1, of which all but the mean is held back by `stiffness` points.
+    pub(crate) fn fit(points: &[([f64; 2], f64)], stiffness: f64) -> Self {
+        let mut normal = [[0.0; TERMS + 1]; TERMS];
+        for ([x, y], level) in points {
+            let row = [1.0, *x, *y, x * x, x * y, y * y, *level];
+            for i in 0..TERMS {
+                for j in 0..=TERMS {
+                    normal[i][j] += row[i] * row[j];
+                }
+            }
+        }
+        for (i, row) in normal.iter_mut().enumerate().skip(1) {
+            row[i] += stiffness;
+        }
+        Self(solve(normal))
+    }
+
+    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        let [c, cx, cy, cxx, cxy, cyy] = self.0;
+        c + cx * x + cy * y + cxx * x * x + cxy * x * y + cyy * y * y
+    }
+}
+
+/// A quadratic surface through the empty parts of a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Background {
+    /// Over −1..1, parts of full scale.
+    pub(crate) surface: Surface,
+    width: usize,
+    height: usize,
+}
+
+impl Background {
+    /// The surface of grey levels `0..=full_scale`.
+    ///
+    /// Empty slide is bright and even: blocks are taken within a band around the brightest (their 98th percentile) whose own
+    /// spread is that of the most even ones, and the band is narrowed around the surface through them.
+    pub(crate) fn new(grey: &[f32], width: usize, full_scale: f32) -> Self {
+        let height = grey.len() / width;
+        let blocks = blocks(grey, width, full_scale);
+        let mut levels: Vec<f64> = blocks.iter().map(|b| b.level).collect();
+        let mut spreads: Vec<f64> = blocks.iter().map(|b| b.spread).collect();
+        let brightest = quantile(&mut levels, 0.98).max(f64::from(LEAST_LIGHT));
+        let bright: Vec<&Block> = blocks.iter().filter(|b| b.level > (1.0 - FIRST_BAND) * brightest).collect();
+        let even = if bright.len() > 2 * TERMS {
+            2.0 * quantile(&mut bright.iter().map(|b| b.spread).collect::<Vec<_>>(), 0.3)
+        } else {
+            quantile(&mut spreads, 0.5)
+        };
+        let place = |b: &Block| [2.0 * b.x / width as f64 - 1.0, 2.0 * b.y / height as f64 - 1.0];
+        let mut surface = Surface([brightest, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut band = FIRST_BAND * brightest;
+        for _ in 0..ROUNDS {
+            let rest = |b: &Block| b.level - surface.at(place(b));
+            let chosen: Vec<&Block> = blocks.iter().filter(|b| b.spread <= even.max(1e-4) && rest(b).abs() < band).collect();
+            if chosen.len() < 2 * TERMS {
+                break;
+            }
+            let mut rests: Vec<f64> = chosen.iter().map(|b| rest(b).abs()).collect();
+            band = (4.0 * median(&mut rests)).clamp(NARROWEST_BAND * brightest, band);
+            let points: Vec<([f64; 2], f64)> = chosen.iter().map(|b| (place(b), b.level)).collect();
+            surface = Surface::fit(&points, STIFFNESS * blocks.len() as f64);
+        }
+        Self { surface, width, height }
+    }
+
+    /// Difference of the surface's highest and lowest place, over its mean.
+    pub(crate) fn peak_to_valley(&self) -> f64 {
+        let values = self.grid();
+        let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+        (high - low) / self.mean().max(f64::from(LEAST_LIGHT))
+    }
+
+    /// Its mean, a part of full scale.
+    pub(crate) fn mean(&self) -> f64 {
+        let values = self.grid();
+        values.iter().sum::<f64>() / values.len() as f64
+    }
+
+    fn grid(&self) -> Vec<f64> {
+        let at = |i: i32| f64::from(i) / 10.0;
+        (-10..=10).flat_map(|y| (-10..=10).map(move |x| [at(x), at(y)])).map(|p| self.surface.at(p)).collect()
+    }
+
+    /// Absorbance A = −log₁₀(I/B) of every pixel.
+    pub(crate) fn absorbance(&self, grey: &[f32], full_scale: f32) -> Vec<f32> {
+        let mut out = Vec::with_capacity(grey.len());
+        let [c, cx, cy, cxx, cxy, cyy] = self.surface.0;
+        for (y, row) in grey.chunks_exact(self.width).enumerate() {
+            let v = 2.0 * y as f64 / self.height as f64 - 1.0;
+            let (level, tilt) = (c + cy * v + cyy * v * v, cx + cxy * v);
+            out.extend(row.iter().enumerate().map(|(x, grey)| {
+                let u = 2.0 * x as f64 / self.width as f64 - 1.0;
+                let light = (grey / full_scale).max(LEAST_LIGHT);
+                let lamp = single(level + tilt * u + cxx * u * u).max(LEAST_LIGHT);
+                libm::log10f(lamp / light)
+            }));
+        }
+        out
+    }
+}
+
+struct Block {
+    x: f64,
+    y: f64,
+    /// Median, a part of full scale.
+    level: f64,
+    /// Distance between the 10th and the 90th percentile.
+    spread: f64,
+}
+
+fn blocks(grey: &[f32], width: usize, full_scale: f32) -> Vec<Block> {
+    let height = grey.len() / width;
+    let mut blocks = Vec::new();
+    let mut values: Vec<f32> = Vec::with_capacity(BLOCK * BLOCK);
+    for y in (0..height + 1 - BLOCK.min(height)).step_by(BLOCK) {
+        for x in (0..width + 1 - BLOCK.min(width)).step_by(BLOCK) {
+            values.clear();
+            for row in grey.chunks_exact(width).skip(y).take(BLOCK) {
+                values.extend_from_slice(&row[x..(x + BLOCK).min(width)]);
+            }
+            values.sort_unstable_by(f32::total_cmp);
+            let at = |q: f64| f64::from(values[nearest(q * (values.len() - 1) as f64)] / full_scale);
+            let half = BLOCK as f64 / 2.0;
+            blocks.push(Block { x: x as f64 + half, y: y as f64 + half, level: at(0.5), spread: at(0.9) - at(0.1) });
+        }
+    }
+    blocks
+}
+
+/// Gauss–Jordan elimination of a symmetric, positive definite system.
+fn solve(mut rows: [[f64; TERMS + 1]; TERMS]) -> [f64; TERMS] {
+    for i in 0..TERMS {
+        let pivot = rows[i][i].max(1e-12);
+        let of = rows[i];
+        for (k, row) in rows.iter_mut().enumerate() {
+            let part = if k == i { 1.0 - 1.0 / pivot } else { row[i] / pivot };
+            for (value, v) in row.iter_mut().zip(of) {
+                *value -= part * v;
+            }
+        }
+    }
+    rows.map(|row| row[TERMS])
+}

@@ -1,0 +1,242 @@
+//! Free cells and their cytoplasm.
+
+use std::f64::consts::{PI, TAU};
+
+use super::maps::Maps;
+use crate::number::{nearest, whole};
+use crate::region::{Region, Shape, components, distance, distance_inside, smoothed};
+use crate::statistics::{deviation, mean, of_sorted};
+use crate::table::{Family, Row};
+
+/// Darker than this is a cell, absorbance after a Gaussian of 1 pixel.
+pub(crate) const COVERED: f32 = 0.03;
+
+/// Areas of cells, µm².
+const AREAS_UM2: [f64; 2] = [150.0, 8000.0];
+
+/// Less solid things are clumps.
+const SOLID: f64 = 0.75;
+
+/// Bins from the rim to the centre.
+pub const PROFILE: usize = 10;
+
+/// So much around a nucleus is not counted as cytoplasm, pixels.
+const NUCLEUS_MARGIN: f32 = 3.0;
+
+/// Chords whose angle tells corners from straight runs, µm.
+const CHORD_UM: f64 = 3.0;
+
+/// An outline that turns by more between two chords has a corner there, degrees.
+const CORNER_DEG: f64 = 45.0;
+
+/// By less, it is straight.
+const STRAIGHT_DEG: f64 = 6.0;
+
+/// Sectors that are compared around the centre.
+const SECTORS: usize = 8;
+
+/// A cell that lies free and whole, with one nucleus.
+pub(crate) struct Cell<'a> {
+    region: Region,
+    pub(crate) shape: Shape,
+    nucleus: &'a Region,
+    outline: Outline,
+    /// Pixels of cytoplasm, with their distance to the rim over the largest there is.
+    cytoplasm: Vec<(usize, f64)>,
+    /// Their absorbances in order.
+    sorted: Vec<f64>,
+}
+
+/// How a line turns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Outline {
+    /// Corners outwards.
+    pub(crate) corners: f64,
+    /// Corners inwards.
+    pub(crate) notches: f64,
+    /// Part of it that is straight.
+    pub(crate) straight: f64,
+}
+
+/// The free cells of a picture; `nuclei` are all its nuclei.
+pub(crate) fn cells<'a>(maps: &Maps, nuclei: &'a [Region], pixel_um: f64) -> Vec<Cell<'a>> {
+    let covered: Vec<bool> = maps.smooth.iter().map(|a| *a > COVERED).collect();
+    let mut of = vec![0_u32; covered.len()];
+    for (id, nucleus) in (1..).zip(nuclei) {
+        for p in &nucleus.pixels {
+            of[*p as usize] = id;
+        }
+    }
+    let um2 = pixel_um * pixel_um;
+    let free = |region: &Region| -> Option<usize> {
+        let area = region.pixels.len() as f64 * um2;
+        if area < AREAS_UM2[0] || area > AREAS_UM2[1] || region.at_border(maps.height) {
+            return None;
+        }
+        let mut ids = region.pixels.iter().map(|p| of[*p as usize]).filter(|id| *id > 0);
+        let first = ids.next()?;
+        ids.all(|id| id == first).then_some(first as usize - 1)
+    };
+    let found = components(&covered, maps.width).into_iter().filter_map(|region| free(&region).map(|n| (region, n)));
+    let cells = found.map(|(region, n)| Cell::new(maps, region.filled(maps.height), &nuclei[n], pixel_um));
+    cells.filter(|cell| cell.shape.solidity >= SOLID && !cell.cytoplasm.is_empty()).collect()
+}
+
+impl<'a> Cell<'a> {
+    fn new(maps: &Maps, region: Region, nucleus: &'a Region, pixel_um: f64) -> Self {
+        let (inside, wide, [left, top]) = region.tile(1);
+        let depths = distance_inside(&inside, wide);
+        let deepest = depths.iter().fold(1.0_f32, |a, d| a.max(*d));
+        let mut elsewhere = vec![true; inside.len()];
+        for &p in &nucleus.pixels {
+            let (x, y) = nucleus.place(p);
+            if let (Ok(u), Ok(v)) = (usize::try_from(x as i64 - left), usize::try_from(y as i64 - top))
+                && u < wide
+                && let Some(pixel) = elsewhere.get_mut(v * wide + u)
+            {
+                *pixel = false;
+            }
+        }
+        let away = distance_inside(&elsewhere, wide);
+        let place = |i: usize| {
+            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            (inside[i] && away[i] > NUCLEUS_MARGIN).then(|| (y * maps.width + x, f64::from(depths[i] / deepest)))
+        };
+        let cytoplasm: Vec<(usize, f64)> = (0..inside.len()).filter_map(place).collect();
+        let mut sorted: Vec<f64> = cytoplasm.iter().map(|(p, _)| f64::from(maps.absorbance[*p])).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let outline = Outline::new(&region.outline(), CHORD_UM / pixel_um);
+        Self { shape: region.shape(), region, nucleus, outline, cytoplasm, sorted }
+    }
+
+    /// Median absorbance of the cytoplasm.
+    pub(crate) fn middle(&self) -> f64 {
+        of_sorted(&self.sorted, 0.5)
+    }
+
+    pub(crate) fn outline(&self) -> Outline {
+        self.outline
+    }
+
+    /// Absorbance in bins from the rim to the centre, over the cell's median; NaN where the nucleus fills a bin.
+    pub(crate) fn profile(&self, maps: &Maps) -> [f64; PROFILE] {
+        let (mut sums, mut counts) = ([0.0; PROFILE], [0.0; PROFILE]);
+        for (p, depth) in &self.cytoplasm {
+            let bin = nearest(depth * PROFILE as f64 - 0.5).min(PROFILE - 1);
+            sums[bin] += f64::from(maps.absorbance[*p]);
+            counts[bin] += 1.0;
+        }
+        let middle = self.middle().max(0.01);
+        std::array::from_fn(|i| if counts[i] > 0.0 { sums[i] / counts[i] / middle } else { f64::NAN })
+    }
+
+    /// All its features.
+    pub(crate) fn features(&self, maps: &Maps, pixel_um: f64) -> Row {
+        let mut row = Row::default();
+        let um2 = pixel_um * pixel_um;
+        let shape = self.shape;
+        let radius = (shape.area / PI).sqrt();
+        row.put(Family::Shape, "cell area, um2", shape.area * um2);
+        row.put(Family::Shape, "cell eccentricity", shape.eccentricity);
+        row.put(Family::Shape, "cell solidity", shape.solidity);
+        row.put(Family::Shape, "cell circularity", shape.circularity);
+        row.put(Family::Shape, "corners", self.outline.corners);
+        row.put(Family::Shape, "notches", self.outline.notches);
+        row.put(Family::Shape, "straight part of the outline", self.outline.straight);
+        let nucleus = self.nucleus.shape();
+        row.put(Family::Shape, "nucleus over cell area", nucleus.area / shape.area);
+        row.put(Family::Shape, "nucleus off centre, radii", distance(nucleus.centre, shape.centre) / radius);
+
+        let middle = self.middle();
+        let unit = middle.max(0.01);
+        let at = |q: f64| of_sorted(&self.sorted, q) / unit;
+        row.put(Family::Stain, "cytoplasm absorbance", middle);
+        row.put(Family::Stain, "cytoplasm sd over median", deviation(&self.sorted) / unit);
+        for q in [0.05, 0.25, 0.75, 0.9, 0.99] {
+            row.put(Family::Stain, format!("cytoplasm quantile {q} over median"), at(q));
+        }
+        for (i, a) in self.profile(maps).into_iter().enumerate() {
+            row.put(Family::Stain, format!("rim to centre, bin {} of {PROFILE}", i + 1), a);
+        }
+
+        let pixels = || self.cytoplasm.iter().map(|c| c.0);
+        for (band, name) in ["1", "2", "4", "8", "16"].into_iter().enumerate() {
+            row.put(Family::Texture, format!("cytoplasm power at {name} px over median"), maps.power(pixels(), band) / unit);
+        }
+        let inner = || self.cytoplasm.iter().filter(|c| c.1 > 0.2).map(|c| c.0);
+        let slopes: Vec<f64> = inner().map(|p| f64::from(maps.slope[p])).collect();
+        row.put(Family::Texture, "cytoplasm slope over median", mean(&slopes) / unit);
+        let [dark, pale] = maps.extrema(inner());
+        row.put(Family::Texture, "dark spots in cytoplasm, um-2", dark / um2);
+        row.put(Family::Texture, "pale spots in cytoplasm, um-2", pale / um2);
+        let of_sector = |s: usize| {
+            let values: Vec<f64> = self.cytoplasm.iter().filter(|c| self.sector(c.0, maps.width) == s).map(|c| f64::from(maps.absorbance[c.0])).collect();
+            if values.is_empty() { f64::NAN } else { mean(&values) / unit }
+        };
+        let sectors: Vec<f64> = (0..SECTORS).map(of_sector).filter(|v| v.is_finite()).collect();
+        row.put(Family::Texture, "unevenness between sectors", deviation(&sectors));
+        row.put(Family::Texture, "darkest sector over median", sectors.iter().copied().fold(f64::NAN, f64::max));
+
+        let mut rim: Vec<f64> = Vec::new();
+        let near = self.rim(maps.height);
+        for edge in &maps.edges {
+            if near.binary_search(&edge.pixel).is_ok() {
+                rim.push(edge.sigma);
+            }
+        }
+        rim.sort_unstable_by(f64::total_cmp);
+        let known = rim.len() >= super::edges::LEAST;
+        for q in [0.25, 0.5] {
+            row.put(Family::Edges, format!("sigma of the cell's rim, px, quantile {q}"), if known { of_sorted(&rim, q) } else { f64::NAN });
+        }
+        row.put(Family::Edges, "steep part of the rim", rim.len() as f64 / (TAU * radius));
+        row
+    }
+
+    fn sector(&self, pixel: usize, width: usize) -> usize {
+        let (x, y) = ((pixel % width) as f64 - self.shape.centre[0], (pixel / width) as f64 - self.shape.centre[1]);
+        whole((libm::atan2(y, x) / TAU + 0.5) * SECTORS as f64).min(SECTORS - 1)
+    }
+
+    /// Pixels at most three from the cell's rim, in order.
+    fn rim(&self, height: usize) -> Vec<usize> {
+        const NEAR: f32 = 3.0;
+        let (inside, wide, [left, top]) = self.region.tile(whole(f64::from(NEAR)) + 1);
+        let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
+        let (inner, outer) = (distance_inside(&inside, wide), distance_inside(&outside, wide));
+        let place = |i: usize| {
+            let (x, y) = (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
+            (x < self.region.width && y < height && inner[i] <= NEAR && outer[i] <= NEAR).then(|| y * self.region.width + x)
+        };
+        (0..inside.len()).filter_map(place).collect()
+    }
+}
+
+impl Outline {
+    /// Of a closed line along the corners of pixels; `chord` in pixels.
+    pub(crate) fn new(line: &[[f64; 2]], chord: f64) -> Self {
+        let line = smoothed(line, nearest(chord / 2.0).max(3));
+        let n = line.len();
+        let step = nearest(chord).max(2);
+        if n < 4 * step {
+            return Self { corners: f64::NAN, notches: f64::NAN, straight: f64::NAN };
+        }
+        let turn = |i: usize| {
+            let (a, b, c) = (line[(i + n - step) % n], line[i], line[(i + step) % n]);
+            let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
+            // The line runs anticlockwise on the screen, where y points down: outwards turns are negative.
+            -libm::atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]).to_degrees()
+        };
+        let turns: Vec<f64> = (0..n).map(turn).collect();
+        let count = |sign: f64| {
+            let is_corner = |i: &usize| {
+                let own = sign * turns[*i];
+                let others = (1..=step).flat_map(|k| [(*i + k) % n, (*i + n - k) % n]);
+                own > CORNER_DEG && others.enumerate().all(|(k, j)| if k % 2 == 0 { own >= sign * turns[j] } else { own > sign * turns[j] })
+            };
+            (0..n).filter(is_corner).count() as f64
+        };
+        let straight = turns.iter().filter(|t| t.abs() < STRAIGHT_DEG).count() as f64 / n as f64;
+        Self { corners: count(1.0), notches: count(-1.0), straight }
+    }
+}

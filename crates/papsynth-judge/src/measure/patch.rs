@@ -1,0 +1,255 @@
+//! What a patch of a field looks like.
+
+use super::maps::{BANDS, Maps};
+use super::noise::{BLOCK, Noise};
+use crate::filter::{blur, gradient};
+use crate::number::whole;
+use crate::statistics::{of_sorted, quantile};
+use crate::table::{Family, Row, Table};
+
+/// Side of a patch, pixels; smaller fields are one patch.
+pub(crate) const PATCH_PX: usize = 200;
+
+/// Darker than this is an object, absorbance.
+pub(crate) const OBJECT: f32 = 0.04;
+
+/// Parts of a patch between these absorbances are counted.
+const STEPS: [f32; 6] = [0.04, 0.1, 0.2, 0.3, 0.5, 0.8];
+
+/// Quantiles of absorbance.
+const QUANTILES: [f64; 7] = [0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99];
+
+/// Standard deviations at which ridges and blobs are looked for, pixels.
+const HESSIANS: [f64; 3] = [1.5, 3.0, 6.0];
+
+/// Gradient and window of structure tensors, pixels.
+const TENSORS: [[f64; 2]; 2] = [[1.0, 3.0], [2.0, 6.0]];
+
+/// Radius and smoothing of local binary patterns, pixels.
+const PATTERNS: [(i64, f64); 3] = [(1, 0.0), (2, 1.0), (4, 2.0)];
+
+/// Differences of absorbance smaller than this are none, for patterns.
+const TOLERANCE: f32 = 0.004;
+
+/// Patterns of eight neighbours with at most two changes have 0 to 8 of them darker; all others are one class more.
+const CLASSES: usize = 10;
+
+/// Part of a patch's blocks that count as flat.
+const FLAT: f64 = 0.2;
+
+/// Maps that patches alone need.
+struct Fine<'a> {
+    maps: &'a Maps,
+    gradient: [Vec<f32>; 2],
+    /// Larger and smaller eigenvalue of the second derivatives (darkness is positive: a dark ridge's is negative across).
+    hessians: Vec<[Vec<f32>; 2]>,
+    /// Coherence and energy of structure tensors.
+    tensors: Vec<[Vec<f32>; 2]>,
+    /// Class of the pattern around every pixel.
+    patterns: Vec<Vec<u8>>,
+}
+
+/// The features of all patches of a field.
+pub(crate) fn patches(maps: &Maps) -> Table {
+    let fine = Fine {
+        maps,
+        gradient: maps.gradient(),
+        hessians: HESSIANS.iter().map(|s| hessian(&blur(&maps.absorbance, maps.width, *s), maps.width, *s)).collect(),
+        tensors: TENSORS.iter().map(|[s, window]| tensor(maps, *s, *window)).collect(),
+        patterns: PATTERNS.iter().map(|(radius, s)| pattern(maps, *radius, *s)).collect(),
+    };
+    let mut table = Table::default();
+    let (wide, high) = (PATCH_PX.min(maps.width), PATCH_PX.min(maps.height));
+    for top in (0..=maps.height - high).step_by(high) {
+        for left in (0..=maps.width - wide).step_by(wide) {
+            let window = Window { left, top, wide, high };
+            table.push(features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64]);
+        }
+    }
+    table
+}
+
+#[derive(Clone, Copy)]
+struct Window {
+    left: usize,
+    top: usize,
+    wide: usize,
+    high: usize,
+}
+
+impl Window {
+    /// The values of an image in it, of which every `2^shift` pixels a side are one.
+    fn of<T: Copy>(self, image: &[T], width: usize, shift: usize) -> impl Iterator<Item = T> {
+        let rows = (self.top >> shift)..((self.top + self.high) >> shift).max((self.top >> shift) + 1);
+        let columns = (self.left >> shift)..((self.left + self.wide) >> shift).max((self.left >> shift) + 1);
+        rows.flat_map(move |y| image[y * width..][columns.clone()].iter().copied())
+    }
+}
+
+fn features(fine: &Fine, window: Window) -> Row {
+    let maps = fine.maps;
+    let width = maps.width;
+    let mut row = Row::default();
+    let a: Vec<f32> = window.of(&maps.absorbance, width, 0).collect();
+    let smooth: Vec<f32> = window.of(&maps.smooth, width, 0).collect();
+    let part = |count: usize| count as f64 / a.len() as f64;
+
+    let mut sorted: Vec<f64> = smooth.iter().map(|v| f64::from(*v)).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    for q in QUANTILES {
+        row.put(Family::Stain, format!("absorbance, quantile {q}"), of_sorted(&sorted, q));
+    }
+    for (i, from) in STEPS.iter().enumerate() {
+        let to = STEPS.get(i + 1).copied().unwrap_or(f32::INFINITY);
+        let count = smooth.iter().filter(|v| **v >= *from && **v < to).count();
+        row.put(Family::Stain, format!("part of absorbance {from} and more"), part(count));
+    }
+
+    let mut powers = Vec::new();
+    for (i, (band, wide)) in maps.bands.iter().enumerate() {
+        let values: Vec<f64> = window.of(band, *wide, i).map(f64::from).collect();
+        let n = values.len() as f64;
+        let square = values.iter().map(|v| v * v).sum::<f64>() / n;
+        let fourth = values.iter().map(|v| v * v * v * v).sum::<f64>() / n;
+        let power = libm::log10(square.max(1e-10));
+        row.put(Family::Spectrum, format!("log power at {} px", 1 << i), power);
+        row.put(Family::Spectrum, format!("sparseness at {} px", 1 << i), libm::log10(fourth / (square * square).max(1e-18)));
+        powers.push(power);
+    }
+    for i in 1..BANDS {
+        row.put(Family::Spectrum, format!("log power at {} over {} px", 1 << i, 1 << (i - 1)), powers[i] - powers[i - 1]);
+    }
+
+    edges(&mut row, fine, window);
+    noise(&mut row, maps, window);
+
+    let object: Vec<bool> = smooth.iter().map(|v| *v > OBJECT).collect();
+    let objects = object.iter().filter(|o| **o).count();
+    let over = |image: &[f32], f: &dyn Fn(f32) -> f64| {
+        let sum: f64 = window.of(image, width, 0).zip(&object).filter(|(_, o)| **o).map(|(v, _)| f(v)).sum();
+        if objects < MIN_OBJECT { f64::NAN } else { sum / objects as f64 }
+    };
+    for ([high, low], sigma) in fine.hessians.iter().zip(HESSIANS) {
+        let (valley, ridge) = (over(high, &|v| f64::from(v.max(0.0))), over(low, &|v| f64::from(-v.min(0.0))));
+        let weak = over(high, &|v| f64::from(v.min(0.0).abs()));
+        row.put(Family::Texture, format!("log dark ridges at {sigma} px"), libm::log10(ridge.max(1e-6)));
+        row.put(Family::Texture, format!("pale over dark ridges at {sigma} px"), valley / ridge.max(1e-6));
+        row.put(Family::Texture, format!("blobs over ridges at {sigma} px"), weak / ridge.max(1e-6));
+    }
+    for ([coherence, energy], [sigma, _]) in fine.tensors.iter().zip(TENSORS) {
+        let total = over(energy, &f64::from);
+        let product: Vec<f32> = coherence.iter().zip(energy).map(|(c, e)| c * e).collect();
+        row.put(Family::Texture, format!("coherence at {sigma} px"), over(coherence, &f64::from));
+        row.put(Family::Texture, format!("coherence of edges at {sigma} px"), over(&product, &f64::from) / total.max(1e-9));
+    }
+    for (classes, (radius, _)) in fine.patterns.iter().zip(PATTERNS) {
+        let mut counts = [0_usize; CLASSES];
+        // The finest patterns tell of noise, wherever it is.
+        let everywhere = radius == 1;
+        for (class, o) in window.of(classes, width, 0).zip(&object) {
+            if everywhere || *o {
+                counts[usize::from(class)] += 1;
+            }
+        }
+        let total = if everywhere { a.len() } else { objects };
+        for (i, count) in counts.iter().enumerate() {
+            let value = if total < MIN_OBJECT { f64::NAN } else { *count as f64 / total as f64 };
+            row.put(Family::Texture, format!("pattern {i} at {radius} px"), value);
+        }
+    }
+    row
+}
+
+/// Fewer pixels of objects in a patch tell nothing of their texture.
+const MIN_OBJECT: usize = 400;
+
+fn edges(row: &mut Row, fine: &Fine, window: Window) {
+    let maps = fine.maps;
+    let mut slopes: Vec<f64> = window.of(&maps.slope, maps.width, 0).map(f64::from).collect();
+    slopes.sort_unstable_by(f64::total_cmp);
+    for q in [0.5, 0.75, 0.9, 0.97, 0.995] {
+        row.put(Family::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
+    }
+    let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
+    row.put(Family::Edges, "log slope across over down", libm::log10(sum(&fine.gradient[0]).max(1e-9) / sum(&fine.gradient[1]).max(1e-9)));
+    let within = |p: usize| {
+        let (x, y) = (p % maps.width, p / maps.width);
+        (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
+    };
+    let mut widths: Vec<f64> = maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma).collect();
+    for q in [0.1, 0.5, 0.9] {
+        let value = if widths.len() < super::edges::LEAST { f64::NAN } else { quantile(&mut widths, q) };
+        row.put(Family::Edges, format!("edge sigma, px, quantile {q}"), value);
+    }
+}
+
+/// Noise of the flattest blocks: its size, and how much neighbours are alike.
+fn noise(row: &mut Row, maps: &Maps, window: Window) {
+    let along = |from: usize, length: usize| (from..(from + length).saturating_sub(BLOCK - 1)).step_by(BLOCK);
+    let places = along(window.top, window.high).flat_map(|y| along(window.left, window.wide).map(move |x| (x, y)));
+    let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&maps.grey, maps.width, x, y)).collect();
+    blocks.sort_by(|a, b| a.variance.total_cmp(&b.variance));
+    blocks.truncate(whole((FLAT * blocks.len() as f64).ceil()));
+    let noise = Noise::mean(&mut blocks);
+    let known = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
+    row.put(Family::Noise, "log noise, dn", known(&|n| 0.5 * libm::log10(n.variance.max(1e-4))));
+    for (lag, name) in Noise::LAGS.iter().enumerate() {
+        row.put(Family::Noise, format!("noise correlation {name}"), known(&|n| n.correlation(lag)));
+    }
+}
+
+/// Both eigenvalues of the second derivatives in units of absorbance, the larger first.
+fn hessian(image: &[f32], width: usize, sigma: f64) -> [Vec<f32>; 2] {
+    let [dx, dy] = gradient(image, width);
+    let [dxx, dxy] = gradient(&dx, width);
+    let [_, dyy] = gradient(&dy, width);
+    let scale = crate::number::single(sigma * sigma);
+    let mut out = [Vec::with_capacity(image.len()), Vec::with_capacity(image.len())];
+    for ((xx, xy), yy) in dxx.iter().zip(&dxy).zip(&dyy) {
+        let half = 0.5 * (xx + yy);
+        let root = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+        out[0].push(scale * (half + root));
+        out[1].push(scale * (half - root));
+    }
+    out
+}
+
+/// Coherence ((λ₁ − λ₂)/(λ₁ + λ₂)) and energy (λ₁ + λ₂) of the structure tensor.
+fn tensor(maps: &Maps, sigma: f64, window: f64) -> [Vec<f32>; 2] {
+    let image = if sigma > 1.0 { &maps.smoother } else { &maps.smooth };
+    let [dx, dy] = gradient(image, maps.width);
+    let product = |a: &[f32], b: &[f32]| blur(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>(), maps.width, window);
+    let (xx, xy, yy) = (product(&dx, &dx), product(&dx, &dy), product(&dy, &dy));
+    let mut out = [Vec::with_capacity(image.len()), Vec::with_capacity(image.len())];
+    for ((xx, xy), yy) in xx.iter().zip(&xy).zip(&yy) {
+        let (sum, difference) = (xx + yy, ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt());
+        out[0].push(if sum > 1e-12 { difference / sum } else { 0.0 });
+        out[1].push(sum);
+    }
+    out
+}
+
+/// Rotation-invariant uniform local binary patterns of eight neighbours (Ojala et al., doi:10.1109/TPAMI.2002.1017623).
+fn pattern(maps: &Maps, radius: i64, sigma: f64) -> Vec<u8> {
+    let image = if sigma == 0.0 { maps.absorbance.clone() } else if sigma == 1.0 { maps.smooth.clone() } else { maps.smoother.clone() };
+    let diagonal = (radius * 7 + 5) / 10;
+    let ring = [[radius, 0], [diagonal, diagonal], [0, radius], [-diagonal, diagonal], [-radius, 0], [-diagonal, -diagonal], [0, -radius], [diagonal, -diagonal]];
+    let (width, height) = (maps.width as i64, maps.height as i64);
+    let classes = classes();
+    let mut out = vec![0; image.len()];
+    for y in 0..height {
+        for x in 0..width {
+            let at = |x: i64, y: i64| image[usize::try_from(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)).unwrap_or(0)];
+            let own = at(x, y) + TOLERANCE;
+            let bits = ring.iter().enumerate().map(|(i, [dx, dy])| usize::from(at(x + dx, y + dy) > own) << i).sum::<usize>();
+            out[usize::try_from(y * width + x).unwrap_or(0)] = classes[bits];
+        }
+    }
+    out
+}
+
+/// The class of each pattern of eight bits.
+fn classes() -> Vec<u8> {
+    let class = |bits: u8| if (bits ^ bits.rotate_left(1)).count_ones() <= 2 { bits.count_ones() } else { 9 };
+    (0..=u8::MAX).map(|bits| u8::try_from(class(bits)).unwrap_or(9)).collect()
+}

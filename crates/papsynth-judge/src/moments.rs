@@ -1,0 +1,186 @@
+//! The paper's comparison of nuclear textures.
+
+use rand_core::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use crate::number::{nearest, whole};
+use crate::statistics::{deviation, mean, median, of_sorted, quantile, shuffle};
+use crate::table::Table;
+
+/// Grey levels of a histogram.
+const LEVELS: usize = 256;
+
+/// How often each grey level of 8 bits occurs, as parts of 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Histogram {
+    parts: Vec<f64>,
+}
+
+impl Histogram {
+    /// Counts grey levels 0 to 255; what lies between two counts to the nearer.
+    pub fn new(grey: impl Iterator<Item = f32>) -> Self {
+        let mut parts = vec![0.0; LEVELS];
+        let mut count = 0.0;
+        for level in grey {
+            parts[nearest(f64::from(level)).min(LEVELS - 1)] += 1.0;
+            count += 1.0;
+        }
+        if count > 0.0 {
+            parts.iter_mut().for_each(|p| *p /= count);
+        }
+        Self { parts }
+    }
+
+    /// Eq. 18: m = Σᵢ zᵢ p(zᵢ).
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.parts.iter().enumerate().map(|(z, p)| z as f64 * p).sum()
+    }
+
+    /// Eq. 17: μₙ = Σᵢ (zᵢ − m)ⁿ p(zᵢ).
+    #[must_use]
+    pub fn moment(&self, n: i32) -> f64 {
+        let mean = self.mean();
+        let power = |d: f64| (0..n).fold(1.0, |product, _| product * d);
+        self.parts.iter().enumerate().map(|(z, p)| power(z as f64 - mean) * p).sum()
+    }
+
+    /// The logarithm to base 10 of 1 + |μₙ|, with the sign of μₙ: the odd ones have either.
+    #[must_use]
+    pub fn log_moment(&self, n: i32) -> f64 {
+        let moment = self.moment(n);
+        libm::log10(1.0 + moment.abs()) * moment.signum()
+    }
+
+    /// Eq. 19: H = −Σᵢ p(zᵢ) log₂ p(zᵢ), bits.
+    #[must_use]
+    pub fn entropy(&self) -> f64 {
+        -self.parts.iter().filter(|p| **p > 0.0).map(|p| p * libm::log2(*p)).sum::<f64>()
+    }
+}
+
+/// How the paper's descriptors of nuclear texture compare: the slope of the line through the quantiles of one side against those of the
+/// other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Moments {
+    /// Nuclei that each Q-Q plot compares, of either side.
+    pub n: usize,
+    /// One for each descriptor: central moments 2 to 6, as logarithms, and entropy.
+    pub descriptors: Vec<Descriptor>,
+}
+
+/// One descriptor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Descriptor {
+    /// Its name.
+    pub name: String,
+    /// Slope of real quantiles against synthetic ones: above 1 if the real ones spread more. 5th, 50th and 95th percentile over draws
+    /// of `n` nuclei from each side.
+    pub slope: [f64; 3],
+    /// The same between two disjoint halves of the real fields: 0.5th, 50th and 99.5th percentile. Of six descriptors one lies outside by
+    /// chance in one comparison of twenty.
+    pub null_slope: [f64; 3],
+    /// Median of the synthetic nuclei less that of the real ones, in standard deviations of the real ones: 5th, 50th and 95th percentile.
+    pub shift: [f64; 3],
+    /// The same between halves.
+    pub null_shift: [f64; 3],
+    /// Quantiles of both sides to be drawn: real, synthetic.
+    pub quantiles: Vec<[f64; 2]>,
+}
+
+impl Descriptor {
+    /// Whether both the slope and the shift lie where those of real halves do.
+    #[must_use]
+    pub fn is_within(&self) -> bool {
+        let within = |value: f64, [low, _, high]: [f64; 3]| value >= low && value <= high;
+        within(self.slope[1], self.null_slope) && within(self.shift[1], self.null_shift)
+    }
+}
+
+/// Slope of the least-squares line through the quantiles of `y` against those of `x`; both have the same length, which is that of the
+/// shorter where they differ. NaN if `x` does not vary.
+#[must_use]
+pub fn qq_slope(x: &[f64], y: &[f64]) -> f64 {
+    let n = x.len().min(y.len());
+    let quantiles = |values: &[f64]| {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        (0..n).map(|i| of_sorted(&sorted, (i as f64 + 0.5) / n as f64)).collect::<Vec<_>>()
+    };
+    let (x, y) = (quantiles(x), quantiles(y));
+    let (mx, my) = (mean(&x), mean(&y));
+    let (xy, xx) = x.iter().zip(&y).fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
+    if xx > 0.0 { xy / xx } else { f64::NAN }
+}
+
+/// Columns of the table of nuclei that are compared.
+const COLUMNS: [&str; 6] = ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
+
+/// Quantiles that are kept to be drawn.
+const DRAWN: usize = 60;
+
+/// Fewest nuclei of a side that are compared.
+const LEAST: usize = 8;
+
+/// Compares `n` nuclei of either side, `draws` times; of all that there are if `n` is 0. None if there are too few.
+pub(crate) fn compare(real: &[Table], synthetic: &[Table], n: usize, draws: usize, seed: u64) -> Option<Moments> {
+    let (real, synthetic): (Vec<&Table>, Vec<&Table>) = (real.iter().collect(), synthetic.iter().collect());
+    let nuclei = |tables: &[&Table]| tables.iter().map(|t| t.len()).sum::<usize>();
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let halves: Vec<[Vec<&Table>; 2]> = (0..draws).map(|_| halves(&real, &mut rng)).collect();
+    // The null is drawn from halves: no more than the smaller of them has, all but the smallest few.
+    let mut sizes: Vec<f64> = halves.iter().map(|h| nuclei(&h[0]).min(nuclei(&h[1])) as f64).collect();
+    let most = whole(quantile(&mut sizes, 0.1)).min(nuclei(&synthetic));
+    let n = if n == 0 { most } else { n };
+    if n < LEAST || n > most {
+        return None;
+    }
+    let halves: Vec<&[Vec<&Table>; 2]> = halves.iter().filter(|h| nuclei(&h[0]).min(nuclei(&h[1])) >= n).collect();
+    let descriptors = COLUMNS.iter().map(|name| {
+        let values = |tables: &[&Table]| tables.iter().flat_map(|t| t.column(name)).collect::<Vec<f64>>();
+        let all = [values(&real), values(&synthetic)];
+        let (mut slopes, mut shifts, mut null_slopes, mut null_shifts) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for half in &halves {
+            let mut draw = |mut values: Vec<f64>| {
+                shuffle(&mut values, &mut rng);
+                values.truncate(n);
+                values
+            };
+            let (a, b) = (draw(values(&half[0])), draw(values(&half[1])));
+            let other = draw(all[1].clone());
+            slopes.push(qq_slope(&other, &a));
+            null_slopes.push(qq_slope(&b, &a));
+            shifts.push(shift(&a, &other));
+            null_shifts.push(shift(&a, &b));
+        }
+        let at = |values: &mut [f64], quantiles: [f64; 3]| quantiles.map(|q| quantile(values, q));
+        let sorted = all.map(|mut values| {
+            values.sort_unstable_by(f64::total_cmp);
+            values
+        });
+        let points = (0..DRAWN).map(|i| (i as f64 + 0.5) / DRAWN as f64);
+        Descriptor {
+            name: (*name).to_owned(),
+            slope: at(&mut slopes, [0.05, 0.5, 0.95]),
+            null_slope: at(&mut null_slopes, [0.005, 0.5, 0.995]),
+            shift: at(&mut shifts, [0.05, 0.5, 0.95]),
+            null_shift: at(&mut null_shifts, [0.005, 0.5, 0.995]),
+            quantiles: points.map(|q| [of_sorted(&sorted[0], q), of_sorted(&sorted[1], q)]).collect(),
+        }
+    });
+    Some(Moments { n, descriptors: descriptors.collect() })
+}
+
+/// Median of `other` less that of `values`, in standard deviations of `values`.
+fn shift(values: &[f64], other: &[f64]) -> f64 {
+    (median(&mut other.to_vec()) - median(&mut values.to_vec())) / deviation(values).max(1e-9)
+}
+
+/// Fields dealt into two halves.
+fn halves<'a>(tables: &[&'a Table], rng: &mut Xoshiro256PlusPlus) -> [Vec<&'a Table>; 2] {
+    let mut tables: Vec<&Table> = tables.iter().copied().filter(|t| !t.is_empty()).collect();
+    shuffle(&mut tables, rng);
+    let other = tables.split_off(tables.len() / 2);
+    [tables, other]
+}

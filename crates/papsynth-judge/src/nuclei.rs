@@ -1,0 +1,178 @@
+//! Nuclei: where they are, pixel by pixel.
+
+use crate::filter::blur;
+use crate::number::whole;
+use crate::region::{Region, flood};
+use crate::tree::{Blob, STEP, blobs};
+
+/// What is taken for a nucleus. All defaults are ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct NucleiParams {
+    /// Smallest area, µm². Default 15: larger specks are rare.
+    pub smallest_um2: f64,
+    /// Largest area, µm². Default 400.
+    pub largest_um2: f64,
+    /// Smallest part of the ellipse of the same second moments that is filled, 0 to 1. Default 0.92.
+    pub least_ellipse: f64,
+    /// Smallest area over that of the convex hull, 0 to 1. Default 0.86.
+    pub least_solidity: f64,
+    /// Least difference of absorbance between inside and what lies around, above 0. Default 0.10.
+    pub least_contrast: f64,
+    /// Least steepness of the rim, absorbance a µm. Default 0.05.
+    pub least_steepness: f64,
+}
+
+impl Default for NucleiParams {
+    fn default() -> Self {
+        Self {
+            smallest_um2: 15.0,
+            largest_um2: 400.0,
+            least_ellipse: 0.92,
+            least_solidity: 0.86,
+            least_contrast: 0.10,
+            least_steepness: 0.05,
+        }
+    }
+}
+
+/// Blur before thresholds are set, µm: what noise of single pixels needs, and less than a rim's width.
+const SMOOTH_UM: f64 = 0.3;
+
+/// Thresholds begin here: nuclei are darker, and empty slide is left out of the search.
+const LIGHTEST: f32 = 0.10;
+
+/// How far a marked point may lie from a nucleus's centre, µm.
+const MARK_UM: f64 = 4.0;
+
+/// What lies around a nucleus begins and ends so far from its rim, µm.
+const AROUND_UM: [f64; 2] = [0.8, 2.5];
+
+/// Where the regions of nuclei come from.
+pub(crate) enum Hints<'a> {
+    Nothing,
+    Points(&'a [[f64; 2]]),
+    Masks(&'a [u32]),
+}
+
+/// The nuclei of a picture, by their centres from top to bottom. No two have a pixel in common.
+pub(crate) fn nuclei(absorbance: &[f32], width: usize, pixel_um: f64, hints: &Hints, params: &NucleiParams) -> Vec<Region> {
+    let mut regions = match hints {
+        Hints::Masks(labels) => masks(labels, width),
+        Hints::Nothing => found(absorbance, width, pixel_um, None, params),
+        Hints::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
+    };
+    regions.retain(|r| r.pixels.len() as f64 * pixel_um * pixel_um >= params.smallest_um2);
+    regions.sort_by_key(|r| r.pixels.iter().min().copied());
+    regions
+}
+
+/// The largest connected part of each label.
+fn masks(labels: &[u32], width: usize) -> Vec<Region> {
+    let mut seen = vec![false; labels.len()];
+    let mut largest = std::collections::BTreeMap::<u32, Region>::new();
+    for start in 0..labels.len() {
+        if labels[start] != 0 && !seen[start] {
+            let region = flood(start, width, labels.len(), &mut seen, |p| labels[p] == labels[start]);
+            let kept = largest.entry(labels[start]).or_default();
+            if kept.pixels.len() < region.pixels.len() {
+                *kept = region;
+            }
+        }
+    }
+    largest.into_values().collect()
+}
+
+fn found(absorbance: &[f32], width: usize, pixel_um: f64, points: Option<&[[f64; 2]]>, params: &NucleiParams) -> Vec<Region> {
+    let smooth = blur(absorbance, width, (SMOOTH_UM / pixel_um).max(0.5));
+    let px2 = pixel_um * pixel_um;
+    let (smallest, largest) = (params.smallest_um2 / px2, params.largest_um2 / px2);
+    let all = blobs(&smooth, width, LIGHTEST, largest * 1.5);
+    // Marked nuclei are there however faint; of them it is only asked which threshold shows them best.
+    let leniency = if points.is_some() { 0.5 } else { 1.0 };
+    let score = |b: &Blob| b.steepness * b.ellipse * b.ellipse * b.ellipse * b.ellipse;
+    let mut candidates: Vec<usize> = (0..all.len())
+        .filter(|&i| {
+            let b = &all[i];
+            b.area >= smallest
+                && b.area <= largest
+                && b.ellipse >= 1.0 - (1.0 - params.least_ellipse) / leniency
+                && b.steepness >= leniency * params.least_steepness * pixel_um
+                && b.sum / b.area - f64::from(b.level) * f64::from(STEP) >= leniency * 0.25 * params.least_contrast
+        })
+        .collect();
+    candidates.sort_by(|&a, &b| score(&all[b]).total_cmp(&score(&all[a])).then(a.cmp(&b)));
+    let mut marked: Vec<bool> = points.map(|p| vec![false; p.len()]).unwrap_or_default();
+    let mut taken = vec![false; absorbance.len()];
+    let mut around = vec![false; all.len()];
+    let mut regions = Vec::new();
+    let mut seen = vec![false; absorbance.len()];
+    for &i in &candidates {
+        let blob = &all[i];
+        if around[i] || taken[blob.pixel as usize] {
+            continue;
+        }
+        let mark = points.map(|points| nearest_mark(points, &marked, blob, pixel_um));
+        if mark == Some(None) {
+            continue;
+        }
+        let threshold = f32::from(blob.level) * STEP;
+        let region = flood(blob.pixel as usize, width, smooth.len(), &mut seen, |p| smooth[p] >= threshold);
+        for &p in &region.pixels {
+            seen[p as usize] = false;
+        }
+        let region = region.filled(smooth.len() / width);
+        let free = region.pixels.iter().all(|p| !taken[*p as usize]);
+        let shape = region.shape();
+        let good = free
+            && region.pixels.len() as f64 <= largest
+            && shape.solidity >= 1.0 - (1.0 - params.least_solidity) / leniency
+            && contrast(&smooth, &region, pixel_um) >= leniency * params.least_contrast;
+        if !good {
+            continue;
+        }
+        if let Some(Some(mark)) = mark {
+            marked[mark] = true;
+        }
+        for &p in &region.pixels {
+            taken[p as usize] = true;
+        }
+        let mut outer = blob.parent;
+        while let Some(o) = outer {
+            around[o as usize] = true;
+            outer = all[o as usize].parent;
+        }
+        regions.push(region);
+    }
+    regions
+}
+
+/// The nearest point to a blob, not further from its centre than a mark may be, that has no nucleus yet.
+fn nearest_mark(points: &[[f64; 2]], marked: &[bool], blob: &Blob, pixel_um: f64) -> Option<usize> {
+    let reach = (MARK_UM / pixel_um).max(0.7 * (blob.area / std::f64::consts::PI).sqrt());
+    let far = |i: usize| crate::region::distance(points[i], blob.centre);
+    let near = (0..points.len()).filter(|&i| !marked[i] && far(i) <= reach);
+    near.min_by(|&a, &b| far(a).total_cmp(&far(b)))
+}
+
+/// Mean absorbance inside above the median of what lies around.
+fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
+    let inner = region.pixels.iter().map(|p| f64::from(absorbance[*p as usize])).sum::<f64>() / region.pixels.len() as f64;
+    let [from, to] = AROUND_UM.map(|um| um / pixel_um);
+    let mut outer: Vec<f64> = Vec::new();
+    let margin = whole(to) + 1;
+    let (inside, wide, [left, top]) = region.tile(margin);
+    let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
+    let distances = crate::region::distance_inside(&outside, wide);
+    let height = absorbance.len() / region.width;
+    for (i, d) in distances.iter().enumerate() {
+        let d = f64::from(*d);
+        let (x, y) = ((i % wide) as i64 + left, (i / wide) as i64 + top);
+        if let (true, Ok(x), Ok(y)) = (d > from && d <= to, usize::try_from(x), usize::try_from(y))
+            && x < region.width
+            && y < height
+        {
+            outer.push(f64::from(absorbance[y * region.width + x]));
+        }
+    }
+    if outer.is_empty() { 0.0 } else { inner - crate::statistics::median(&mut outer) }
+}

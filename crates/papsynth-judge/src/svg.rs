@@ -1,0 +1,142 @@
+//! Small drawings as SVG.
+
+use std::fmt::Write;
+
+/// Colour of real things, and of synthetic ones: told apart with defective colour vision too (Okabe and Ito).
+pub(crate) const COLOURS: [&str; 2] = ["#0072b2", "#d55e00"];
+
+const WIDTH: f64 = 380.0;
+const HEIGHT: f64 = 260.0;
+const LEFT: f64 = 52.0;
+const BOTTOM: f64 = 40.0;
+const TOP: f64 = 24.0;
+const RIGHT: f64 = 10.0;
+
+/// Axes with things on them.
+pub(crate) struct Plot {
+    x: [f64; 2],
+    y: [f64; 2],
+    body: String,
+}
+
+impl Plot {
+    /// Axes that hold all of these values, with a little room; what is not finite does not count.
+    pub(crate) fn new(title: &str, x_name: &str, y_name: &str, x: impl Iterator<Item = f64>, y: impl Iterator<Item = f64>) -> Self {
+        let mut plot = Self { x: range(x), y: range(y), body: String::new() };
+        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        plot.put(&format!(r##"<path d="M{LEFT} {TOP}V{bottom}H{right}" fill="none" stroke="#444"/>"##));
+        for v in ticks(plot.x) {
+            let at = plot.x(v);
+            plot.put(&format!(r##"<path d="M{at:.1} {bottom}v4" stroke="#444"/><text x="{at:.1}" y="{:.1}" text-anchor="middle">{}</text>"##, bottom + 15.0, short(v)));
+        }
+        for v in ticks(plot.y) {
+            let at = plot.y(v);
+            plot.put(&format!(r##"<path d="M{LEFT} {at:.1}h-4" stroke="#444"/><text x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"##, LEFT - 6.0, at + 3.5, short(v)));
+        }
+        plot.put(&format!(r#"<text class="title" x="{LEFT}" y="14">{}</text>"#, escape(title)));
+        plot.put(&format!(r#"<text x="{right}" y="{:.1}" text-anchor="end">{}</text>"#, HEIGHT - 6.0, escape(x_name)));
+        plot.put(&format!(r#"<text x="12" y="{TOP}" text-anchor="end" transform="rotate(-90 12 {TOP})">{}</text>"#, escape(y_name)));
+        plot
+    }
+
+    fn put(&mut self, element: &str) {
+        self.body.push_str(element);
+    }
+
+    fn x(&self, v: f64) -> f64 {
+        LEFT + (v - self.x[0]) / (self.x[1] - self.x[0]) * (WIDTH - LEFT - RIGHT)
+    }
+
+    fn y(&self, v: f64) -> f64 {
+        HEIGHT - BOTTOM - (v - self.y[0]) / (self.y[1] - self.y[0]) * (HEIGHT - BOTTOM - TOP)
+    }
+
+    fn path(&self, points: impl Iterator<Item = [f64; 2]>) -> String {
+        let mut path = String::new();
+        let mut letter = 'M';
+        for [x, y] in points {
+            if x.is_finite() && y.is_finite() {
+                let _ = write!(path, "{letter}{:.1} {:.1}", self.x(x), self.y(y));
+                letter = 'L';
+            } else {
+                letter = 'M';
+            }
+        }
+        path
+    }
+
+    /// A line through points, broken where one is not finite.
+    pub(crate) fn line(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
+        let path = self.path(points);
+        self.put(&format!(r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.8"/>"#));
+    }
+
+    /// A pale area between two lines.
+    pub(crate) fn band(&mut self, lower: &[[f64; 2]], upper: &[[f64; 2]], colour: &str) {
+        let known = |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite();
+        let path = self.path(lower.iter().filter(known).chain(upper.iter().rev().filter(known)).copied());
+        self.put(&format!(r#"<path d="{path}Z" fill="{colour}" fill-opacity="0.15" stroke="none"/>"#));
+    }
+
+    /// A dot at each point.
+    pub(crate) fn dots(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
+        for [x, y] in points.filter(|p| p[0].is_finite() && p[1].is_finite()) {
+            let (x, y) = (self.x(x), self.y(y));
+            self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="{colour}" fill-opacity="0.7"/>"#));
+        }
+    }
+
+    /// A dashed line between two points.
+    pub(crate) fn dashes(&mut self, from: [f64; 2], to: [f64; 2]) {
+        let path = self.path([from, to].into_iter());
+        self.put(&format!(r##"<path d="{path}" stroke="#888" stroke-dasharray="4 3"/>"##));
+    }
+
+    /// The drawing.
+    pub(crate) fn finish(self) -> String {
+        format!(r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{}</svg>"#, self.body)
+    }
+}
+
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+    if low > high {
+        return [0.0, 1.0];
+    }
+    let room = if high > low { 0.04 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+    [low - room, high + room]
+}
+
+/// Round numbers within a range.
+fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
+    let rough = (high - low) / 5.0;
+    let ten = libm::pow(10.0, libm::log10(rough).floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * ten).find(|s| *s >= rough).unwrap_or(ten);
+    let first = (low / step).ceil();
+    (0..12).map(|i| (first + f64::from(i)) * step).filter(|v| *v <= high).collect()
+}
+
+/// A number in as many digits as are read.
+pub(crate) fn short(value: f64) -> String {
+    let size = value.abs();
+    if !value.is_finite() {
+        "–".to_owned()
+    } else if size >= 100.0 {
+        format!("{value:.0}")
+    } else if size >= 10.0 {
+        format!("{value:.1}")
+    } else if size >= 1.0 {
+        format!("{value:.2}")
+    } else if size >= 0.001 {
+        format!("{value:.3}")
+    } else if size < 1e-9 {
+        "0".to_owned()
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+/// Text that means itself in HTML.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

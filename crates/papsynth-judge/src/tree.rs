@@ -1,0 +1,223 @@
+//! Dark blobs at every threshold at once: the component tree of absorbance.
+
+use crate::number::{id, nearest, whole};
+
+/// Step between thresholds, absorbance: what a level of 8 bits is at 110 of 255.
+pub(crate) const STEP: f32 = 0.01;
+
+/// A connected region darker than a threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Blob {
+    /// Its threshold, in steps.
+    pub(crate) level: u16,
+    /// One of its darkest pixels.
+    pub(crate) pixel: u32,
+    /// Pixels.
+    pub(crate) area: f64,
+    /// Sum of absorbance over its pixels.
+    pub(crate) sum: f64,
+    /// Centre.
+    pub(crate) centre: [f64; 2],
+    /// Area over that of the ellipse of the same second moments: 1 of an ellipse, less of anything else.
+    pub(crate) ellipse: f64,
+    /// How steep its rim is: absorbance a pixel, by how fast its area grows with the threshold.
+    pub(crate) steepness: f64,
+    /// The blob around it, at the next lower threshold where there is one.
+    pub(crate) parent: Option<u32>,
+    /// Its largest part at the next higher threshold.
+    largest: Option<u32>,
+}
+
+/// How many thresholds below and above its own a blob's growth is looked at.
+const AROUND: u16 = 3;
+
+const NONE: u32 = u32::MAX;
+
+/// Running sums of a region.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    n: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    a: f64,
+}
+
+impl Sums {
+    fn add(&mut self, o: Self) {
+        self.n += o.n;
+        self.x += o.x;
+        self.y += o.y;
+        self.xx += o.xx;
+        self.xy += o.xy;
+        self.yy += o.yy;
+        self.a += o.a;
+    }
+
+    fn centre(&self) -> [f64; 2] {
+        [self.x / self.n, self.y / self.n]
+    }
+
+    fn ellipse(&self) -> f64 {
+        let [x, y] = self.centre();
+        let (xx, yy) = (self.xx / self.n - x * x + 1.0 / 12.0, self.yy / self.n - y * y + 1.0 / 12.0);
+        let xy = self.xy / self.n - x * y;
+        self.n / (4.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(1e-3).sqrt())
+    }
+}
+
+/// A tree with the sums of its region.
+#[derive(Clone, Copy)]
+struct Root {
+    sums: Sums,
+    pixel: u32,
+    /// Blobs that wait for one around them; a list through `Builder::next`.
+    waiting: u32,
+    touched: u16,
+}
+
+/// The level of a pixel.
+fn level(absorbance: f32, most: u16) -> u16 {
+    u16::try_from(whole(f64::from(absorbance / STEP))).unwrap_or(u16::MAX).min(most)
+}
+
+/// Every blob darker than `darkest..lightest` of at most `largest` pixels, the darkest first.
+pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f64) -> Vec<Blob> {
+    const MOST: u16 = 250;
+    let least = u16::try_from(nearest(f64::from(lightest / STEP))).unwrap_or(0).max(1);
+    let mut by_level: Vec<Vec<u32>> = vec![Vec::new(); usize::from(MOST) + 1];
+    for (i, a) in absorbance.iter().enumerate() {
+        let level = level(*a, MOST);
+        if level >= least {
+            by_level[usize::from(level)].push(id(i));
+        }
+    }
+    let mut slot = vec![NONE; absorbance.len()];
+    let mut roots: Vec<Root> = Vec::new();
+    let mut parents: Vec<u32> = Vec::new();
+    let mut blobs: Vec<Blob> = Vec::new();
+    let mut next: Vec<u32> = Vec::new();
+    let mut touched: Vec<u32> = Vec::new();
+    for level in (least..=MOST).rev() {
+        touched.clear();
+        for &pixel in &by_level[usize::from(level)] {
+            let p = pixel as usize;
+            let (x, y) = (p % width, p / width);
+            let mut own = NONE;
+            let around = [(x > 0).then(|| p - 1), (x + 1 < width).then(|| p + 1), p.checked_sub(width), Some(p + width).filter(|q| *q < absorbance.len())];
+            for q in around.into_iter().flatten().filter(|q| slot[*q] != NONE) {
+                let root = find(&mut parents, slot[q]);
+                own = if own == NONE || own == root { root } else { join(&mut parents, &mut roots, &mut next, own, root) };
+            }
+            if own == NONE {
+                own = id(roots.len());
+                parents.push(own);
+                roots.push(Root { sums: Sums::default(), pixel, waiting: NONE, touched: 0 });
+            }
+            slot[p] = own;
+            let (fx, fy) = (x as f64, y as f64);
+            let root = &mut roots[own as usize];
+            root.sums.add(Sums { n: 1.0, x: fx, y: fy, xx: fx * fx, xy: fx * fy, yy: fy * fy, a: f64::from(absorbance[p]) });
+            if root.touched != level {
+                root.touched = level;
+                touched.push(own);
+            }
+        }
+        for &candidate in &touched {
+            let own = find(&mut parents, candidate);
+            let root = roots[own as usize];
+            // The first to come makes the blob of all that were joined.
+            if root.touched == 0 {
+                continue;
+            }
+            roots[own as usize].touched = 0;
+            if root.sums.n > largest {
+                roots[own as usize].waiting = NONE;
+                continue;
+            }
+            let blob = id(blobs.len());
+            let mut part = root.waiting;
+            let mut main: Option<u32> = None;
+            while part != NONE {
+                blobs[part as usize].parent = Some(blob);
+                if main.is_none_or(|m| blobs[m as usize].area < blobs[part as usize].area) {
+                    main = Some(part);
+                }
+                part = next[part as usize];
+            }
+            blobs.push(Blob {
+                level,
+                pixel: root.pixel,
+                area: root.sums.n,
+                sum: root.sums.a,
+                centre: root.sums.centre(),
+                ellipse: root.sums.ellipse(),
+                steepness: 0.0,
+                parent: None,
+                largest: main,
+            });
+            next.push(NONE);
+            roots[own as usize].waiting = blob;
+        }
+    }
+    for i in 0..blobs.len() {
+        blobs[i].steepness = steepness(&blobs, i);
+    }
+    blobs
+}
+
+fn find(parents: &mut [u32], mut i: u32) -> u32 {
+    while parents[i as usize] != i {
+        parents[i as usize] = parents[parents[i as usize] as usize];
+        i = parents[i as usize];
+    }
+    i
+}
+
+fn join(parents: &mut [u32], roots: &mut [Root], next: &mut [u32], a: u32, b: u32) -> u32 {
+    let (into, from) = if roots[a as usize].sums.n >= roots[b as usize].sums.n { (a, b) } else { (b, a) };
+    parents[from as usize] = into;
+    let other = roots[from as usize];
+    let root = &mut roots[into as usize];
+    root.sums.add(other.sums);
+    root.touched = root.touched.max(other.touched);
+    if root.waiting == NONE {
+        root.waiting = other.waiting;
+    } else {
+        let mut last = root.waiting;
+        while next[last as usize] != NONE {
+            last = next[last as usize];
+        }
+        next[last as usize] = other.waiting;
+    }
+    into
+}
+
+/// A rim of slope g around a region of perimeter P moves outwards by dA/g when the threshold falls by dA, and adds P dA/g pixels.
+fn steepness(blobs: &[Blob], i: usize) -> f64 {
+    let blob = &blobs[i];
+    let mut outer = blob;
+    let mut fallen = 0;
+    while let Some(parent) = outer.parent.map(|p| &blobs[p as usize]) {
+        if blob.level - parent.level > AROUND {
+            break;
+        }
+        outer = parent;
+        fallen = blob.level - parent.level;
+    }
+    // What has no blob around it becomes too large at the next threshold: its rim is no rim.
+    if outer.parent.is_none() && fallen < AROUND {
+        return 0.0;
+    }
+    // The largest part that is still there when the threshold has risen; nothing, if none is.
+    let mut inner = Some(blob);
+    while let Some(part) = inner.filter(|part| part.level - blob.level < AROUND) {
+        inner = part.largest.map(|p| &blobs[p as usize]);
+    }
+    let inner = inner.map_or(0.0, |part| part.area);
+    let perimeter = 2.0 * (std::f64::consts::PI * blob.area).sqrt();
+    let steps = f64::from(2 * AROUND) * f64::from(STEP);
+    perimeter * steps / (outer.area - inner).max(1.0)
+}

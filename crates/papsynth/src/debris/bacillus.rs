@@ -1,0 +1,214 @@
+//! Rod-shaped bacteria ("Bacilli"): short bent lines of even width with round ends, some in chains.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Lie, cluster_id, member_number};
+use super::site::Site;
+use super::{Ground, Kinds, Section, Thing};
+use crate::phantom::tile::{Point, Tile};
+use crate::phantom::wobble::placed;
+use crate::phantom::{LEAST_ABSORBANCE, Phantom};
+use crate::random;
+use crate::recipe::Number;
+
+/// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Bacilli {
+    /// Number of clusters, 0 to 100000; drawn once a field.
+    pub clusters: Number,
+    /// Bacilli of a cluster, 1 to 10000.
+    pub per_cluster: Number,
+    /// Radius (standard deviation) of a cluster, µm, 0 to 1000.
+    pub cluster_um: Number,
+    /// Share of the clusters that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Length of a bacillus, µm, 0.3 to 50.
+    pub length_um: Number,
+    /// Width of a bacillus, µm, 0.1 to 5.
+    pub width_um: Number,
+    /// Bend of a bacillus, degrees between its ends, 0 to 120.
+    pub bend_deg: Number,
+    /// Share of the bacilli that hang together in chains of two to four, 0 to 1.
+    pub chained: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through a bacillus, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+}
+
+/// A rod-shaped bacterium or a chain of them, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bacillus {
+    /// Length of a rod, µm.
+    pub length_um: f64,
+    /// Width, µm.
+    pub width_um: f64,
+    /// Bend between its ends, degrees.
+    pub bend_deg: f64,
+    /// Number of rods in a chain.
+    pub rods: usize,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+}
+
+impl Default for Bacilli {
+    fn default() -> Self {
+        Self {
+            clusters: Number::log_normal(4.0, 0.8),
+            per_cluster: Number::log_normal(9.0, 0.9).at_least(1.0),
+            cluster_um: Number::uniform(5.0, 16.0),
+            on_cells: 0.85.into(),
+            length_um: Number::log_normal(2.6, 0.35),
+            width_um: Number::normal(0.6, 0.05),
+            bend_deg: Number::uniform(0.0, 35.0),
+            chained: 0.12.into(),
+            absorbance: Number::log_normal(0.09, 0.35),
+            phase_rad: Number::uniform(0.1, 0.25),
+        }
+    }
+}
+
+/// Chains have this many rods at most.
+const LONGEST_CHAIN: usize = 4;
+
+impl Kinds for Bacilli {
+    fn none() -> Self {
+        Self { clusters: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("clusters", &self.clusters, 0.0, 1e5);
+        section.count("per_cluster", &self.per_cluster, 1.0, 1e4);
+        section.number("cluster_um", &self.cluster_um, 0.0, 1000.0);
+        section.share("on_cells", &self.on_cells);
+        section.number("length_um", &self.length_um, 0.3, 50.0);
+        section.number("width_um", &self.width_um, 0.1, 5.0);
+        section.number("bend_deg", &self.bend_deg, 0.0, 120.0);
+        section.share("chained", &self.chained);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        for index in 0..ground.count("clusters", &self.clusters) {
+            let mut rng = ground.stream(index, "cluster");
+            let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
+            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = ground.stream(number, "body");
+                let centre_um = clump.place(&mut rng);
+                let mut own = ground.stream(number, "chain");
+                let chained = random::chance(self.chained.draw(&mut own), &mut own);
+                let bacillus = Bacillus {
+                    length_um: self.length_um.draw(&mut rng),
+                    width_um: self.width_um.draw(&mut rng),
+                    bend_deg: self.bend_deg.draw(&mut rng),
+                    rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
+                    absorbance: self.absorbance.draw(&mut rng),
+                    phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+                };
+                let depth_um = clump.depth_um + 0.3 * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                ground.add(number, cluster_id(index), lie, bacillus);
+            }
+        }
+    }
+}
+
+/// Straight parts of a bent rod.
+const PARTS: usize = 6;
+
+/// Standard deviation of the angle between the rods of a chain, radians.
+const KINK: f64 = 0.35;
+
+/// Width of a chain between two rods, relative to the rods': there the wall has grown in.
+const WAIST: f64 = 0.7;
+
+impl Thing for Bacillus {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let half_width = 0.5 * site.px(self.width_um);
+        let length = site.px((self.length_um - self.width_um).max(0.0));
+        let bend = self.bend_deg.to_radians();
+        let mut rng = site.stream("chain.shape");
+        let mut rods: Vec<Vec<Point>> = vec![spine(length, bend)];
+        for _ in 1..self.rods {
+            let size = random::between(0.8, 1.2, &mut rng);
+            let kink = KINK * random::normal(&mut rng);
+            let next = spine(size * length, bend * random::between(-1.0, 1.0, &mut rng));
+            rods.push(appended(&rods[rods.len() - 1], &next, kink, (1.0 + WAIST) * half_width));
+        }
+        let middle = rods.iter().flatten().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        let count = (self.rods * (PARTS + 1)) as f64;
+        let middle = if self.rods > 1 { middle.map(|sum| sum / count) } else { [0.0; 2] };
+        let turn = site.object.rotation_deg.to_radians();
+        for point in rods.iter_mut().flatten() {
+            *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, site.centre);
+        }
+        let mut coverage = Tile::around(rods.iter().flatten(), half_width + 2.0);
+        coverage.for_each(|p, value| {
+            // A pixel is covered as far as the rod's edge reaches into it.
+            let nearest = rods
+                .iter()
+                .flat_map(|rod| rod.windows(2))
+                .fold(f64::INFINITY, |least, part| least.min(distance(p, part[0], part[1])));
+            *value = (half_width - nearest + 0.5).clamp(0.0, (2.0 * half_width).min(1.0)) as f32;
+        });
+        let mut tile = coverage.clone();
+        for value in &mut tile.values {
+            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+        }
+        let (length_um, width_um) = (self.length_um, self.width_um);
+        let area = (length_um - width_um).max(0.0) * width_um + core::f64::consts::FRAC_PI_4 * width_um * width_um;
+        let area_px = match self.rods {
+            1 => area / (site.pixel_um * site.pixel_um),
+            _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
+        };
+        let dyes = site.scene.dyes.bacillus;
+        Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
+    }
+}
+
+/// The middle line of a rod: an arc of a circle about the origin.
+fn spine(length: f64, bend: f64) -> Vec<Point> {
+    let mut points = vec![[0.0, 0.0]];
+    let step = length / PARTS as f64;
+    let (mut x, mut y) = (0.0, 0.0);
+    for part in 0..PARTS {
+        let angle = bend * ((part as f64 + 0.5) / PARTS as f64 - 0.5);
+        x += step * libm::cos(angle);
+        y += step * libm::sin(angle);
+        points.push([x, y]);
+    }
+    for point in &mut points {
+        point[0] -= 0.5 * x;
+        point[1] -= 0.5 * y;
+    }
+    points
+}
+
+/// A rod that goes on where another ends, at an angle to it and a gap behind it.
+fn appended(before: &[Point], next: &[Point], kink: f64, gap: f64) -> Vec<Point> {
+    let [a, b] = [before[before.len() - 2], before[before.len() - 1]];
+    let heading = libm::atan2(b[1] - a[1], b[0] - a[0]) + kink;
+    let start = [b[0] + gap * libm::cos(heading), b[1] + gap * libm::sin(heading)];
+    let lead = libm::atan2(next[1][1] - next[0][1], next[1][0] - next[0][0]);
+    let first = next[0];
+    next.iter().map(|p| placed([p[0] - first[0], p[1] - first[1]], heading - lead, start)).collect()
+}
+
+/// Distance from a point to a straight part.
+fn distance(p: Point, a: Point, b: Point) -> f64 {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    let length = dx * dx + dy * dy;
+    let t = if length > 0.0 { (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+    let (ex, ey) = (p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
+    (ex * ex + ey * ey).sqrt()
+}

@@ -1,0 +1,155 @@
+//! The faint dirt of the background: flecks of a micrometre or two, many of them, hardly darker than empty slide.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::paint::Stroke;
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
+///
+/// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Dirt {
+    /// Number of drifts, 0 to 100000; drawn once a field.
+    pub drifts: Number,
+    /// Flecks of a drift, 1 to 10000.
+    pub per_drift: Number,
+    /// Radius (standard deviation) of a drift, µm, 0 to 1000.
+    pub drift_um: Number,
+    /// Length of a fleck, µm, 0.1 to 20.
+    pub length_um: Number,
+    /// Width of a fleck, µm, 0.1 to 10.
+    pub width_um: Number,
+    /// Share of the flecks that lie in the direction of their drift, 0 to 1.
+    pub aligned: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through a fleck, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+    /// Their dyes.
+    pub dyes: DyeAmounts,
+}
+
+/// A fleck of dirt, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fleck {
+    /// Length, µm.
+    pub length_um: f64,
+    /// Width, µm.
+    pub width_um: f64,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+    /// Its dyes where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for Dirt {
+    fn default() -> Self {
+        Self {
+            drifts: Number::log_normal(20.0, 0.7),
+            per_drift: Number::log_normal(4.0, 0.8).at_least(1.0),
+            drift_um: Number::log_normal(22.0, 0.6),
+            length_um: Number::log_normal(2.1, 0.5),
+            width_um: Number::log_normal(1.1, 0.35),
+            aligned: 0.6.into(),
+            absorbance: Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15),
+            phase_rad: Number::uniform(0.0, 0.12),
+            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
+        }
+    }
+}
+
+/// Most strokes that a fleck is made of, and the spread of the angles between them, radians.
+const MOST_STROKES: usize = 4;
+const KINK: f64 = 0.7;
+
+/// Spread of the depths of a drift's flecks, µm.
+const SCATTER_UM: f64 = 1.2;
+
+/// Spread of the directions of flecks that lie as their drift does, degrees.
+const ASTRAY_DEG: f64 = 14.0;
+
+impl Kinds for Dirt {
+    fn none() -> Self {
+        Self { drifts: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("drifts", &self.drifts, 0.0, 1e5);
+        section.count("per_drift", &self.per_drift, 1.0, 1e4);
+        section.number("drift_um", &self.drift_um, 0.0, 1000.0);
+        section.number("length_um", &self.length_um, 0.1, 20.0);
+        section.number("width_um", &self.width_um, 0.1, 10.0);
+        section.share("aligned", &self.aligned);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for index in 0..ground.count("drifts", &self.drifts) {
+            let mut rng = ground.stream(index, "drift");
+            let drift = ground.cluster(&Number::Fixed(0.0), &self.drift_um, &mut rng);
+            let direction_deg = random::between(0.0, 360.0, &mut rng);
+            for member in 0..self.per_drift.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = ground.stream(number, "body");
+                let centre_um = drift.place(&mut rng);
+                let length_um = self.length_um.draw(&mut rng);
+                let fleck = Fleck {
+                    length_um,
+                    width_um: self.width_um.draw(&mut rng).min(length_um),
+                    absorbance: self.absorbance.draw(&mut rng),
+                    phase_rad: self.phase_rad.draw(&mut rng),
+                    dyes,
+                };
+                let depth_um = drift.depth_um + SCATTER_UM * random::normal(&mut rng);
+                let mut lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                if random::chance(self.aligned.draw(&mut rng), &mut rng) {
+                    lie.rotation_deg = direction_deg + ASTRAY_DEG * random::normal(&mut rng);
+                }
+                ground.add(number, cluster_id(index), lie, fleck);
+            }
+        }
+    }
+}
+
+impl Thing for Fleck {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        // A crumb: a few strokes one after the other, each with its own width and heading.
+        let count = 2 + random::below(MOST_STROKES - 1, &mut rng);
+        let step = (self.length_um - self.width_um) / count as f64;
+        let (mut at, mut heading) = ([-0.5 * step * count as f64, 0.0], KINK * random::normal(&mut rng));
+        let mut joints: Vec<(Point, f64)> = Vec::with_capacity(count + 1);
+        for _ in 0..=count {
+            joints.push((site.place(at), site.px(0.5 * self.width_um * random::between(0.35, 1.0, &mut rng))));
+            at = [at[0] + step * libm::cos(heading), at[1] + step * libm::sin(heading)];
+            heading = 0.5 * heading + KINK * random::normal(&mut rng);
+        }
+        let mut painting = site.painting(joints.iter().map(|(at, _)| at), 0.5 * self.width_um);
+        for pair in joints.windows(2) {
+            let [(from, first), (to, last)] = [pair[0], pair[1]];
+            painting.stroke(&Stroke { ends: [from, to], half_widths: [first, last] }, 0.0);
+        }
+        for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
+            *value = self.absorbance as f32 * cover;
+        }
+        painting.finish(self.dyes, self.phase_rad, self.absorbance)
+    }
+}

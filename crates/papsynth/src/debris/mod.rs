@@ -1,0 +1,235 @@
+//! Everything that is no epithelial cell ("Debris Object Generation").
+//!
+//! A kind of object is one file: its section of the recipe with what is accepted there, the numbers that are drawn of
+//! one object, where objects lie, and the phantom of one. The list below makes of the files the recipe's `[debris]`, the
+//! scene's bodies and the truth's classes. Adding a kind means adding its file and its entry.
+
+mod bacillus;
+mod bare_nucleus;
+mod bubble;
+mod candida;
+mod check;
+mod clue;
+mod coccus;
+mod crystal;
+mod dirt;
+mod dust;
+mod fibre;
+mod ground;
+mod leukocyte;
+mod mucus;
+mod out_of_focus;
+mod paint;
+mod red_cell;
+mod scratch;
+mod site;
+mod smudge;
+mod speckle;
+mod trichomonad;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::phantom::{Phantom, Pools};
+use crate::scene::{CellBody, Object, Scene};
+
+pub use bacillus::{Bacilli, Bacillus};
+pub use bare_nucleus::{BareNuclei, BareNucleus};
+pub use bubble::{Bubble, Bubbles};
+pub use candida::{Candida, Candidas, Growth};
+pub(crate) use check::{MOST_PHASE_RAD, Section};
+pub(crate) use clue::cover;
+pub use clue::{ClueCells, Coat};
+pub use coccus::{Cocci, Colony};
+pub use crystal::{Crystal, Crystals};
+pub use dirt::{Dirt, Fleck};
+pub use dust::{Dust, Grain};
+pub use fibre::{Fibre, Fibres};
+pub(crate) use ground::Ground;
+pub use leukocyte::{Leukocyte, Leukocytes, NucleusForm};
+pub use mucus::{Mucus, Strand};
+pub use out_of_focus::{Blob, OutOfFocus};
+pub use red_cell::{RedCell, RedCells};
+pub use scratch::{Scratch, Scratches};
+pub use smudge::{Smudge, Smudges};
+pub use speckle::{SpeckForm, Speckle, Speckles};
+pub use trichomonad::{Trichomonad, Trichomonads};
+
+use site::Site;
+
+/// A section of the recipe: how many objects of a kind there are, and what they are like.
+trait Kinds {
+    /// The section of a slide that has none of them.
+    fn none() -> Self;
+
+    /// Finds what is out of range.
+    fn check(&self, section: &mut Section<'_>);
+
+    /// Draws every object of a field.
+    fn draw(&self, ground: &mut Ground<'_>);
+}
+
+/// The numbers drawn of one object.
+trait Thing {
+    /// The strength of its stain.
+    fn absorbance(&self) -> f64;
+
+    /// What it absorbs where it lies.
+    fn phantom(&self, site: &Site<'_>) -> Phantom;
+}
+
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $field:ident: $Section:ident => $Kind:ident($Thing:ident), $name:literal;)*) => {
+        /// Everything that is no epithelial cell.
+        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Debris {
+            /// Clue cells: epithelial cells covered with coccobacilli.
+            pub clue_cells: ClueCells,
+            $($(#[$doc])* pub $field: $Section,)*
+        }
+
+        /// What kind of thing an object is.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Kind {
+            /// Epithelial cells: cytoplasm and nucleus.
+            Cell,
+            $($(#[$doc])* $Kind,)*
+        }
+
+        /// What an object is, its numbers drawn.
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[serde(tag = "kind", rename_all = "kebab-case")]
+        pub enum Body {
+            /// An epithelial cell.
+            Cell(Box<CellBody>),
+            $($(#[$doc])* $Kind($Thing),)*
+        }
+
+        impl Kind {
+            /// All kinds, in the order in which their objects are numbered.
+            pub const ALL: [Self; 1 + [$($name),*].len()] = [Self::Cell, $(Self::$Kind),*];
+
+            /// The name of the kind, which is also the class of what has no class of its own.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    Self::Cell => "cell",
+                    $(Self::$Kind => $name,)*
+                }
+            }
+        }
+
+        impl Kind {
+            /// Whether all of it in an image is one row and one mask of the truth: a layer that nobody counts.
+            #[must_use]
+            pub fn is_layer(self) -> bool {
+                self == Self::Dirt
+            }
+        }
+
+        impl Body {
+            /// The kind of the object.
+            #[must_use]
+            pub fn kind(&self) -> Kind {
+                match self {
+                    Self::Cell(_) => Kind::Cell,
+                    $(Self::$Kind(_) => Kind::$Kind,)*
+                }
+            }
+
+            /// The strength of its stain: of a cell that of its cytoplasm.
+            pub(crate) fn absorbance(&self) -> f64 {
+                match self {
+                    Self::Cell(cell) => cell.cytoplasm_absorbance,
+                    $(Self::$Kind(thing) => thing.absorbance(),)*
+                }
+            }
+        }
+
+        $(impl From<$Thing> for Body {
+            fn from(thing: $Thing) -> Self {
+                Self::$Kind(thing)
+            }
+        })*
+
+        impl Debris {
+            /// A slide with nothing but cells.
+            #[must_use]
+            pub fn none() -> Self {
+                Self { clue_cells: ClueCells::none(), $($field: $Section::none(),)* }
+            }
+
+            /// Finds what is out of range; `find` is told the section's name.
+            pub(crate) fn check(&self, find: &mut impl FnMut(&str, &str, String)) {
+                {
+                    let mut add = |field: &str, message: String| find("clue_cells", field, message);
+                    self.clue_cells.check(&mut Section::new(&mut add));
+                }
+                $({
+                    let mut add = |field: &str, message: String| find(stringify!($field), field, message);
+                    self.$field.check(&mut Section::new(&mut add));
+                })*
+            }
+
+            /// Draws everything that lies on a slide with these cells.
+            pub(crate) fn draw(&self, ground: &mut Ground<'_>) {
+                ground.dress(&self.clue_cells);
+                $(
+                    ground.begin($name, stringify!($field));
+                    self.$field.draw(ground);
+                )*
+            }
+        }
+
+        /// What an object absorbs; nothing of cells, which are made together.
+        pub(crate) fn phantom(scene: &Scene, pools: &Pools<'_>, object: &Object) -> Option<Phantom> {
+            let site = Site::new(scene, pools, object);
+            match &object.body {
+                Body::Cell(_) => None,
+                $(Body::$Kind(thing) => Some(thing.phantom(&site)),)*
+            }
+        }
+    };
+}
+
+kinds! {
+    /// White blood cells, single and in clusters.
+    leukocytes: Leukocytes => Leukocyte(Leukocyte), "leukocyte";
+    /// Rod-shaped bacteria, in clusters, on cells and between them.
+    bacilli: Bacilli => Bacillus(Bacillus), "bacillus";
+    /// Specks of dust and stain, anywhere.
+    speckles: Speckles => Speckle(Speckle), "speckle";
+    /// Objects far outside the depth of the slide.
+    out_of_focus: OutOfFocus => OutOfFocus(Blob), "out-of-focus";
+    /// Amorphous debris: granular clumps.
+    smudges: Smudges => Smudge(Smudge), "smudge";
+    /// Faint flecks of background dirt.
+    dirt: Dirt => Dirt(Fleck), "dirt";
+    /// Cocci and coccobacilli, colony by colony.
+    cocci: Cocci => Coccus(Colony), "coccus";
+    /// *Candida*: pseudohyphae and budding yeasts.
+    candida: Candidas => Candida(Candida), "candida";
+    /// Trichomonads, pale pear-shaped flagellates.
+    trichomonads: Trichomonads => Trichomonad(Trichomonad), "trichomonad";
+    /// Red blood cells and their ghosts.
+    red_cells: RedCells => RedCell(RedCell), "red-cell";
+    /// Strands of mucus.
+    mucus: Mucus => Mucus(Strand), "mucus";
+    /// Bare nuclei.
+    bare_nuclei: BareNuclei => BareNucleus(BareNucleus), "bare-nucleus";
+    /// Precipitated dye: dark, angular, refracting grains.
+    crystals: Crystals => Crystal(Crystal), "crystal";
+    /// Dust on the glass, out of focus.
+    dust: Dust => Dust(Grain), "dust";
+    /// Fibres of cotton and cloth.
+    fibres: Fibres => Fibre(Fibre), "fibre";
+    /// Air bubbles in the mountant.
+    bubbles: Bubbles => Bubble(Bubble), "bubble";
+    /// Scratches in the glass.
+    scratches: Scratches => Scratch(Scratch), "scratch";
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,175 @@
+//! Painting an object on its own tile: what it covers, and what it absorbs there.
+
+use dye_spectra::Amounts;
+
+use crate::phantom::pools::{Look, Pool, SIDE, Texels};
+use crate::phantom::tile::{Point, Tile};
+use crate::phantom::{LEAST_ABSORBANCE, Phantom};
+
+/// An object that is being painted.
+pub(super) struct Painting {
+    /// Share of each pixel that it covers.
+    pub(super) coverage: Tile,
+    /// What it absorbs there.
+    pub(super) absorbance: Tile,
+}
+
+/// A straight stroke whose half-width changes evenly from one end to the other, with round ends; all in pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Stroke {
+    pub(super) ends: [Point; 2],
+    pub(super) half_widths: [f64; 2],
+}
+
+impl Stroke {
+    /// A stroke of even width.
+    pub(super) fn even(from: Point, to: Point, half_width: f64) -> Self {
+        Self { ends: [from, to], half_widths: [half_width; 2] }
+    }
+
+    /// How far inside its edge a point lies, and the half-width there.
+    fn depth(&self, p: Point) -> (f64, f64) {
+        let [a, b] = self.ends;
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let length = dx * dx + dy * dy;
+        let along = (p[0] - a[0]) * dx + (p[1] - a[1]) * dy;
+        let t = if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 };
+        let (ex, ey) = (p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
+        let half_width = self.half_widths[0] + t * (self.half_widths[1] - self.half_widths[0]);
+        (half_width - (ex * ex + ey * ey).sqrt(), half_width)
+    }
+
+    /// The share of a pixel that it covers: as far as its edge reaches into it.
+    fn share(&self, p: Point) -> f64 {
+        let (depth, half_width) = self.depth(p);
+        (depth + 0.5).clamp(0.0, (2.0 * half_width).min(1.0))
+    }
+}
+
+impl Painting {
+    /// An empty painting that reaches so many pixels beyond these points.
+    pub(super) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
+        let coverage = Tile::around(points, margin);
+        Self { absorbance: coverage.blank(), coverage }
+    }
+
+    /// Adds a stroke that absorbs so much where it covers a pixel, on top of what is there.
+    pub(super) fn stroke(&mut self, stroke: &Stroke, absorbance: f64) {
+        self.blend(stroke, |value, share| *value += share * absorbance as f32);
+    }
+
+    /// The same beside what is there: where strokes meet, the darker one counts.
+    pub(super) fn line(&mut self, stroke: &Stroke, absorbance: f64) {
+        self.blend(stroke, |value, share| *value = value.max(share * absorbance as f32));
+    }
+
+    fn blend(&mut self, stroke: &Stroke, add: impl Fn(&mut f32, f32)) {
+        let (width, height) = (self.coverage.width, self.coverage.height());
+        let reach = stroke.half_widths[0].max(stroke.half_widths[1]) + 1.0;
+        let origin = self.coverage.origin.map(|at| at as f64);
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to the tile")]
+        let span = |axis: usize, length: usize| {
+            let [a, b] = stroke.ends.map(|end| end[axis] - origin[axis]);
+            let low = (a.min(b) - reach).floor().clamp(0.0, length as f64);
+            let high = (a.max(b) + reach).ceil().clamp(0.0, length as f64);
+            low as usize..high as usize
+        };
+        for y in span(1, height) {
+            for x in span(0, width) {
+                let share = stroke.share([x as f64 + origin[0], y as f64 + origin[1]]) as f32;
+                if share > 0.0 {
+                    let at = y * width + x;
+                    let cover = &mut self.coverage.values[at];
+                    *cover = cover.max(share);
+                    add(&mut self.absorbance.values[at], share);
+                }
+            }
+        }
+    }
+
+    /// Adds a polygon of even absorbance.
+    pub(super) fn fill(&mut self, polygon: &[Point], absorbance: f64) {
+        let mut shape = self.coverage.blank();
+        shape.cover(polygon);
+        self.lay(&shape, |share| share * absorbance as f32);
+    }
+
+    /// Adds a tile of the painting's own size, of which each share of a pixel absorbs so much.
+    pub(super) fn lay(&mut self, shape: &Tile, absorbance: impl Fn(f32) -> f32) {
+        let values = self.coverage.values.iter_mut().zip(&mut self.absorbance.values);
+        for ((cover, value), share) in values.zip(&shape.values) {
+            *cover = cover.max(*share);
+            *value += absorbance(*share);
+        }
+    }
+
+    /// Visits every row with a field of a pool: where it starts, its coverage, its absorbance, and the field's values.
+    pub(super) fn rows(
+        &mut self,
+        pool: &Pool,
+        look: &Look,
+        mut visit: impl FnMut(Point, &mut [f32], &mut [f32], &[f32]),
+    ) {
+        let (width, [x, y]) = (self.coverage.width, self.coverage.origin);
+        let mut field = vec![0.0; width];
+        let mut texels: Texels = [0.0; SIDE + 1];
+        let covers = self.coverage.values.chunks_exact_mut(width);
+        for (row, (cover, value)) in covers.zip(self.absorbance.values.chunks_exact_mut(width)).enumerate() {
+            pool.row_into(&mut field, look, [0.0, row as f64], &mut texels);
+            visit([x as f64, y as f64 + row as f64], cover, value, &field);
+        }
+    }
+
+    /// Multiplies what it absorbs by 1 + strength · field, but by no less than 0.
+    pub(super) fn texture(&mut self, pool: &Pool, look: &Look, strength: f32) {
+        self.rows(pool, look, |_, _, values, field| {
+            for (value, field) in values.iter_mut().zip(field) {
+                *value *= (1.0 + strength * field).max(0.0);
+            }
+        });
+    }
+
+    /// The object, through which light comes late by `phase_rad` where it absorbs `absorbance`.
+    pub(super) fn finish(mut self, dyes: Amounts, phase_rad: f64, absorbance: f64) -> Phantom {
+        if absorbance < LEAST_ABSORBANCE {
+            // What only refracts has its phase counted by its absorbance.
+            let scale = (LEAST_ABSORBANCE / absorbance.max(f64::MIN_POSITIVE)) as f32;
+            let values = self.absorbance.values.iter_mut().zip(&self.coverage.values);
+            for (value, cover) in values {
+                *value = if absorbance > 0.0 { *value * scale } else { cover * LEAST_ABSORBANCE as f32 };
+            }
+        }
+        let area = self.coverage.values.iter().map(|share| f64::from(*share)).sum();
+        Phantom::whole(self.absorbance, self.coverage, area, dyes).refracting(phase_rad, absorbance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strokes_cover_their_area_and_absorb_what_they_are_told() {
+        for (to, half_width) in [([30.2, 17.7], 2.3), ([3.1, 4.2], 5.0), ([14.0, 4.2], 1.4)] {
+            let from = [3.1, 4.2];
+            let mut painting = Painting::around(&[from, to], half_width + 2.0);
+            painting.stroke(&Stroke::even(from, to, half_width), 0.25);
+            let (dx, dy): (f64, f64) = (to[0] - from[0], to[1] - from[1]);
+            let length = (dx * dx + dy * dy).sqrt();
+            let area = 2.0 * half_width * length + core::f64::consts::PI * half_width * half_width;
+            let covered: f64 = painting.coverage.values.iter().map(|v| f64::from(*v)).sum();
+            let absorbed: f64 = painting.absorbance.values.iter().map(|v| f64::from(*v)).sum();
+            assert!((covered / area - 1.0).abs() < 0.03, "{covered} {area}");
+            assert!((absorbed / covered - 0.25).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_stroke_beyond_the_tile_is_cut_off() {
+        let mut painting = Painting::around(&[[0.0, 0.0]], 3.0);
+        painting.stroke(&Stroke::even([-40.0, 0.0], [40.0, 0.0], 1.0), 1.0);
+        painting.stroke(&Stroke::even([90.0, 90.0], [90.0, 90.0], 2.0), 1.0);
+        let covered: f64 = painting.coverage.values.iter().map(|v| f64::from(*v)).sum();
+        assert!((covered - 14.0).abs() < 1e-6, "{covered}");
+    }
+}

@@ -1,0 +1,135 @@
+//! Specks of dust and stain ("Speckles"): a pixel, extended by one in a random direction, then dilated.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::Lie;
+use super::site::Site;
+use super::{Ground, Kinds, Section, Thing};
+use crate::phantom::tile::Tile;
+use crate::phantom::{LEAST_ABSORBANCE, Phantom};
+use crate::random;
+use crate::recipe::Number;
+
+/// How a speck is grown from its two pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpeckForm {
+    /// Round, whatever the pixels.
+    Round,
+    /// The paper's: dilated by a cross of pixels, which makes diamonds.
+    Dilated,
+}
+
+/// Specks of dust and stain ("Speckles").
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Speckles {
+    /// Number of speckles, 0 to 1000000; drawn once a field.
+    pub count: Number,
+    /// How it is grown from its two pixels.
+    pub form: SpeckForm,
+    /// How often a speckle is grown by a pixel to all sides (binary dilation), 0 to 50.
+    pub dilations: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through a speck, radians of phase, -3 to 3: the halo that changes sign with focus. Seen by
+    /// bright-field optics alone.
+    pub phase_rad: Number,
+}
+
+/// A speck of dust or stain, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Speckle {
+    /// How it was grown.
+    pub form: SpeckForm,
+    /// How often it was grown by a pixel.
+    pub dilations: usize,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+}
+
+impl Default for Speckles {
+    fn default() -> Self {
+        Self {
+            count: Number::log_normal(6.0, 0.7),
+            form: SpeckForm::Round,
+            dilations: Number::log_normal(0.35, 0.9),
+            absorbance: Number::log_normal(0.09, 0.6),
+            phase_rad: Number::normal(0.25, 0.15),
+        }
+    }
+}
+
+impl Kinds for Speckles {
+    fn none() -> Self {
+        Self { count: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("count", &self.count, 0.0, 1e6);
+        section.count("dilations", &self.dilations, 0.0, 50.0);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        for number in 0..ground.count("count", &self.count) {
+            let mut rng = ground.stream(number, "body");
+            let centre_um = ground.anywhere(&mut rng);
+            let speckle = Speckle {
+                form: self.form,
+                dilations: self.dilations.draw_count(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+                phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+            };
+            let depth_um = random::normal(&mut rng);
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            ground.add(number, 0, lie, speckle);
+        }
+    }
+}
+
+impl Thing for Speckle {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let pixel = site.scene.oversampling() as f64;
+        // Its pixels are those of the image, whatever grid it is drawn on.
+        let [x, y] = site.scene.view.to_px(site.object.centre_um).map(libm::round);
+        let [dx, dy] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][random::below(4, &mut rng)];
+        let seeds = [[x, y], [x + dx, y + dy]];
+        let to_grid = |p: [f64; 2]| p.map(|v| (v + 0.5) * pixel - 0.5);
+        let reach = self.dilations as f64;
+        let mut coverage = Tile::around(&seeds.map(to_grid), (reach + 2.0) * pixel);
+        coverage.for_each(|p, value| {
+            let p = p.map(|v| (v + 0.5) / pixel - 0.5);
+            *value = match self.form {
+                // Dilation by a cross, so often, is everything within that many steps along rows and columns.
+                SpeckForm::Dilated => {
+                    let p = p.map(libm::round);
+                    let inside = seeds.iter().any(|s| (p[0] - s[0]).abs() + (p[1] - s[1]).abs() <= reach);
+                    if inside { 1.0 } else { 0.0 }
+                }
+                // By a disc: everything nearer to the way between the two than the radius, its edge as far as it is
+                // covered.
+                SpeckForm::Round => {
+                    let along = ((p[0] - x) * dx + (p[1] - y) * dy).clamp(0.0, 1.0);
+                    let (ex, ey) = (p[0] - x - along * dx, p[1] - y - along * dy);
+                    ((reach + 0.5 - (ex * ex + ey * ey).sqrt()) * pixel + 0.5).clamp(0.0, 1.0) as f32
+                }
+            };
+        });
+        let area = coverage.values.iter().map(|v| f64::from(*v)).sum();
+        let mut tile = coverage.clone();
+        for value in &mut tile.values {
+            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+        }
+        Phantom::whole(tile, coverage, area, site.scene.dyes.speckle).refracting(self.phase_rad, self.absorbance)
+    }
+}
