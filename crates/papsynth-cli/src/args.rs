@@ -391,16 +391,17 @@ Examples:
   papsynth study real fields --out pairs --design 2afc           two at a time: which one is real?
   papsynth study real fields --out try --trials 10 --exposure-ms 500
   papsynth study real fields --pixel-um 0.33                     synthetic pixels are made as large
-  papsynth study --results results                               all subjects, pooled, as the paper's Table 1
+  papsynth study --results results                               all subjects, as the paper's Table 1
 
-REAL and SYNTHETIC are folders of PNG or TIFF images, data sets of papsynth, or folders of several such
-data sets, of varied settings; answers are then broken down by what the recipes differ in, and by
-defocus, stain and density. Of images in colour green is shown, of stacks the middle plane.
+REAL and SYNTHETIC are folders of PNG or TIFF images, data sets of papsynth, or folders of several
+such data sets, of varied settings; answers are then broken down by what the recipes differ in, and
+by defocus, stain and density. Of images in colour green is shown, of stacks the middle plane.
 
-Fields are shown as they are; --grey glass brings the bright glass of each to one level. If the size of
-a pixel is known of both, the finer are resampled. A patch is taken anywhere at random, 8 pixels off the
-border, where at least a fifth of it is 8 % darker than the glass, and shares at most a quarter with
-another. In the folder of --out, each subject has a folder with trials.csv, summary.json, and the state to go on from.
+Fields are shown as they are; --grey glass brings the bright glass of each to one level. If the
+size of a pixel is known of both, the finer are resampled. A patch is taken anywhere at random, 8
+pixels off the border, where at least a fifth of it is 8 % darker than the glass, and shares at most
+a quarter with another. In the folder of --out, each subject has a folder with trials.csv,
+summary.json, and the state to go on from.
 
 An accuracy near .5 known to 5 points takes 384 trials, of one subject or several.")]
 pub(crate) struct Study {

@@ -98,12 +98,18 @@ impl Root {
     }
 
     fn add_pictures(&self, fields: &mut Vec<Field>) -> Result<(), Error> {
-        let files = image_files(&self.real)?;
+        let images = self.real.join("images");
+        let (files, prefix) = match image_files(&self.real) {
+            Err(papsynth_dataset::Error::Input { problem: Problem::NoImages, .. }) if images.is_dir() => {
+                (image_files(&self.inside(&images)?)?, "images/")
+            }
+            files => (files?, ""),
+        };
         let mut names: Vec<_> = files.into_iter().collect();
         names.sort_by(|(a, _), (b, _)| natural_order(a, b));
         for (_, path) in names {
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            fields.push(Field { name, path: self.inside(&path)?, frame: None });
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            fields.push(Field { name: format!("{prefix}{name}"), path: self.inside(&path)?, frame: None });
         }
         Ok(())
     }
@@ -205,6 +211,11 @@ mod tests {
         let fields = Root::new(scratch.path()).unwrap().fields().unwrap();
         assert_eq!(fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>(), ["f1.png", "f9.png", "f10.png"]);
         assert!(fields.iter().all(|f| f.frame.is_none()));
+        // Pictures may lie in a folder of that name.
+        let below = Scratch::new("fields-images");
+        fs::create_dir_all(below.join("images")).unwrap();
+        fs::write(below.join("images/a.png"), picture(1, 64, 64)).unwrap();
+        assert_eq!(Root::new(below.path()).unwrap().fields().unwrap()[0].name, "images/a.png");
     }
 
     #[test]

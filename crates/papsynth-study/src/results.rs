@@ -250,3 +250,59 @@ fn exposures(params: &StudyParams, answers: &[Answered]) -> Option<Exposures> {
         shown_again: answers.iter().filter(|answered| answered.showings > 1).count(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::saved::{Answer, Exposure};
+    use crate::session::Session;
+    use crate::support::{Scratch, study_folders};
+
+    /// A subject who gives these answers, over and over, to so many of 2 + 6 trials.
+    fn subject(scratch: &Scratch, name: &str, task: Task, answers: &[Answer], trials: usize) {
+        let params = StudyParams { subject: name.to_owned(), task, trials: 6, patch_px: 48, ..StudyParams::default() };
+        let [real, synthetic, out] = ["real", "synthetic", "out"].map(|folder| scratch.join(folder));
+        let mut session = Session::open(&params, &real, &synthetic, &out).unwrap();
+        for answer in answers.iter().cycle().take(trials) {
+            let patch = session.state().patches[0].clone();
+            let exposure = Exposure { exposure_ms: 2000.0, frames: 120, longest_frame_ms: 17.0, pixel_ratio: 1.0 };
+            session.patch(&patch).unwrap();
+            session.shown(&patch, exposure).unwrap();
+            session.answer(&patch, *answer, 300.0).unwrap();
+        }
+    }
+
+    #[test]
+    fn subjects_are_pooled_in_their_order_and_who_has_not_finished_is_left_out() {
+        let scratch = Scratch::new("pool");
+        study_folders(&scratch, 3, 3);
+        subject(&scratch, "10", Task::YesNo, &[Answer::Real], 8);
+        subject(&scratch, "9", Task::YesNo, &[Answer::Synthetic], 8);
+        subject(&scratch, "early", Task::YesNo, &[Answer::Real], 5);
+        let pool = Pool::read(&scratch.join("out")).unwrap();
+        assert_eq!(pool.subjects.iter().map(|row| row.subject.as_str()).collect::<Vec<_>>(), ["9", "10"]);
+        assert_eq!(pool.subjects[0].counts, Counts { tp: 0, fp: 0, tn: 3, fn_: 3 });
+        assert_eq!(pool.pooled.counts, Counts { tp: 3, fp: 3, tn: 3, fn_: 3 });
+        assert_eq!(pool.random.counts.trials(), 6);
+        assert_eq!(pool.mean_accuracy.unwrap().0, 0.5);
+        assert!(pool.mean_sensitivity.unwrap().1.high > 1.0, "two subjects tell little of others");
+        assert!(pool.notes.iter().any(|note| note == "subject early is left out: 5 of 8 trials are answered"));
+        // Every patch is of one field: of 12 trials, 6 of either side.
+        let fields = |side| pool.breakdown.iter().filter(|group| group.side == side).map(|g| g.correct.of).sum::<u64>();
+        assert_eq!([fields(Side::Real), fields(Side::Synthetic)], [6, 6]);
+    }
+
+    #[test]
+    fn different_questions_are_not_pooled() {
+        let scratch = Scratch::new("pool-tasks");
+        study_folders(&scratch, 3, 3);
+        assert!(Pool::read(&scratch.join("out")).is_err());
+        subject(&scratch, "a", Task::TwoAlternatives, &[Answer::Left, Answer::Right], 8);
+        let pool = Pool::read(&scratch.join("out")).unwrap();
+        assert_eq!(pool.pooled.counts.trials(), 6);
+        assert!(pool.mean_accuracy.is_none());
+        subject(&scratch, "b", Task::YesNo, &[Answer::Real], 8);
+        let error = Pool::read(&scratch.join("out")).unwrap_err().to_string();
+        assert!(error.contains("subject a was asked 2afc, subject b yes-no"), "{error}");
+    }
+}
