@@ -31,7 +31,7 @@ impl Default for Slide {
             relief_um: 90.0.into(),
             median_um: 20.0.into(),
             stacking_um: 0.6.into(),
-            spacing_um: Number::uniform(10.0, 18.0),
+            spacing_um: 9.0.into(),
             fields: 16,
         }
     }
