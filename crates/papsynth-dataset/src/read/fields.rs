@@ -222,7 +222,10 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
             (Some(y), Some(x)) => points.push([x, y]),
             _ if line == 1 && y == "y" && x == "x" => {}
             _ => {
-                return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") });
+                return Err(Problem::Row {
+                    line,
+                    message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels"),
+                });
             }
         }
     }
