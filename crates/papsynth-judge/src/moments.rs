@@ -35,6 +35,7 @@ impl Histogram {
     /// Eq. 18: m = Σᵢ zᵢ p(zᵢ).
     #[must_use]
     pub fn mean(&self) -> f64 {
+        // Eq. 18.
         self.parts.iter().enumerate().map(|(z, p)| z as f64 * p).sum()
     }
 
@@ -43,6 +44,7 @@ impl Histogram {
     pub fn moment(&self, n: i32) -> f64 {
         let mean = self.mean();
         let power = |d: f64| (0..n).fold(1.0, |product, _| product * d);
+        // Eq. 17.
         self.parts.iter().enumerate().map(|(z, p)| power(z as f64 - mean) * p).sum()
     }
 
@@ -56,6 +58,7 @@ impl Histogram {
     /// Eq. 19: H = −Σᵢ p(zᵢ) log₂ p(zᵢ), bits.
     #[must_use]
     pub fn entropy(&self) -> f64 {
+        // Eq. 19.
         -self.parts.iter().filter(|p| **p > 0.0).map(|p| p * libm::log2(*p)).sum::<f64>()
     }
 }
