@@ -1,4 +1,4 @@
-//! The paper's figures with our own material, and a picture book of debris.
+//! The paper's figures with our own material, a picture book of cells and debris, and the effects of all parameters.
 
 use std::fs;
 
@@ -12,8 +12,8 @@ use crate::{Chore, shell};
 pub(crate) const CHORE: Chore = Chore {
     name: "figures",
     usage: "[FIGURE …]",
-    about: "redraws the paper's Figs. 1, 3-10, 12 and 13 with our own material, and a picture book of debris",
-    details: "Writes target/figures/fig-01.png and so on, and the picture book as fig-debris.png; all of them, or those that are given.",
+    about: "redraws the paper's Figs. 1, 3-10, 12 and 13 with our own material, a picture book of cells and debris, and the effect of every parameter",
+    details: "Writes target/figures/fig-01.png and so on, the picture book as fig-cells.png and fig-debris.png, the effects as fig-effects-cytoplasm.png and so on; all of them, or those that are given.",
     run,
 };
 
@@ -32,7 +32,12 @@ const fn engine(name: &'static str, shows: &'static str, arguments: &'static [&'
     Figure { name, shows, package: "papsynth", example: "figures", arguments }
 }
 
-const FIGURES: [Figure; 12] = [
+const fn effects(name: &'static str, arguments: &'static [&'static str]) -> Figure {
+    let shows = "what every parameter of a section does, low, as it is, high";
+    Figure { name, shows, package: "papsynth", example: "effects", arguments }
+}
+
+const FIGURES: [Figure; 26] = [
     engine("1", "bacilli, leukocytes, speckles, objects out of focus", &["1"]),
     Figure { name: "3", shows: "drawn outlines", package: "fsd-shape", example: "sheet", arguments: &[] },
     Figure {
@@ -51,18 +56,41 @@ const FIGURES: [Figure; 12] = [
     engine("12", "a whole field", &["12"]),
     engine("13", "high-grade cells", &["13"]),
     Figure {
+        name: "cells",
+        shows: "every class of cell with its name",
+        package: "papsynth",
+        example: "picture_book",
+        arguments: &["cells"],
+    },
+    Figure {
         name: "debris",
         shows: "every kind of debris with its name",
         package: "papsynth",
         example: "picture_book",
-        arguments: &[],
+        arguments: &["debris"],
     },
+    effects("effects-cells", &["cells"]),
+    effects("effects-cytoplasm", &["cytoplasm"]),
+    effects("effects-nucleus", &["nucleus"]),
+    effects("effects-stain", &["stain"]),
+    effects("effects-slide", &["slide"]),
+    effects("effects-layout", &["layout"]),
+    effects("effects-debris", &["debris"]),
+    effects("effects-background", &["background"]),
+    effects("effects-light", &["light"]),
+    effects("effects-optics", &["optics"]),
+    effects("effects-focus", &["focus"]),
+    effects("effects-field", &["field"]),
+    effects("effects-camera", &["camera"]),
 ];
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let wanted = arguments.rest().into_iter().map(|word| {
         let figure = FIGURES.iter().find(|figure| figure.name == word).map(|figure| figure.name);
-        figure.with_context(|| format!("`{word}` is no figure that is redrawn; expected 1, 3 to 10, 12, 13 or debris"))
+        figure.with_context(|| {
+            let known: Vec<&str> = FIGURES.iter().map(|figure| figure.name).collect();
+            format!("`{word}` is no figure that is redrawn; expected one of {}", known.join(", "))
+        })
     });
     let wanted: Vec<&str> = wanted.collect::<Result<_>>()?;
     let folder = workspace.target.join("figures");
@@ -82,7 +110,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         let own = arguments.iter().map(|word| format!("{word} ")).collect::<String>();
         let place = workspace.shown(&path);
         table.push_str(&format!(
-            "Fig. {name:<7} {shows:<52} cargo run --release -p {package} --example {example} -- {own}{place}\n"
+            "Fig. {name:<18} {shows:<60} cargo run --release -p {package} --example {example} -- {own}{place}\n"
         ));
     }
     print!("{table}");

@@ -18,6 +18,7 @@ mod outcome;
 mod peers;
 mod publish;
 mod python;
+mod realism;
 mod shell;
 mod test;
 mod wasm;
@@ -49,6 +50,7 @@ const CHORES: &[Chore] = &[
     golden::CHORE,
     bench::CHORE,
     figures::CHORE,
+    realism::CHORE,
     equations::CHORE,
     deps::CHORE,
     external::CHORE,

@@ -494,6 +494,13 @@ fn camera_parser() -> impl TypedValueParser<Value = CameraPreset> {
         .try_map(|name| CameraPreset::by_name(&name).ok_or_else(|| format!("there is no camera `{name}`")))
 }
 
+fn nuclei_parser() -> impl TypedValueParser<Value = NucleiFrom> {
+    let names = NucleiFrom::ALL.map(|from| PossibleValue::new(from.name()));
+    PossibleValuesParser::new(names).try_map(|name| {
+        NucleiFrom::ALL.into_iter().find(|from| from.name() == name).ok_or_else(|| format!("there is no way `{name}`"))
+    })
+}
+
 fn task_parser() -> impl TypedValueParser<Value = Task> {
     PossibleValuesParser::new(Task::ALL.map(Task::name)).try_map(|name| {
         Task::ALL.into_iter().find(|task| task.name() == name).ok_or_else(|| format!("there is no design `{name}`"))
@@ -503,13 +510,6 @@ fn task_parser() -> impl TypedValueParser<Value = Task> {
 fn grey_parser() -> impl TypedValueParser<Value = Grey> {
     PossibleValuesParser::new(Grey::ALL.map(Grey::name)).try_map(|name| {
         Grey::ALL.into_iter().find(|grey| grey.name() == name).ok_or_else(|| format!("there is no scale `{name}`"))
-    })
-}
-
-fn nuclei_parser() -> impl TypedValueParser<Value = NucleiFrom> {
-    let names = NucleiFrom::ALL.map(|from| PossibleValue::new(from.name()));
-    PossibleValuesParser::new(names).try_map(|name| {
-        NucleiFrom::ALL.into_iter().find(|from| from.name() == name).ok_or_else(|| format!("there is no way `{name}`"))
     })
 }
 

@@ -12,7 +12,8 @@ use crate::exit::{self, Complaint, Failure};
 use crate::text_file::may_replace;
 
 /// Files that are written, and how those begin that may be replaced.
-const PAGE: (&str, &[u8]) = ("report.html", b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<");
+const PAGE: (&str, &[u8]) =
+    ("report.html", b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<");
 const NUMBERS: (&str, &[u8]) = ("report.json", b"{\n  \"judge_report\":");
 
 /// Pixels that differ by less are of one size.
@@ -71,7 +72,9 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
     let (Some(of_real), Some(of_synthetic)) = (of_real.or(of_synthetic), of_synthetic.or(of_real)) else {
         let message = "neither folder says how large its pixels are";
-        return Err(Failure::input(Complaint::new(message).help("give --pixel-um, the size of a pixel in micrometres")));
+        return Err(Failure::input(
+            Complaint::new(message).help("give --pixel-um, the size of a pixel in micrometres"),
+        ));
     };
     let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
         let pixels_um = files.iter().map(|f| given.or(f.pixel_um).unwrap_or(else_um)).collect();
@@ -89,11 +92,15 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     } else if !groups.is_empty() && files.iter().any(|f| !f.group.is_empty()) {
         let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
         let known: std::collections::BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter())))));
+        return Err(Failure::input(
+            Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter()))),
+        ));
     }
     if files.len() < LEAST {
         let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::input(Complaint::new(message).help("fields are never split between what is learnt from and what is tried")));
+        return Err(Failure::input(
+            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
+        ));
     }
     Ok(files)
 }
@@ -132,9 +139,9 @@ fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Fail
             let factor = pixel_um / own_um;
             let picture = picture(file)?;
             let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
-            gauge.measure(&picture).map_err(|error| {
-                Failure::input(Complaint::new(format!("{}: {error}", file.path().display())))
-            })
+            gauge
+                .measure(&picture)
+                .map_err(|error| Failure::input(Complaint::new(format!("{}: {error}", file.path().display()))))
         })
         .collect();
     fields.into_iter().collect()
@@ -170,13 +177,19 @@ fn told(report: &Report, out: &Path) -> String {
             test.verdict
         ));
         for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {
-            text.push_str(&format!("    {:<42} real {:>9.4}  synthetic {:>9.4}\n", g.feature, g.real[1], g.synthetic[1]));
+            text.push_str(&format!(
+                "    {:<42} real {:>9.4}  synthetic {:>9.4}\n",
+                g.feature, g.real[1], g.synthetic[1]
+            ));
         }
     }
     for test in &report.moments {
         let outside = test.result.descriptors.iter().filter(|d| !d.is_within()).count();
         let of = test.result.descriptors.len();
-        text.push_str(&format!("{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n", test.name, test.verdict));
+        text.push_str(&format!(
+            "{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n",
+            test.name, test.verdict
+        ));
     }
     let [real, synthetic] = &report.fields;
     text.push_str(&format!("{} real fields and {} synthetic ones: {}\n", real.len(), synthetic.len(), report.verdict));

@@ -75,7 +75,8 @@ pub(crate) fn beside(real: &[Field], synthetic: &[Field]) -> Beside {
         Scalar { name: (*name).to_owned(), real, synthetic, within }
     };
     let curve = |name: &str, along: &str, at: Vec<f64>, of: &dyn Fn(&Statistics) -> &[f64]| {
-        let spreads = |fields: &[Field]| (0..at.len()).map(|i| Spread::of(fields.iter().map(|f| of(&f.statistics)[i]))).collect();
+        let spreads =
+            |fields: &[Field]| (0..at.len()).map(|i| Spread::of(fields.iter().map(|f| of(&f.statistics)[i]))).collect();
         Curve { name: name.to_owned(), along: along.to_owned(), real: spreads(real), synthetic: spreads(synthetic), at }
     };
     let bins = (0..HISTOGRAM).map(|i| HISTOGRAM_FROM + (i as f64 + 0.5) * HISTOGRAM_STEP).collect();

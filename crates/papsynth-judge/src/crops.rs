@@ -36,13 +36,22 @@ pub(crate) fn crops(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample
         for (is_synthetic, fields) in [(false, real), (true, synthetic)] {
             let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
             let scores = &test.result.scores[usize::from(is_synthetic)];
-            let mut all: Vec<(f64, &Field, [f64; 2])> = scores.iter().zip(places).map(|(s, (f, p))| (*s, f, p)).collect();
+            let mut all: Vec<(f64, &Field, [f64; 2])> =
+                scores.iter().zip(places).map(|(s, (f, p))| (*s, f, p)).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
             let shown = SHOWN.min(all.len());
             for (looks_real, part) in [(true, &all[..shown]), (false, &all[all.len() - shown..])] {
                 crops.extend(part.iter().filter_map(|(score, field, place)| {
                     let (grey, width) = cut(field, *place, side)?;
-                    Some(Crop { of, synthetic: is_synthetic, looks_real, field: field.name.clone(), score: *score, grey, width })
+                    Some(Crop {
+                        of,
+                        synthetic: is_synthetic,
+                        looks_real,
+                        field: field.name.clone(),
+                        score: *score,
+                        grey,
+                        width,
+                    })
                 }));
             }
         }

@@ -29,24 +29,30 @@ impl Report {
     pub fn to_html(&self) -> String {
         let mut page = String::new();
         let [real, synthetic] = &self.fields;
-        put(&mut page, format_args!(
-            "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
+        put(
+            &mut page,
+            format_args!(
+                "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
              <h1>{} real fields against {} synthetic ones: {}</h1>",
-            real.len(),
-            synthetic.len(),
-            verdict(self.verdict)
-        ));
-        put(&mut page, format_args!(
-            "<p>Pixels of {} µm; nuclei {}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
+                real.len(),
+                synthetic.len(),
+                verdict(self.verdict)
+            ),
+        );
+        put(
+            &mut page,
+            format_args!(
+                "<p>Pixels of {} µm; nuclei {}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
              have these colours throughout.</p>",
-            self.gauge.pixel_um,
-            match self.gauge.nuclei_from {
-                crate::NucleiFrom::Masks => "from masks",
-                crate::NucleiFrom::Points => "around given points",
-                crate::NucleiFrom::Search => "found",
-            },
-            self.judge.seed
-        ));
+                self.gauge.pixel_um,
+                match self.gauge.nuclei_from {
+                    crate::NucleiFrom::Masks => "from masks",
+                    crate::NucleiFrom::Points => "around given points",
+                    crate::NucleiFrom::Search => "found",
+                },
+                self.judge.seed
+            ),
+        );
         for note in &self.notes {
             put(&mut page, format_args!("<p class=\"note\">{}</p>", escape(note)));
         }
@@ -78,25 +84,44 @@ fn summary(page: &mut String, report: &Report) {
     for test in &report.two_sample {
         let r = &test.result;
         let null = Spread::of(r.null.iter().copied());
-        put(page, format_args!(
-            "<tr><td>classifier on {}</td><td>{} / {}</td><td>{:.3}</td><td>{:.3} – {:.3}</td><td>{} ({} – {}), {} rows a half</td><td>{}</td></tr>",
-            escape(&test.name), r.rows[0], r.rows[1], r.auc, r.interval[0], r.interval[1],
-            known(null.p50), known(null.p10), known(null.p90), r.null_rows, verdict(test.verdict)
-        ));
+        put(
+            page,
+            format_args!(
+                "<tr><td>classifier on {}</td><td>{} / {}</td><td>{:.3}</td><td>{:.3} – {:.3}</td><td>{} ({} – {}), {} rows a half</td><td>{}</td></tr>",
+                escape(&test.name),
+                r.rows[0],
+                r.rows[1],
+                r.auc,
+                r.interval[0],
+                r.interval[1],
+                known(null.p50),
+                known(null.p10),
+                known(null.p90),
+                r.null_rows,
+                verdict(test.verdict)
+            ),
+        );
     }
     for test in &report.moments {
         let outside = test.result.descriptors.iter().filter(|d| !d.is_within()).count();
         let slopes: Vec<String> = test.result.descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
-        put(page, format_args!(
-            "<tr><td>Q-Q slopes, {}</td><td>{}</td><td></td><td>{}</td><td>{outside} of {} outside</td><td>{}</td></tr>",
-            escape(&test.name), test.result.n, slopes.join(" "), test.result.descriptors.len(), verdict(test.verdict)
-        ));
+        put(
+            page,
+            format_args!(
+                "<tr><td>Q-Q slopes, {}</td><td>{}</td><td></td><td>{}</td><td>{outside} of {} outside</td><td>{}</td></tr>",
+                escape(&test.name),
+                test.result.n,
+                slopes.join(" "),
+                test.result.descriptors.len(),
+                verdict(test.verdict)
+            ),
+        );
     }
     page.push_str(
         "</table><p class=\"note\">A classifier tells the sides apart if its area under the ROC curve is larger than 95 of 100 between random \
          halves of the real fields, and the 95 % interval of it (fields drawn with replacement) leaves out ½. Fields are never split between what it learns from and \
-         what it is tried on. Moments tell them apart if a slope or a shift of medians lies outside what 99 of 100 pairs of disjoint \
-         real halves show at the same number of nuclei: by chance, one of six does in one comparison of twenty.</p>",
+         what it is tried on. Moments tell them apart if a slope or a shift of medians lies outside what 199 of 200 pairs of disjoint \
+         real halves show at the same number of nuclei: by chance, one of the twelve does in one comparison of seventeen or fewer.</p>",
     );
 }
 
@@ -106,15 +131,27 @@ fn known(value: Option<f64>) -> String {
 
 fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
     let r = &test.result;
-    put(page, format_args!("<h2>What gives {} away</h2><p>AUC {:.3}, {}. With features of one kind alone: ", escape(&test.name), r.auc, verdict(test.verdict)));
-    let kinds: Vec<String> = r.families.iter().map(|f| format!("{} {:.2}", format!("{:?}", f.family).to_lowercase(), f.auc)).collect();
+    put(
+        page,
+        format_args!(
+            "<h2>What gives {} away</h2><p>AUC {:.3}, {}. With features of one kind alone: ",
+            escape(&test.name),
+            r.auc,
+            verdict(test.verdict)
+        ),
+    );
+    let kinds: Vec<String> =
+        r.families.iter().map(|f| format!("{} {:.2}", format!("{:?}", f.family).to_lowercase(), f.auc)).collect();
     put(page, format_args!("{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r)));
     page.push_str(
         "<table><tr><th>feature</th><th>importance</th><th>AUC alone</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th></tr>",
     );
     for g in r.giveaways.iter().take(LISTED) {
-        put(page, format_args!("<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone));
+        put(
+            page,
+            format_args!("<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone),
+        );
         for v in g.real.iter().chain(&g.synthetic) {
             put(page, format_args!("<td>{}</td>", short(*v)));
         }
@@ -130,18 +167,24 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
         (false, true, "Real, most plainly real"),
         (false, false, "Real, taken for synthetic"),
     ] {
-        let chosen: Vec<&Crop> = crops.iter().filter(|c| c.of == test.name && c.synthetic == synthetic && c.looks_real == looks_real).collect();
+        let chosen: Vec<&Crop> = crops
+            .iter()
+            .filter(|c| c.of == test.name && c.synthetic == synthetic && c.looks_real == looks_real)
+            .collect();
         if chosen.is_empty() {
             continue;
         }
         put(page, format_args!("<h3>{title}</h3><div class=\"crops {}\">", test.name));
         for crop in chosen {
-            put(page, format_args!(
-                "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><br>{:.2} {}</figure>",
-                base64(&png(&crop.grey, crop.width)),
-                crop.score,
-                escape(&crop.field)
-            ));
+            put(
+                page,
+                format_args!(
+                    "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><br>{:.2} {}</figure>",
+                    base64(&png(&crop.grey, crop.width)),
+                    crop.score,
+                    escape(&crop.field)
+                ),
+            );
         }
         page.push_str("</div>");
     }
@@ -150,7 +193,8 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
 /// The AUC and its interval among those between halves.
 fn strip(r: &TwoSample) -> String {
     let all = r.null.iter().copied().chain(r.interval).chain([0.3, 1.0]);
-    let mut plot = Plot::new("AUC (line: 95 % interval) and real halves", "AUC", "", all, [0.0, 3.0].into_iter());
+    let mut plot =
+        Plot::new("AUC with its 95 % interval", "AUC", "1 real halves, 2 the sides", all, [0.0, 3.0].into_iter());
     plot.dashes([0.5, 0.0], [0.5, 3.0]);
     plot.dots(r.null.iter().map(|v| [*v, 1.0]), COLOURS[0]);
     plot.line(r.interval.iter().map(|v| [*v, 2.0]), COLOURS[1]);
@@ -163,10 +207,18 @@ fn scores(r: &TwoSample) -> String {
     const BINS: usize = 25;
     let bins = r.scores.each_ref().map(|scores| {
         let mut bins = vec![0.0; BINS];
-        scores.iter().for_each(|s| bins[nearest(s * BINS as f64 - 0.5).min(BINS - 1)] += 1.0 / scores.len().max(1) as f64);
+        scores
+            .iter()
+            .for_each(|s| bins[nearest(s * BINS as f64 - 0.5).min(BINS - 1)] += 1.0 / scores.len().max(1) as f64);
         bins
     });
-    let mut plot = Plot::new("Scores of rows not learnt from", "how synthetic it looks", "part", [0.0, 1.0].into_iter(), bins.iter().flatten().copied().chain([0.0]));
+    let mut plot = Plot::new(
+        "Scores of rows not learnt from",
+        "how synthetic it looks",
+        "part",
+        [0.0, 1.0].into_iter(),
+        bins.iter().flatten().copied().chain([0.0]),
+    );
     for (bins, colour) in bins.iter().zip(COLOURS) {
         plot.line(bins.iter().enumerate().map(|(i, v)| [(i as f64 + 0.5) / BINS as f64, *v]), colour);
     }
@@ -176,16 +228,23 @@ fn scores(r: &TwoSample) -> String {
 fn moments(page: &mut String, test: &Test<Moments>) {
     put(page, format_args!("<h2>{}: {}</h2>", escape(&test.name), verdict(test.verdict)));
     page.push_str(
-        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.5 – 99.5 %)</th><th>shift, sd (5 – 95 %)</th>\
+        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.25 – 99.75 %)</th><th>shift, sd (5 – 95 %)</th>\
          <th>between real halves</th></tr>",
     );
     for d in &test.result.descriptors {
         let three = |v: [f64; 3]| format!("{:.2} ({:.2} – {:.2})", v[1], v[0], v[2]);
-        put(page, format_args!(
-            "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            if d.is_within() { "" } else { " class=\"out\"" },
-            escape(&d.name), three(d.slope), three(d.null_slope), three(d.shift), three(d.null_shift)
-        ));
+        put(
+            page,
+            format_args!(
+                "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                if d.is_within() { "" } else { " class=\"out\"" },
+                escape(&d.name),
+                three(d.slope),
+                three(d.null_slope),
+                three(d.shift),
+                three(d.null_shift)
+            ),
+        );
     }
     page.push_str("</table><div class=\"plots\">");
     for d in &test.result.descriptors {
@@ -264,7 +323,15 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_rfc() {
-        for (plain, coded) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("fooba", "Zm9vYmE="), ("foobar", "Zm9vYmFy")] {
+        for (plain, coded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
             assert_eq!(base64(plain.as_bytes()), coded);
         }
     }

@@ -24,11 +24,11 @@ pub struct JudgeParams {
 }
 
 impl JudgeParams {
-    /// About five times as quick, for a first look: fewer trees, halvings and draws.
+    /// About five times as quick, for a first look: fewer trees, halvings and draws of fields.
     #[must_use]
     pub fn quick() -> Self {
         let two_sample = TwoSampleParams { folds: 3, trees: 60, halvings: 5, bootstrap: 200, shuffled: 20 };
-        Self { two_sample, draws: 100, ..Self::default() }
+        Self { two_sample, ..Self::default() }
     }
 }
 
@@ -149,7 +149,11 @@ impl Judge {
         let mut notes = Vec::new();
         let two_sample = self.classify(real, synthetic, &mut notes);
         let moments = self.moments(real, synthetic, &mut notes);
-        let told = two_sample.iter().map(|t| t.verdict).chain(moments.iter().map(|t| t.verdict)).any(|v| v == Verdict::ToldApart);
+        let told = two_sample
+            .iter()
+            .map(|t| t.verdict)
+            .chain(moments.iter().map(|t| t.verdict))
+            .any(|v| v == Verdict::ToldApart);
         let crops = crops(real, synthetic, &two_sample);
         let names = |fields: &[Field]| fields.iter().map(|f| f.name.clone()).collect();
         Ok(Report {
@@ -171,10 +175,13 @@ impl Judge {
         let everything = |_: &&Field| true;
         let mut tests = Vec::new();
         let mut test = |name: String, of: fn(&Field) -> &Table, counts: &dyn Fn(&&Field) -> bool| {
-            let tables = |fields: &'_ [Field]| fields.iter().filter(counts).map(|f| of(f).clone()).collect::<Vec<Table>>();
+            let tables =
+                |fields: &'_ [Field]| fields.iter().filter(counts).map(|f| of(f).clone()).collect::<Vec<Table>>();
             match two_sample(&tables(real), &tables(synthetic), &self.params.two_sample, self.params.seed) {
                 Some(result) => tests.push(Test { name, verdict: of_areas(&result), result }),
-                None => notes.push(format!("{name}: fewer than two fields of a side have some, so nothing is said of them")),
+                None => {
+                    notes.push(format!("{name}: fewer than two fields of a side have some, so nothing is said of them"))
+                }
             }
         };
         test("nuclei".to_owned(), |f| &f.nuclei, &everything);
@@ -198,7 +205,8 @@ impl Judge {
                     let verdict = if within { Verdict::NotToldApart } else { Verdict::ToldApart };
                     tests.push(Test { name: format!("texture of {} nuclei, {what}", result.n), verdict, result });
                 }
-                None => notes.push(format!("Q-Q plots of {what} of nuclei need more nuclei than half of the real fields have")),
+                None => notes
+                    .push(format!("Q-Q plots of {what} of nuclei need more nuclei than half of the real fields have")),
             }
         }
         tests
@@ -208,8 +216,10 @@ impl Judge {
 /// Groups that have two fields or more on both sides, in order.
 fn shared_groups(real: &[Field], synthetic: &[Field]) -> Vec<String> {
     let enough = |fields: &[Field], group: &str| fields.iter().filter(|f| f.group == group).count() >= LEAST_FIELDS;
-    let names: std::collections::BTreeSet<&str> = real.iter().map(|f| f.group.as_str()).filter(|g| !g.is_empty()).collect();
-    let shared: Vec<String> = names.into_iter().filter(|g| enough(real, g) && enough(synthetic, g)).map(str::to_owned).collect();
+    let names: std::collections::BTreeSet<&str> =
+        real.iter().map(|f| f.group.as_str()).filter(|g| !g.is_empty()).collect();
+    let shared: Vec<String> =
+        names.into_iter().filter(|g| enough(real, g) && enough(synthetic, g)).map(str::to_owned).collect();
     // One group alone is the whole.
     if shared.len() == 1 && real.iter().chain(synthetic).all(|f| f.group == shared[0]) { Vec::new() } else { shared }
 }

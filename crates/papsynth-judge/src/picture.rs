@@ -93,7 +93,12 @@ impl Picture {
             return self.clone();
         }
         let (x1, y1) = (width - right, height - bottom);
-        fn cut<T: Copy>(all: &[T], width: usize, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>) -> Vec<T> {
+        fn cut<T: Copy>(
+            all: &[T],
+            width: usize,
+            rows: std::ops::Range<usize>,
+            columns: std::ops::Range<usize>,
+        ) -> Vec<T> {
             rows.flat_map(|y| all[y * width..][columns.clone()].iter().copied()).collect()
         }
         let nuclei = match &self.nuclei {
@@ -117,7 +122,9 @@ impl Picture {
         let narrow: Vec<f64> = self
             .grey
             .chunks_exact(width)
-            .flat_map(|row| across.iter().map(|(from, parts)| parts.iter().zip(&row[*from..]).map(|(p, v)| p * f64::from(*v)).sum()))
+            .flat_map(|row| {
+                across.iter().map(|(from, parts)| parts.iter().zip(&row[*from..]).map(|(p, v)| p * f64::from(*v)).sum())
+            })
             .collect();
         let mut grey = Vec::with_capacity(wide * high);
         for (from, parts) in shares(high, factor) {
@@ -127,7 +134,9 @@ impl Picture {
         let centre = |i: usize, count: usize| nearest((i as f64 + 0.5) * factor - 0.5).min(count - 1);
         let nuclei = match &self.nuclei {
             Known::Nothing => Known::Nothing,
-            Known::Points(points) => Known::Points(points.iter().map(|p| p.map(|v| (v + 0.5) / factor - 0.5)).collect()),
+            Known::Points(points) => {
+                Known::Points(points.iter().map(|p| p.map(|v| (v + 0.5) / factor - 0.5)).collect())
+            }
             Known::Masks(labels) => {
                 let rows = (0..high).map(|y| centre(y, height) * width);
                 Known::Masks(rows.flat_map(|row| (0..wide).map(move |x| labels[row + centre(x, width)])).collect())

@@ -21,7 +21,13 @@ pub(crate) struct Plot {
 
 impl Plot {
     /// Axes that hold all of these values, with a little room; what is not finite does not count.
-    pub(crate) fn new(title: &str, x_name: &str, y_name: &str, x: impl Iterator<Item = f64>, y: impl Iterator<Item = f64>) -> Self {
+    pub(crate) fn new(
+        title: &str,
+        x_name: &str,
+        y_name: &str,
+        x: impl Iterator<Item = f64>,
+        y: impl Iterator<Item = f64>,
+    ) -> Self {
         let mut plot = Self { x: range(x), y: range(y), body: String::new() };
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
         plot.put(&format!(r##"<path d="M{LEFT} {TOP}V{bottom}H{right}" fill="none" stroke="#444"/>"##));
@@ -35,7 +41,10 @@ impl Plot {
         }
         plot.put(&format!(r#"<text class="title" x="{LEFT}" y="14">{}</text>"#, escape(title)));
         plot.put(&format!(r#"<text x="{right}" y="{:.1}" text-anchor="end">{}</text>"#, HEIGHT - 6.0, escape(x_name)));
-        plot.put(&format!(r#"<text x="12" y="{TOP}" text-anchor="end" transform="rotate(-90 12 {TOP})">{}</text>"#, escape(y_name)));
+        plot.put(&format!(
+            r#"<text x="12" y="{TOP}" text-anchor="end" transform="rotate(-90 12 {TOP})">{}</text>"#,
+            escape(y_name)
+        ));
         plot
     }
 
@@ -94,12 +103,16 @@ impl Plot {
 
     /// The drawing.
     pub(crate) fn finish(self) -> String {
-        format!(r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{}</svg>"#, self.body)
+        format!(
+            r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{}</svg>"#,
+            self.body
+        )
     }
 }
 
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    let [low, high] = values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+    let [low, high] =
+        values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
     if low > high {
         return [0.0, 1.0];
     }

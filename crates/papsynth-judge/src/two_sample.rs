@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::forest::{Forest, Rows};
 use crate::number::single;
-use crate::statistics::{auc, below, mean, of_sorted, median, shuffle, weighted_auc};
+use crate::statistics::{auc, below, mean, median, of_sorted, shuffle, weighted_auc};
 use crate::table::{Family, Feature, Table};
 
 /// How the classifier is tried.
@@ -129,7 +129,8 @@ impl Sample {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut folds = vec![0; self.sides.len()];
         for side in [false, true] {
-            let mut fields: Vec<usize> = (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).collect();
+            let mut fields: Vec<usize> =
+                (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).collect();
             shuffle(&mut fields, &mut rng);
             for (i, field) in fields.into_iter().enumerate() {
                 folds[field] = i % count;
@@ -140,7 +141,8 @@ impl Sample {
 
     /// Fields with rows, of either side.
     fn counts(&self) -> [usize; 2] {
-        [false, true].map(|side| (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).count())
+        [false, true]
+            .map(|side| (0..self.sides.len()).filter(|f| self.sides[*f] == side && self.fields.contains(f)).count())
     }
 }
 
@@ -186,20 +188,26 @@ fn round(sample: &Sample, folds: usize, trees: usize, seed: u64) -> Option<Round
 }
 
 fn area(sample: &Sample, scores: &[f64]) -> f64 {
-    let of = |side: bool| -> Vec<f64> { scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect() };
+    let of = |side: bool| -> Vec<f64> {
+        scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     auc(&of(false), &of(true))
 }
 
 /// Tries to tell two sets of fields apart by their tables; none if a side has fewer than two fields with rows.
 pub fn two_sample(real: &[Table], synthetic: &[Table], params: &TwoSampleParams, seed: u64) -> Option<TwoSample> {
-    let tables: Vec<(&Table, bool)> = real.iter().map(|t| (t, false)).chain(synthetic.iter().map(|t| (t, true))).collect();
+    let tables: Vec<(&Table, bool)> =
+        real.iter().map(|t| (t, false)).chain(synthetic.iter().map(|t| (t, true))).collect();
     let sample = Sample::new(&tables)?;
     let round = round(&sample, params.folds, params.trees, seed)?;
-    let halves: Vec<Option<(f64, usize)>> = (0..params.halvings as u64).into_par_iter().map(|i| halving(real, params, seed.wrapping_add(i + 1))).collect();
+    let halves: Vec<Option<(f64, usize)>> =
+        (0..params.halvings as u64).into_par_iter().map(|i| halving(real, params, seed.wrapping_add(i + 1))).collect();
     let halves: Vec<(f64, usize)> = halves.into_iter().flatten().collect();
     let mut null_rows: Vec<f64> = halves.iter().map(|h| h.1 as f64).collect();
     let count = |side: bool| sample.rows.synthetic.iter().filter(|s| **s == side).count();
-    let of = |side: bool| round.scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect();
+    let of = |side: bool| {
+        round.scores.iter().zip(&sample.rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     Some(TwoSample {
         rows: [count(false), count(true)],
         fields: sample.counts(),
@@ -227,8 +235,11 @@ fn halving(real: &[Table], params: &TwoSampleParams, seed: u64) -> Option<(f64, 
 /// The 95 % interval of the AUC, by drawing fields of each side with replacement.
 fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2] {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ 0x_b007);
-    let sides = [false, true].map(|side| (0..sample.sides.len()).filter(|f| sample.sides[*f] == side && sample.fields.contains(f)).collect::<Vec<_>>());
-    let mut all: Vec<(f64, bool, usize)> = scores.iter().zip(&sample.rows.synthetic).zip(&sample.fields).map(|((s, side), f)| (*s, *side, *f)).collect();
+    let sides = [false, true].map(|side| {
+        (0..sample.sides.len()).filter(|f| sample.sides[*f] == side && sample.fields.contains(f)).collect::<Vec<_>>()
+    });
+    let mut all: Vec<(f64, bool, usize)> =
+        scores.iter().zip(&sample.rows.synthetic).zip(&sample.fields).map(|((s, side), f)| (*s, *side, *f)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut areas: Vec<f64> = (0..draws)
         .map(|_| {
@@ -238,7 +249,8 @@ fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2
                     weights[fields[below(fields.len(), &mut rng)]] += 1.0;
                 }
             }
-            let mut weighted: Vec<(f64, bool, f64)> = all.iter().map(|(s, side, f)| (*s, *side, weights[*f])).filter(|s| s.2 > 0.0).collect();
+            let mut weighted: Vec<(f64, bool, f64)> =
+                all.iter().map(|(s, side, f)| (*s, *side, weights[*f])).filter(|s| s.2 > 0.0).collect();
             weighted_auc(&mut weighted)
         })
         .collect();
@@ -247,28 +259,43 @@ fn interval(sample: &Sample, scores: &[f64], draws: usize, seed: u64) -> [f64; 2
 }
 
 /// The test with the features of each family alone.
-fn families<'a>(sample: &Sample, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<FamilyAlone> {
+fn families<'a>(
+    sample: &Sample,
+    mut tables: impl Iterator<Item = &'a Table>,
+    params: &TwoSampleParams,
+    seed: u64,
+) -> Vec<FamilyAlone> {
     let Some(features) = tables.find(|t| !t.is_empty()).map(|t| &t.features) else { return Vec::new() };
     let names: BTreeSet<Family> = features.iter().map(|f| f.family).collect();
     let names: Vec<Family> = names.into_iter().collect();
     let alone = |family: Family| {
-        let columns = sample.rows.columns.iter().zip(features).filter(|(_, f)| f.family == family).map(|(c, _)| c.clone());
+        let columns =
+            sample.rows.columns.iter().zip(features).filter(|(_, f)| f.family == family).map(|(c, _)| c.clone());
         let rows = Rows { columns: columns.collect(), synthetic: sample.rows.synthetic.clone() };
         let part = Sample { rows, fields: sample.fields.clone(), sides: sample.sides.clone() };
         round(&part, params.folds, params.trees, seed).map(|r| FamilyAlone { family, auc: area(&part, &r.scores) })
     };
-    let mut areas: Vec<FamilyAlone> = names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
+    let mut areas: Vec<FamilyAlone> =
+        names.into_par_iter().map(alone).collect::<Vec<_>>().into_iter().flatten().collect();
     areas.sort_by(|a, b| b.auc.total_cmp(&a.auc));
     areas
 }
 
 /// How far the sides' mean scores lie apart.
 fn separation(synthetic: &[bool], scores: &[f64]) -> f64 {
-    let of = |side: bool| -> Vec<f64> { scores.iter().zip(synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect() };
+    let of = |side: bool| -> Vec<f64> {
+        scores.iter().zip(synthetic).filter(|(_, s)| **s == side).map(|(v, _)| *v).collect()
+    };
     mean(&of(true)) - mean(&of(false))
 }
 
-fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item = &'a Table>, params: &TwoSampleParams, seed: u64) -> Vec<Giveaway> {
+fn giveaways<'a>(
+    sample: &Sample,
+    round: &Round,
+    mut tables: impl Iterator<Item = &'a Table>,
+    params: &TwoSampleParams,
+    seed: u64,
+) -> Vec<Giveaway> {
     let Some(features) = tables.find(|t| !t.is_empty()).map(|t| &t.features) else { return Vec::new() };
     let rows = &sample.rows;
     let mut order: Vec<usize> = (0..features.len()).collect();
@@ -286,9 +313,15 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
         }
         1.0 - separation(&rows.synthetic, &scores) / whole
     };
-    let importances: Vec<f64> = order.par_iter().enumerate().map(|(i, c)| if i < params.shuffled { shuffled(*c) } else { 0.0 }).collect();
+    let importances: Vec<f64> =
+        order.par_iter().enumerate().map(|(i, c)| if i < params.shuffled { shuffled(*c) } else { 0.0 }).collect();
     let spread = |column: usize, side: bool| {
-        let mut values: Vec<f64> = rows.columns[column].iter().zip(&rows.synthetic).filter(|(_, s)| **s == side).map(|(v, _)| f64::from(*v)).collect();
+        let mut values: Vec<f64> = rows.columns[column]
+            .iter()
+            .zip(&rows.synthetic)
+            .filter(|(_, s)| **s == side)
+            .map(|(v, _)| f64::from(*v))
+            .collect();
         values.sort_unstable_by(f64::total_cmp);
         ([0.1, 0.5, 0.9].map(|q| of_sorted(&values, q)), values)
     };
@@ -302,6 +335,90 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
             Giveaway { feature: name.clone(), family: *family, importance, alone: auc(&low, &high), real, synthetic }
         })
         .collect();
-    list.sort_by(|a, b| b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs())));
+    list.sort_by(|a, b| {
+        b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs()))
+    });
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::Row;
+
+    const COLUMNS: usize = 8;
+
+    /// Fields with rows of numbers, of which the fourth is shifted, and every ninth unknown.
+    fn tables(shift: f64, seed: u64) -> Vec<Table> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut uniform = move || below(1 << 30, &mut rng) as f64 / f64::from(1 << 30);
+        let mut field = |_| {
+            let mut table = Table::default();
+            let own = 0.2 * uniform();
+            for i in 0..20 {
+                let mut row = Row::default();
+                for c in 0..COLUMNS {
+                    let value = uniform() + own + if c == 3 { shift } else { 0.0 };
+                    row.put(Family::Texture, format!("column {c}"), if (i + c) % 9 == 0 { f64::NAN } else { value });
+                }
+                table.push(row, [0.0; 2]);
+            }
+            table
+        };
+        (0..10).map(&mut field).collect()
+    }
+
+    fn params() -> TwoSampleParams {
+        TwoSampleParams { trees: 60, halvings: 4, bootstrap: 200, shuffled: COLUMNS, ..TwoSampleParams::default() }
+    }
+
+    #[test]
+    fn what_is_alike_is_not_told_apart() {
+        let result = two_sample(&tables(0.0, 1), &tables(0.0, 2), &params(), 5).unwrap();
+        assert!((0.3..0.65).contains(&result.auc), "{}", result.auc);
+        assert_eq!((result.rows, result.fields, result.null.len()), ([200, 200], [10, 10], 4));
+        assert!(result.interval[0] < 0.5);
+    }
+
+    #[test]
+    fn what_differs_is_named_first() {
+        let result = two_sample(&tables(0.0, 1), &tables(0.6, 2), &params(), 5).unwrap();
+        assert!(result.auc > 0.85 && result.interval[0] > 0.75, "{} {:?}", result.auc, result.interval);
+        let first = &result.giveaways[0];
+        assert_eq!(first.feature, "column 3");
+        assert!(first.importance > 0.5 && first.alone > 0.8 && first.synthetic[1] > first.real[1] + 0.3, "{first:?}");
+        assert!(result.giveaways[1].importance < 0.1);
+        assert_eq!(result.families.len(), 1);
+        assert!((result.families[0].auc - result.auc).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_field_is_never_learnt_from_and_tried() {
+        let real: Vec<Table> = tables(0.0, 1);
+        let all: Vec<(&Table, bool)> = real.iter().enumerate().map(|(i, t)| (t, i >= 5)).collect();
+        let sample = Sample::new(&all).unwrap();
+        let of = sample.folds(3, 1);
+        for side in [0..5, 5..10] {
+            let mut counts = [0; 3];
+            side.for_each(|f| counts[of[f]] += 1);
+            assert!(counts.iter().all(|c| (1..=2).contains(c)), "{counts:?}");
+        }
+        let round = round(&sample, 3, 20, 1).unwrap();
+        for (fold, (_, unseen)) in round.folds.iter().enumerate() {
+            assert!(unseen.iter().all(|row| of[sample.fields[*row]] == fold));
+        }
+        assert_eq!(round.folds.iter().map(|f| f.1.len()).sum::<usize>(), 200);
+    }
+
+    #[test]
+    fn fields_without_rows_do_not_count() {
+        let mut real = tables(0.0, 1);
+        real.truncate(2);
+        real.push(Table::default());
+        let result = two_sample(&real, &tables(0.0, 2), &params(), 1).unwrap();
+        assert_eq!((result.fields, result.null.len()), ([2, 10], 0));
+        real.remove(0);
+        assert!(two_sample(&real, &tables(0.0, 2), &params(), 1).is_none());
+        assert!(two_sample(&[], &[], &params(), 1).is_none());
+    }
 }

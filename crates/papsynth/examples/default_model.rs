@@ -20,8 +20,8 @@ use std::path::Path;
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage, Point, learn};
 use papsynth::model::{
-    CellClass, ChromatinStatistics, CytoplasmStatistics, Form, LogNormal, MODEL_VERSION, Model, Normal, NucleusStatistics,
-    Shapes,
+    CellClass, ChromatinStatistics, CytoplasmStatistics, Form, LogNormal, MODEL_VERSION, Model, Normal,
+    NucleusStatistics, Shapes,
 };
 
 /// Thickness from rim to centre in ten steps, relative to a cell's median: measured on free cells.

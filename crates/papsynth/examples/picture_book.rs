@@ -1,16 +1,20 @@
-//! A picture of every kind of debris with its name beneath: `picture_book OUT.png [colour]`.
+//! A picture of every class of cell and every kind of debris with its name beneath:
+//! `picture_book cells|debris OUT.png [colour]`.
 
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small program with small numbers")]
+
+mod support;
 
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Debris, Layout, Light, Mixing, Number, Preset, Recipe, Rendition};
+use papsynth::recipe::{
+    CellMix, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
+};
 use papsynth::scene::Kind;
 use papsynth::truth::Part;
 use papsynth::{Engine, Frame, Inputs};
-
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
+use support::{Outcome, around, enlarged, picture, write};
 
 /// Camera pixels of a tile, and how much larger they are shown.
 const TILE: [u32; 2] = [150, 120];
@@ -24,9 +28,13 @@ const DOT: u32 = 2;
 
 fn main() -> Outcome<()> {
     let mut arguments = std::env::args().skip(1);
+    let chapters = match arguments.next().as_deref() {
+        Some("cells") => cells(),
+        Some("debris") => debris(),
+        _ => return Err("usage: picture_book cells|debris OUT.png [colour]".into()),
+    };
     let out = arguments.next().unwrap_or_else(|| "target/picture-book.png".to_owned());
     let colour = arguments.next().is_some_and(|word| word == "colour");
-    let chapters = chapters();
     let rows = (chapters.len() as u32).div_ceil(COLUMNS);
     let cell = [TILE[0] * ZOOM + GAP, TILE[1] * ZOOM + GAP + LINE];
     let mut page = RgbImage::from_pixel(COLUMNS * cell[0] + GAP, rows * cell[1] + GAP, Rgb([255; 3]));
@@ -34,7 +42,9 @@ fn main() -> Outcome<()> {
         let (x, y) = (GAP + i % COLUMNS * cell[0], GAP + i / COLUMNS * cell[1]);
         let tile = draw(chapter, colour)?;
         image::imageops::replace(&mut page, &tile, i64::from(x), i64::from(y));
-        write(&mut page, chapter.name, [x + 4, y + TILE[1] * ZOOM + 6]);
+        // A name that is too long for its tile is written smaller.
+        let fits = chapter.name.len() as u32 * 8 * DOT <= TILE[0] * ZOOM;
+        write(&mut page, chapter.name, [x + 4, y + TILE[1] * ZOOM + 4], if fits { DOT } else { 1 });
     }
     page.save(&out)?;
     Ok(())
@@ -76,7 +86,38 @@ fn with_cells(mut chapter: Chapter) -> Chapter {
     chapter
 }
 
-fn chapters() -> Vec<Chapter> {
+/// A class of cell, in groups if it lies in groups.
+fn class(name: &'static str, count: f64, group: Group) -> Chapter {
+    let mut chapter = chapter(name, Kind::Cell, |_| {});
+    let tints = if name.contains("superficial") { TintMix::superficial() } else { TintMix::default() };
+    let mix = CellMix { count: count.into(), group, tints, ..CellMix::default() };
+    chapter.recipe.cells.insert(name.to_owned(), mix);
+    chapter.recipe.slide.spacing_um = 0.0.into();
+    chapter
+}
+
+fn cells() -> Vec<Chapter> {
+    let group = |form, size: f64, distance: f64| Group { form, size: size.into(), distance: distance.into() };
+    let heap = |size| group(GroupForm::Heap, size, 0.85);
+    vec![
+        far(class("superficial", 1.0, Group::default())),
+        far(class("intermediate", 1.0, Group::default())),
+        far(class("parabasal", 4.0, heap(4.0))),
+        far(class("basal", 6.0, heap(6.0))),
+        far(class("metaplastic", 4.0, heap(4.0))),
+        far(class("endocervical", 9.0, group(GroupForm::Palisade, 9.0, 0.46))),
+        far(class("endocervical-en-face", 19.0, group(GroupForm::Honeycomb, 19.0, 0.85))),
+        far(class("lsil", 2.0, heap(2.0))),
+        far(class("high-grade", 3.0, heap(3.0))),
+        far(class("severe", 5.0, heap(5.0))),
+        far(class("carcinoma", 6.0, heap(6.0))),
+        far(class("oral-superficial", 1.0, Group::default())),
+        far(class("oral-intermediate", 1.0, Group::default())),
+        far(class("oral-parabasal", 3.0, heap(3.0))),
+    ]
+}
+
+fn debris() -> Vec<Chapter> {
     use Kind as K;
     vec![
         chapter("neutrophils", K::Leukocyte, |d| {
@@ -157,64 +198,5 @@ fn draw(chapter: &Chapter, colour: bool) -> Outcome<RgbImage> {
         }
     }
     let (_, [x, y], frame) = best.ok_or("nothing was drawn")?;
-    let whole = picture(&frame);
-    let corner =
-        |middle: f64, side: u32, length: u32| ((middle - f64::from(side) / 2.0).max(0.0) as u32).min(length - side);
-    let (x, y) = (corner(x, TILE[0], whole.width()), corner(y, TILE[1], whole.height()));
-    let cut = image::imageops::crop_imm(&whole, x, y, TILE[0], TILE[1]).to_image();
-    let filter = image::imageops::FilterType::CatmullRom;
-    Ok(image::imageops::resize(&cut, TILE[0] * ZOOM, TILE[1] * ZOOM, filter))
-}
-
-fn picture(frame: &Frame) -> RgbImage {
-    let (view, plane) = (frame.finished.scene.view, &frame.planes[0]);
-    RgbImage::from_fn(view.width as u32, view.height as u32, |x, y| {
-        let at = (y as usize * view.width + x as usize) * plane.channels;
-        let grey = |channel: usize| plane.grey[at + channel.min(plane.channels - 1)].min(255) as u8;
-        Rgb([grey(0), grey(1), grey(2)])
-    })
-}
-
-/// Rows of five dots, the leftmost the highest bit, of the letters that names are made of.
-const LETTERS: [(char, [u8; 7]); 23] = [
-    ('a', [0, 0, 14, 1, 15, 17, 15]),
-    ('b', [16, 16, 30, 17, 17, 17, 30]),
-    ('c', [0, 0, 14, 16, 16, 17, 14]),
-    ('d', [1, 1, 15, 17, 17, 17, 15]),
-    ('e', [0, 0, 14, 17, 31, 16, 14]),
-    ('f', [6, 9, 28, 8, 8, 8, 8]),
-    ('g', [0, 0, 15, 17, 15, 1, 14]),
-    ('h', [16, 16, 30, 17, 17, 17, 17]),
-    ('i', [4, 0, 12, 4, 4, 4, 14]),
-    ('k', [16, 16, 18, 20, 24, 20, 18]),
-    ('l', [12, 4, 4, 4, 4, 4, 14]),
-    ('m', [0, 0, 26, 21, 21, 21, 21]),
-    ('n', [0, 0, 30, 17, 17, 17, 17]),
-    ('o', [0, 0, 14, 17, 17, 17, 14]),
-    ('p', [0, 0, 30, 17, 30, 16, 16]),
-    ('r', [0, 0, 22, 25, 16, 16, 16]),
-    ('s', [0, 0, 15, 16, 14, 1, 30]),
-    ('t', [8, 8, 28, 8, 8, 9, 6]),
-    ('u', [0, 0, 17, 17, 17, 19, 13]),
-    ('v', [0, 0, 17, 17, 17, 10, 4]),
-    ('w', [0, 0, 17, 17, 21, 21, 10]),
-    ('y', [0, 0, 17, 17, 15, 1, 14]),
-    (',', [0, 0, 0, 0, 12, 4, 8]),
-];
-
-/// Writes a line of letters.
-fn write(page: &mut RgbImage, text: &str, [left, top]: [u32; 2]) {
-    for (place, letter) in (0_u32..).zip(text.chars()) {
-        let Some((_, rows)) = LETTERS.iter().find(|(known, _)| *known == letter) else { continue };
-        for (y, row) in (0_u32..).zip(rows) {
-            for x in (0..5).filter(|x| row >> (4 - x) & 1 == 1) {
-                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-                    let at = [left + (place * 6 + x) * DOT + dx, top + y * DOT + dy];
-                    if at[0] < page.width() && at[1] < page.height() {
-                        page.put_pixel(at[0], at[1], Rgb([0; 3]));
-                    }
-                }
-            }
-        }
-    }
+    Ok(enlarged(&around(&picture(&frame), [x, y], TILE), ZOOM))
 }

@@ -7,14 +7,7 @@ use crate::scene::Fusion;
 
 /// Filters what noise has added to the expected grey levels so that neighbours correlate as they should. Its variance
 /// stays what it was.
-pub(crate) fn correlate(
-    grey: &mut [u16],
-    expected: &[f32],
-    width: usize,
-    channels: usize,
-    fusion: &Fusion,
-    bits: u32,
-) {
+pub(crate) fn correlate(grey: &mut [u16], expected: &[f32], width: usize, channels: usize, fusion: &Fusion, bits: u32) {
     let [across, down] = [0, 1].map(|axis| Kernel::of(fusion.noise_correlation[axis], SECOND[axis]));
     let row = width * channels;
     if row == 0 || fusion.noise_correlation == [0.0; 2] {

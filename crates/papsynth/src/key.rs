@@ -13,7 +13,7 @@ pub type Stream = Xoshiro256PlusPlus;
 
 /// Version of the mapping from keys to numbers, and from numbers to images. It changes when the same recipe,
 /// model, seed and index would give another image, and is recorded with every data set.
-pub const STREAM_VERSION: u32 = 2;
+pub const STREAM_VERSION: u32 = 3;
 
 /// What names one image: the seed of the data set and the index of the image in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]

@@ -227,9 +227,7 @@ impl Rendering {
                 .scene
                 .planes_um
                 .iter()
-                .map(|plane| {
-                    self.scene.in_focus_um(self.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um
-                })
+                .map(|plane| self.scene.in_focus_um(self.scene.seen_at_um(*plane, object.depth_um)) - object.depth_um)
                 .collect(),
             detectability: self.detectability.iter().map(|plane| plane[number]).collect(),
         }

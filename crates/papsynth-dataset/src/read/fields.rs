@@ -107,7 +107,9 @@ impl FieldFile {
         let full = self.white.unwrap_or_else(|| if image.white == u16::MAX { deep() } else { image.white });
         let nuclei = match &self.nuclei {
             NucleiFile::Unknown => FieldNuclei::Unknown,
-            NucleiFile::Points(path) => FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?),
+            NucleiFile::Points(path) => {
+                FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?)
+            }
             NucleiFile::Labels(path) => {
                 let labels = read_label_map(path, limits)?;
                 let size = |width: usize, len: usize| [width, len / width.max(1)];
@@ -133,7 +135,9 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
         return of_dataset(folder);
     }
     let images = match image_files(folder) {
-        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => image_files(&folder.join("images"))?,
+        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => {
+            image_files(&folder.join("images"))?
+        }
         other => other?,
     };
     let masks = if folder.join("masks").is_dir() { image_files(&folder.join("masks"))? } else { BTreeMap::new() };
@@ -206,7 +210,9 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
         match (number(&y), number(&x)) {
             (Some(y), Some(x)) => points.push([x, y]),
             _ if line == 1 && y == "y" && x == "x" => {}
-            _ => return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") }),
+            _ => {
+                return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") });
+            }
         }
     }
     Ok(points)
@@ -223,7 +229,8 @@ fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
 
 /// Lines of two values.
 fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| Problem::Broken { format: "CSV", message: e.to_string() })?;
@@ -252,7 +259,10 @@ mod tests {
 
     #[test]
     fn groups_need_their_columns() {
-        assert_eq!(groups(b"frame,grade\na,N\nb,H\n").unwrap(), BTreeMap::from([("a".into(), "N".into()), ("b".into(), "H".into())]));
+        assert_eq!(
+            groups(b"frame,grade\na,N\nb,H\n").unwrap(),
+            BTreeMap::from([("a".into(), "N".into()), ("b".into(), "H".into())])
+        );
         assert!(groups(b"a,N\n").is_err());
         assert!(groups(b"").is_err());
     }

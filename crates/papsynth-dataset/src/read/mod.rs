@@ -7,8 +7,8 @@
 //!
 //! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused, but for
 //! [`LevelImage`], which keeps its channels: how much light of one wavelength a colour stands for is not known. Fields that
-//! are compared alone are read in green ([`field_files`]). A colour file whose pixels are all grey (R = G = B, opaque) is
-//! read as grey. In label images and masks a palette is not looked at, its indices are the labels.
+//! are compared are read in green ([`field_files`]). A colour file whose pixels are all grey (R = G = B, opaque) is read as
+//! grey. In label images and masks a palette is not looked at, its indices are the labels.
 
 mod components;
 mod fields;

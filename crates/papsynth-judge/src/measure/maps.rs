@@ -82,7 +82,8 @@ impl Maps {
             if x == 0 || y == 0 || x + 1 == width || y + 1 == self.height {
                 continue;
             }
-            let around = [p - width - 1, p - width, p - width + 1, p - 1, p + 1, p + width - 1, p + width, p + width + 1];
+            let around =
+                [p - width - 1, p - width, p - width + 1, p - 1, p + 1, p + width - 1, p + width, p + width + 1];
             let own = self.smooth[p];
             dark += f64::from(u8::from(around.iter().all(|q| own > self.smooth[*q])));
             pale += f64::from(u8::from(around.iter().all(|q| own < self.smooth[*q])));

@@ -20,8 +20,8 @@ use crate::table::Table;
 use maps::Maps;
 
 pub use cell::PROFILE;
-pub(crate) use patch::PATCH_PX;
 pub use layout::{clark_evans, ripley};
+pub(crate) use patch::PATCH_PX;
 pub use spectrum::frequencies;
 pub use statistics::{HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, RADII_UM, Statistics};
 
@@ -159,6 +159,8 @@ impl Gauge {
     pub fn measure(&self, picture: &Picture) -> Result<Field, Error> {
         picture.check()?;
         let picture = picture.trimmed();
+        // What is left of it may be too little.
+        picture.check()?;
         let pixel_um = self.params.pixel_um;
         let maps = Maps::new(&picture);
         let regions = self.nuclei(&maps, &picture.nuclei);
@@ -195,7 +197,8 @@ impl Gauge {
     }
 
     fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<crate::region::Region> {
-        let search = |hints: Hints| nuclei(&maps.absorbance, maps.width, self.params.pixel_um, &hints, &self.params.nuclei);
+        let search =
+            |hints: Hints| nuclei(&maps.absorbance, maps.width, self.params.pixel_um, &hints, &self.params.nuclei);
         match (self.params.nuclei_from, known) {
             (NucleiFrom::Masks, Known::Masks(labels)) => search(Hints::Masks(labels)),
             (NucleiFrom::Points, Known::Points(points)) => search(Hints::Points(points)),

@@ -48,7 +48,8 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
     let deepest = pixels.iter().map(|p| p.depth).fold(0.0, f64::max);
     let rim = RIM_PX.min(0.4 * deepest);
     let core: Vec<&Pixel> = pixels.iter().filter(|p| p.depth > rim).collect();
-    let ring = |[from, to]: [f64; 2]| pixels.iter().filter(move |p| -p.depth > from / pixel_um && -p.depth <= to / pixel_um);
+    let ring =
+        |[from, to]: [f64; 2]| pixels.iter().filter(move |p| -p.depth > from / pixel_um && -p.depth <= to / pixel_um);
     let mut core_a: Vec<f64> = core.iter().map(|p| p.a).collect();
     core_a.sort_unstable_by(f64::total_cmp);
     let beside: Vec<f64> = ring(BESIDE_UM).map(|p| p.a).collect();
@@ -87,13 +88,22 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
         let a = mean_of(pixels.iter().filter(|p| p.depth > 0.0 && of(p.depth) == bin).map(|p| p.a));
         row.put(Family::Rim, format!("rim to centre, bin {} of {BINS}", bin + 1), (a - outer) / contrast.max(0.02));
     }
-    let profile: Vec<f64> = (-REACH_PX..REACH_PX).map(|d| f64::from(d) + 0.5).map(|d| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a))).collect();
+    let profile: Vec<f64> = (-REACH_PX..REACH_PX)
+        .map(|d| f64::from(d) + 0.5)
+        .map(|d| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a)))
+        .collect();
     let steepest = profile.windows(2).map(|w| w[1] - w[0]).filter(|s| s.is_finite()).fold(1e-3, f64::max);
     // The step of an edge blurred by σ has the slope 1/(σ √(2π)) of its height.
     row.put(Family::Rim, "rim sigma, px", contrast / (steepest * TAU.sqrt()));
-    let membrane = profile[whole(f64::from(REACH_PX))..].iter().copied().filter(|v| v.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+    let membrane = profile[whole(f64::from(REACH_PX))..]
+        .iter()
+        .copied()
+        .filter(|v| v.is_finite())
+        .fold(f64::NEG_INFINITY, f64::max);
     row.put(Family::Rim, "darkest depth over core", (membrane - inner) / contrast.max(0.02));
-    let rim_slope = |s: usize| mean_of(pixels.iter().filter(|p| p.depth.abs() < 1.5 && p.sector == s).map(|p| f64::from(maps.slope[p.index])));
+    let rim_slope = |s: usize| {
+        mean_of(pixels.iter().filter(|p| p.depth.abs() < 1.5 && p.sector == s).map(|p| f64::from(maps.slope[p.index])))
+    };
     let slopes = known((0..SECTORS).map(rim_slope));
     row.put(Family::Rim, "rim slope over contrast", mean(&slopes) / contrast.max(0.02));
     row.put(Family::Rim, "rim unevenness", deviation(&slopes) / mean(&slopes).max(1e-3));

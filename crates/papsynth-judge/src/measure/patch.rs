@@ -113,11 +113,19 @@ fn features(fine: &Fine, window: Window) -> Row {
         let fourth = values.iter().map(|v| v * v * v * v).sum::<f64>() / n;
         let power = libm::log10(square.max(1e-10));
         row.put(Family::Spectrum, format!("log power at {} px", 1 << i), power);
-        row.put(Family::Spectrum, format!("sparseness at {} px", 1 << i), libm::log10(fourth / (square * square).max(1e-18)));
+        row.put(
+            Family::Spectrum,
+            format!("sparseness at {} px", 1 << i),
+            libm::log10(fourth / (square * square).max(1e-18)),
+        );
         powers.push(power);
     }
     for i in 1..BANDS {
-        row.put(Family::Spectrum, format!("log power at {} over {} px", 1 << i, 1 << (i - 1)), powers[i] - powers[i - 1]);
+        row.put(
+            Family::Spectrum,
+            format!("log power at {} over {} px", 1 << i, 1 << (i - 1)),
+            powers[i] - powers[i - 1],
+        );
     }
 
     edges(&mut row, fine, window);
@@ -140,7 +148,11 @@ fn features(fine: &Fine, window: Window) -> Row {
         let total = over(energy, &f64::from);
         let product: Vec<f32> = coherence.iter().zip(energy).map(|(c, e)| c * e).collect();
         row.put(Family::Texture, format!("coherence at {sigma} px"), over(coherence, &f64::from));
-        row.put(Family::Texture, format!("coherence of edges at {sigma} px"), over(&product, &f64::from) / total.max(1e-9));
+        row.put(
+            Family::Texture,
+            format!("coherence of edges at {sigma} px"),
+            over(&product, &f64::from) / total.max(1e-9),
+        );
     }
     for (classes, (radius, _)) in fine.patterns.iter().zip(PATTERNS) {
         let mut counts = [0_usize; CLASSES];
@@ -171,7 +183,11 @@ fn edges(row: &mut Row, fine: &Fine, window: Window) {
         row.put(Family::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
     }
     let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
-    row.put(Family::Edges, "log slope across over down", libm::log10(sum(&fine.gradient[0]).max(1e-9) / sum(&fine.gradient[1]).max(1e-9)));
+    row.put(
+        Family::Edges,
+        "log slope across over down",
+        libm::log10(sum(&fine.gradient[0]).max(1e-9) / sum(&fine.gradient[1]).max(1e-9)),
+    );
     let within = |p: usize| {
         let (x, y) = (p % maps.width, p / maps.width);
         (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
@@ -218,7 +234,8 @@ fn hessian(image: &[f32], width: usize, sigma: f64) -> [Vec<f32>; 2] {
 fn tensor(maps: &Maps, sigma: f64, window: f64) -> [Vec<f32>; 2] {
     let image = if sigma > 1.0 { &maps.smoother } else { &maps.smooth };
     let [dx, dy] = gradient(image, maps.width);
-    let product = |a: &[f32], b: &[f32]| blur(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>(), maps.width, window);
+    let product =
+        |a: &[f32], b: &[f32]| blur(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>(), maps.width, window);
     let (xx, xy, yy) = (product(&dx, &dx), product(&dx, &dy), product(&dy, &dy));
     let mut out = [Vec::with_capacity(image.len()), Vec::with_capacity(image.len())];
     for ((xx, xy), yy) in xx.iter().zip(&xy).zip(&yy) {
@@ -231,17 +248,35 @@ fn tensor(maps: &Maps, sigma: f64, window: f64) -> [Vec<f32>; 2] {
 
 /// Rotation-invariant uniform local binary patterns of eight neighbours (Ojala et al., doi:10.1109/TPAMI.2002.1017623).
 fn pattern(maps: &Maps, radius: i64, sigma: f64) -> Vec<u8> {
-    let image = if sigma == 0.0 { maps.absorbance.clone() } else if sigma == 1.0 { maps.smooth.clone() } else { maps.smoother.clone() };
+    let image = if sigma == 0.0 {
+        maps.absorbance.clone()
+    } else if sigma == 1.0 {
+        maps.smooth.clone()
+    } else {
+        maps.smoother.clone()
+    };
     let diagonal = (radius * 7 + 5) / 10;
-    let ring = [[radius, 0], [diagonal, diagonal], [0, radius], [-diagonal, diagonal], [-radius, 0], [-diagonal, -diagonal], [0, -radius], [diagonal, -diagonal]];
+    let ring = [
+        [radius, 0],
+        [diagonal, diagonal],
+        [0, radius],
+        [-diagonal, diagonal],
+        [-radius, 0],
+        [-diagonal, -diagonal],
+        [0, -radius],
+        [diagonal, -diagonal],
+    ];
     let (width, height) = (maps.width as i64, maps.height as i64);
     let classes = classes();
     let mut out = vec![0; image.len()];
     for y in 0..height {
         for x in 0..width {
-            let at = |x: i64, y: i64| image[usize::try_from(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)).unwrap_or(0)];
+            let at = |x: i64, y: i64| {
+                image[usize::try_from(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)).unwrap_or(0)]
+            };
             let own = at(x, y) + TOLERANCE;
-            let bits = ring.iter().enumerate().map(|(i, [dx, dy])| usize::from(at(x + dx, y + dy) > own) << i).sum::<usize>();
+            let bits =
+                ring.iter().enumerate().map(|(i, [dx, dy])| usize::from(at(x + dx, y + dy) > own) << i).sum::<usize>();
             out[usize::try_from(y * width + x).unwrap_or(0)] = classes[bits];
         }
     }

@@ -142,7 +142,12 @@ impl Statistics {
             ("nuclei a mm2", self.nuclei_mm2),
             ("Clark-Evans", self.clark_evans),
         ];
-        let radii = ["K over Poisson at 16.5 um", "K over Poisson at 33 um", "K over Poisson at 66 um", "K over Poisson at 99 um"];
+        let radii = [
+            "K over Poisson at 16.5 um",
+            "K over Poisson at 33 um",
+            "K over Poisson at 66 um",
+            "K over Poisson at 99 um",
+        ];
         all.extend(radii.into_iter().zip(self.ripley));
         all.extend([
             ("area of nuclei, um2", self.nucleus_um2),
@@ -162,7 +167,13 @@ impl Statistics {
         let mut inside = vec![false; maps.absorbance.len()];
         nuclei.iter().flat_map(|n| &n.pixels).for_each(|p| inside[*p as usize] = true);
         let covered = maps.smooth.iter().filter(|a| **a > COVERED).count() as f64;
-        let mut cytoplasm: Vec<f64> = maps.smooth.iter().zip(&inside).filter(|(a, i)| **a > COVERED && !**i).map(|(a, _)| f64::from(*a)).collect();
+        let mut cytoplasm: Vec<f64> = maps
+            .smooth
+            .iter()
+            .zip(&inside)
+            .filter(|(a, i)| **a > COVERED && !**i)
+            .map(|(a, _)| f64::from(*a))
+            .collect();
         cytoplasm.sort_unstable_by(f64::total_cmp);
         let middle = of_sorted(&cytoplasm, 0.5);
         let layered = cytoplasm.iter().filter(|a| **a > TWICE * middle).count() as f64 / cytoplasm.len() as f64;
@@ -229,7 +240,9 @@ fn empty_noise(maps: &Maps) -> Option<Noise> {
     const FLATTEST: f64 = 1.0 / 30.0;
     let along = |length: usize| (0..=length - BLOCK).step_by(BLOCK);
     let places: Vec<(usize, usize)> = along(maps.height).flat_map(|y| along(maps.width).map(move |x| (x, y))).collect();
-    let empty = |(x, y): &&(usize, usize)| (*y..y + BLOCK).all(|y| maps.smooth[y * maps.width + x..][..BLOCK].iter().all(|a| a.abs() < EMPTY));
+    let empty = |(x, y): &&(usize, usize)| {
+        (*y..y + BLOCK).all(|y| maps.smooth[y * maps.width + x..][..BLOCK].iter().all(|a| a.abs() < EMPTY))
+    };
     let noise = |(x, y): &(usize, usize)| Noise::of(&maps.grey, maps.width, *x, *y);
     let mut blocks: Vec<Noise> = places.iter().filter(empty).map(noise).collect();
     if blocks.len() < LEAST {

@@ -86,7 +86,7 @@ pub struct Leukocyte {
 impl Default for Leukocytes {
     fn default() -> Self {
         Self {
-            clusters: Number::log_normal(3.0, 0.9),
+            clusters: Number::log_normal(2.4, 1.0),
             per_cluster: Number::log_normal(1.7, 0.75).at_least(1.0),
             cluster_um: Number::uniform(8.0, 20.0),
             touching: 0.7.into(),
@@ -98,7 +98,7 @@ impl Default for Leukocytes {
             lobes: Number::choice([1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
             cell_um: Number::normal(9.6, 0.7),
             degenerated: 0.2.into(),
-            absorbance: Number::normal(0.34, 0.05),
+            absorbance: Number::normal(0.30, 0.05),
             halo: Number::log_normal(0.10, 0.35),
         }
     }

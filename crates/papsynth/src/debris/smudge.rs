@@ -62,7 +62,7 @@ pub struct Smudge {
 impl Default for Smudges {
     fn default() -> Self {
         Self {
-            count: Number::log_normal(7.0, 0.8),
+            count: Number::log_normal(9.0, 0.8),
             on_cells: 0.25.into(),
             diameter_um: Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0),
             elongation: Number::log_normal(1.5, 0.3).at_least(1.0),

@@ -19,8 +19,7 @@ pub(super) fn merged(base: &Model, text: &str) -> Result<Model, String> {
     }
     let mut model = base.clone();
     if let Some(provenance) = file.remove("provenance") {
-        let entries: Vec<Provenance> =
-            serde_json::from_value(provenance).map_err(|e| format!("provenance: {e}"))?;
+        let entries: Vec<Provenance> = serde_json::from_value(provenance).map_err(|e| format!("provenance: {e}"))?;
         model.provenance.retain(|old| !entries.contains(old));
         model.provenance.extend(entries);
     }

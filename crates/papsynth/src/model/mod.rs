@@ -17,8 +17,7 @@ use crate::error::Error;
 pub const MODEL_VERSION: u32 = 1;
 
 /// The classes that are told from those of the model that ships, by the numbers in which they differ.
-const BUILTIN_CLASSES: [&str; 2] =
-    [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
+const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
 
 /// The text of the model that ships.
 const BUILTIN: &str = include_str!("../../model/default.json");

@@ -1,9 +1,9 @@
 //! The nucleus of a cell: outline, chromatin, rim.
 
-use super::{Piece, form};
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area};
 use super::wobble::{placed, wobbled_circle};
+use super::{Piece, form};
 use crate::random;
 use crate::recipe::Chromatin;
 use crate::scene::{CellBody, NucleusBody, Object, Scene};
@@ -137,7 +137,9 @@ fn add_nucleolus(
     let share = random::between(0.0, 0.6, rng);
     let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
     let mut cover = absorbance.blank();
-    cover.cover(&wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
+    cover.cover(
+        &wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>(),
+    );
     for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
         *value += cover * (NUCLEOLUS * strength) as f32;
     }

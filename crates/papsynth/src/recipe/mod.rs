@@ -28,8 +28,8 @@ pub use imaging::{
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use specimen::{
-    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam, ShapeSpread, Sheet,
-    Slide, Stain, TintMix,
+    Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam,
+    ShapeSpread, Sheet, Slide, Stain, TintMix,
 };
 
 /// The version of recipes that this crate reads and writes.

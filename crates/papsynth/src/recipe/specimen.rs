@@ -324,7 +324,7 @@ impl Default for Cytoplasm {
             grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::log_normal(0.55, 0.5),
+            fray_um: Number::log_normal(0.45, 0.55),
             rim_um: Number::log_normal(2.0, 0.4),
             phase_rad: Number::uniform(0.05, 0.15),
         }

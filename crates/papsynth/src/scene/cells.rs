@@ -145,7 +145,9 @@ fn draw_body(
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
         // About as many as there are on average, one more or less.
-        nucleoli: random::count(nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0)),
+        nucleoli: random::count(
+            nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0),
+        ),
     };
     if pyknotic {
         // Shrunken, almost black, without structure.

@@ -10,8 +10,8 @@ use crate::recipe::{Illumination, Light, Number, Optics, Picture, Recipe};
 use super::cells::draw_cells;
 use super::stain::{FieldStain, slide_of};
 use super::{
-    Fusion, Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope, SceneOptics,
-    View, WeightMap,
+    Fusion, Restoration, Scene, SceneBackground, SceneCamera, SceneIllumination, SceneLight, SceneMicroscope,
+    SceneOptics, View, WeightMap,
 };
 
 /// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of

@@ -184,8 +184,10 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
     let mut sum = like.blank();
     for step in 0..STEPS {
         let share = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
-        let scaled: Vec<Point> =
-            polygon.iter().map(|p| [centre[0] + share * (p[0] - centre[0]), centre[1] + share * (p[1] - centre[1])]).collect();
+        let scaled: Vec<Point> = polygon
+            .iter()
+            .map(|p| [centre[0] + share * (p[0] - centre[0]), centre[1] + share * (p[1] - centre[1])])
+            .collect();
         let mut cover = like.blank();
         cover.cover(&scaled);
         sum.values.iter_mut().zip(&cover.values).for_each(|(sum, cover)| *sum += cover / STEPS as f32);
@@ -214,7 +216,11 @@ pub(super) fn add_endoplasm(
     let round = wobbled_circle(radius, 0.15, 0.15, rng);
     let round: Vec<Point> = round.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
     let lifted = ramp(absorbance, &round, nucleus, 1.0, LIFTED);
-    absorbance.values.iter_mut().zip(&lifted.values).for_each(|(value, share)| *value *= 1.0 + 0.9 * share * body.detail.endoplasm as f32);
+    absorbance
+        .values
+        .iter_mut()
+        .zip(&lifted.values)
+        .for_each(|(value, share)| *value *= 1.0 + 0.9 * share * body.detail.endoplasm as f32);
     let grain = Look::fine(pixel_um, rng);
     let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
     let width = absorbance.width;

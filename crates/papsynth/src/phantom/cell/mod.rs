@@ -6,13 +6,13 @@ mod detail;
 mod outline;
 mod wrinkles;
 
+use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
-use crate::phantom::{form, nucleus};
 use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::phantom::{Phantom, Piece};
-use crate::key::Stream;
+use crate::phantom::{form, nucleus};
 use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
 use crate::truth::Part;
 
@@ -154,8 +154,10 @@ fn finish(
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
         pieces = folded.map_err(|e| e.to_string())?.concat();
     }
-    let rough: Vec<Vec<Point>> =
-        pieces.iter().map(|p| outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng)).collect();
+    let rough: Vec<Vec<Point>> = pieces
+        .iter()
+        .map(|p| outline::roughened(p, body.detail.fray_um / pixel_um, RIM_STEP_UM / pixel_um, &mut rng))
+        .collect();
     let mut coverage = Tile::around(rough.iter().flatten(), 3.0);
     for piece in &rough {
         coverage.cover(piece);

@@ -140,7 +140,7 @@ fn poked(outline: &[Point], depth: f64, rng: &mut Stream) -> Vec<Point> {
 }
 
 /// Strength of the jags of a torn rim, a few micrometres long, relative to its fraying.
-const JAGGED: f64 = 2.0;
+const JAGGED: f64 = 1.0;
 
 /// An outline whose points are pushed in and out a little, finely and unevenly: the frayed rim of a real cell.
 pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mut Stream) -> Vec<Point> {
@@ -168,4 +168,3 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
         })
         .collect()
 }
-

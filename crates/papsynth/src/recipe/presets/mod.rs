@@ -72,21 +72,35 @@ impl Preset {
     fn entry(self) -> (&'static str, &'static str, fn() -> Recipe) {
         match self {
             Self::Lbc => ("lbc", "liquid-based cytology: free cells and small groups (default)", lbc),
-            Self::Paper2015 => ("paper-2015", "the simulator of the 2015 paper, with the values of its released code", paper::recipe),
+            Self::Paper2015 => {
+                ("paper-2015", "the simulator of the 2015 paper, with the values of its released code", paper::recipe)
+            }
             Self::Sparse => ("sparse", "few cells, hardly any debris", sparse),
             Self::Dense => ("dense", "covered with cells, several layers deep", dense),
-            Self::Conventional => ("conventional", "a conventional smear: thick and uneven, with blood, mucus and leukocytes", conventional),
+            Self::Conventional => (
+                "conventional",
+                "a conventional smear: thick and uneven, with blood, mucus and leukocytes",
+                conventional,
+            ),
             Self::Lsil => ("lsil", "cells of a low-grade lesion, koilocytes among them", lsil),
             Self::HighGrade => ("high-grade", "cells of a high-grade lesion among normal ones", high_grade),
             Self::Carcinoma => ("carcinoma", "squamous carcinoma: cells of every form, leukocytes, debris", carcinoma),
             Self::Atrophic => ("atrophic", "atrophy: parabasal and basal cells", atrophic),
-            Self::Endocervical => ("endocervical", "palisades and honeycombs of endocervical cells, metaplastic cells", endocervical),
+            Self::Endocervical => {
+                ("endocervical", "palisades and honeycombs of endocervical cells, metaplastic cells", endocervical)
+            }
             Self::Inflamed => ("inflamed", "many leukocytes, bacteria and debris", inflamed),
-            Self::BacterialVaginosis => ("bacterial-vaginosis", "bacterial vaginosis: clue cells and clouds of cocci", bacterial_vaginosis),
+            Self::BacterialVaginosis => {
+                ("bacterial-vaginosis", "bacterial vaginosis: clue cells and clouds of cocci", bacterial_vaginosis)
+            }
             Self::Candida => ("candida", "Candida: pseudohyphae and budding yeasts", candida),
             Self::Trichomonas => ("trichomonas", "trichomonads among leukocytes", trichomonas),
             Self::Oral => ("oral", "the oral mucosa: another smear, made of a class file and a few lines", oral),
-            Self::ExtendedFocus => ("extended-focus", "the default slide from a scanner that fuses planes, 0.33 µm a pixel", extended_focus),
+            Self::ExtendedFocus => (
+                "extended-focus",
+                "the default slide from a scanner that fuses planes, 0.33 µm a pixel",
+                extended_focus,
+            ),
         }
     }
 

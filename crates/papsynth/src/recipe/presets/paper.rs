@@ -114,11 +114,7 @@ fn debris() -> Debris {
     debris.speckles = Speckles {
         count: 120.0.into(),
         form: SpeckForm::Dilated,
-        dilations: Number::Drawn {
-            law: Law::Choice(vec![0.0, 0.0, 1.0]),
-            min: f64::NEG_INFINITY,
-            max: f64::INFINITY,
-        },
+        dilations: Number::Drawn { law: Law::Choice(vec![0.0, 0.0, 1.0]), min: f64::NEG_INFINITY, max: f64::INFINITY },
         absorbance: 0.25.into(),
         phase_rad: 0.0.into(),
     };
@@ -132,4 +128,3 @@ fn debris() -> Debris {
     };
     debris
 }
-
