@@ -12,7 +12,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
     details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the study the data set, the \
-              program all of them, the chores nobody. Dependencies of tests count too, so that every crate can be \
+               judge nobody, the program all of them, the chores nobody. Dependencies of tests count too, so that every crate can be \
               taken, tested and published alone.",
     run,
 };
@@ -23,13 +23,14 @@ enum Role {
     Technique,
     Engine,
     Dataset,
+    Judge,
     Study,
     Program,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 14] = [
+const PLACES: [(&str, Role); 15] = [
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -41,6 +42,7 @@ const PLACES: [(&str, Role); 14] = [
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
     ("papsynth-dataset", Role::Dataset),
+    ("papsynth-judge", Role::Judge),
     ("papsynth-study", Role::Study),
     ("papsynth-cli", Role::Program),
     ("xtask", Role::Chores),
@@ -54,13 +56,14 @@ impl Role {
     /// Whom a crate in this place may depend on.
     fn may_know(self) -> &'static [Self] {
         match self {
-            Self::Technique | Self::Chores => &[],
+            // Who judges must not know what is judged.
+            Self::Technique | Self::Judge | Self::Chores => &[],
             Self::Engine => &[Self::Technique],
             Self::Dataset => &[Self::Engine],
             // It shows files, whoever made them.
             Self::Study => &[Self::Dataset],
             // It measures microscopes and cameras, which are no business of the engine.
-            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Study],
+            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Study],
         }
     }
 }

@@ -22,8 +22,8 @@ pub(crate) const CHORE: Chore = Chore {
     run,
 };
 
-/// The equations that have to stand somewhere. 17 to 19 are measures of an image, not parts of the simulator.
-const EQUATIONS: std::ops::RangeInclusive<u32> = 1..=16;
+/// The equations that have to stand somewhere: all of them. 17 to 19 are measures of an image, and the judge's.
+const EQUATIONS: std::ops::RangeInclusive<u32> = 1..=19;
 
 /// An item that cites an equation.
 #[derive(Debug, PartialEq, Eq)]

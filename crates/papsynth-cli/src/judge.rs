@@ -1,5 +1,6 @@
 //! `papsynth judge`: two sets of fields in, a report of how they differ out.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits, field_files};
@@ -42,6 +43,9 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
     }
     let (real, synthetic) = sides(args)?;
     let pixel_um = coarsest(&real, &synthetic);
+    for (folder, side) in [(&args.real, &real), (&args.synthetic, &synthetic)] {
+        few_slides(folder, side);
+    }
     let nuclei_from = nuclei_from(args, &real, &synthetic)?;
     let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(refuse)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
@@ -91,7 +95,7 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
         files.retain(wanted);
     } else if !groups.is_empty() && files.iter().any(|f| !f.group.is_empty()) {
         let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
-        let known: std::collections::BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
+        let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
         return Err(Failure::input(
             Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter()))),
         ));
@@ -103,6 +107,19 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
         ));
     }
     Ok(files)
+}
+
+/// Fields of one slide are alike, so that a few slides are told from any others: which is no fault of theirs.
+fn few_slides(folder: &Path, side: &Side) {
+    let slides: BTreeSet<u64> = side.files.iter().filter_map(|f| f.slide).collect();
+    if !slides.is_empty() && 2 * slides.len() < side.files.len() {
+        exit::note(&format!(
+            "{}: {} fields of {} slides, which differ by their stain; more slides say more: generate with --set slide.fields=1",
+            folder.display(),
+            side.files.len(),
+            slides.len()
+        ));
+    }
 }
 
 /// The size that all pixels are brought to.

@@ -27,8 +27,11 @@ pub(crate) struct Crop {
     pub(crate) width: usize,
 }
 
+/// A name, the table of it, and the side of its picture.
+type Kind = (&'static str, fn(&Field) -> &Table, usize);
+
 pub(crate) fn crops(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample>]) -> Vec<Crop> {
-    let kinds: [(&'static str, fn(&Field) -> &Table, usize); 2] =
+    let kinds: [Kind; 2] =
         [("nuclei", |f| &f.nuclei, NUCLEUS_PX), ("patches", |f| &f.patches, crate::measure::PATCH_PX)];
     let mut crops = Vec::new();
     for (of, table, side) in kinds {

@@ -56,6 +56,8 @@ pub struct FieldFile {
     pub group: String,
     /// Size of a pixel, µm, where the files say it.
     pub pixel_um: Option<f64>,
+    /// Which slide it is of, where the files say it: fields of one slide are stained alike.
+    pub slide: Option<u64>,
     image: PathBuf,
     nuclei: NucleiFile,
     /// The largest grey level, where the files say it.
@@ -154,7 +156,15 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
             None if points.exists() => NucleiFile::Points(points),
             None => NucleiFile::Unknown,
         };
-        FieldFile { group: groups.remove(&name).unwrap_or_default(), name, pixel_um: None, image, nuclei, white: None }
+        FieldFile {
+            group: groups.remove(&name).unwrap_or_default(),
+            name,
+            pixel_um: None,
+            slide: None,
+            image,
+            nuclei,
+            white: None,
+        }
     };
     Ok(images.into_iter().map(field).collect())
 }
@@ -175,6 +185,7 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
             name: layout::frame_name(index),
             group: String::new(),
             pixel_um: Some(frame.pixel_um),
+            slide: Some(frame.slide),
             image: folder.path(&image),
             nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
             white: Some(white(frame.bits)),
@@ -211,7 +222,10 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
             (Some(y), Some(x)) => points.push([x, y]),
             _ if line == 1 && y == "y" && x == "x" => {}
             _ => {
-                return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") });
+                return Err(Problem::Row {
+                    line,
+                    message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels"),
+                });
             }
         }
     }
@@ -245,6 +259,8 @@ fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -274,5 +290,17 @@ mod tests {
         assert_eq!(separate(map(&[255, 255, 0, 255]), &limits).unwrap(), [1, 1, 0, 2]);
         assert_eq!(separate(map(&[7, 7, 0, 9]), &limits).unwrap(), [7, 7, 0, 9]);
         assert_eq!(separate(map(&[0; 4]), &limits).unwrap(), [0; 4]);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_a_table_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..60), text in "[-0-9.,yx\\n \"]{0,40}") {
+            for bytes in [&bytes[..], text.as_bytes()] {
+                if let Ok(points) = points(bytes) {
+                    prop_assert!(points.iter().flatten().all(|v| v.is_finite()));
+                }
+                let _ = groups(bytes);
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Free cells and their cytoplasm.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 
 use super::maps::Maps;
 use crate::number::{nearest, whole};
@@ -12,7 +13,7 @@ use crate::table::{Family, Row};
 pub(crate) const COVERED: f32 = 0.03;
 
 /// Areas of cells, µm².
-const AREAS_UM2: [f64; 2] = [150.0, 8000.0];
+const AREAS_UM2: RangeInclusive<f64> = 150.0..=8000.0;
 
 /// Less solid things are clumps.
 const SOLID: f64 = 0.75;
@@ -70,7 +71,7 @@ pub(crate) fn cells<'a>(maps: &Maps, nuclei: &'a [Region], pixel_um: f64) -> Vec
     let um2 = pixel_um * pixel_um;
     let free = |region: &Region| -> Option<usize> {
         let area = region.pixels.len() as f64 * um2;
-        if area < AREAS_UM2[0] || area > AREAS_UM2[1] || region.at_border(maps.height) {
+        if !AREAS_UM2.contains(&area) || region.at_border(maps.height) {
             return None;
         }
         let mut ids = region.pixels.iter().map(|p| of[*p as usize]).filter(|id| *id > 0);

@@ -1,5 +1,7 @@
 //! What a patch of a field looks like.
 
+use multiversion::multiversion;
+
 use super::maps::{BANDS, Maps};
 use super::noise::{BLOCK, Noise};
 use crate::filter::{blur, gradient};
@@ -26,7 +28,7 @@ const HESSIANS: [f64; 3] = [1.5, 3.0, 6.0];
 const TENSORS: [[f64; 2]; 2] = [[1.0, 3.0], [2.0, 6.0]];
 
 /// Radius and smoothing of local binary patterns, pixels.
-const PATTERNS: [(i64, f64); 3] = [(1, 0.0), (2, 1.0), (4, 2.0)];
+const PATTERNS: [(usize, f64); 3] = [(1, 0.0), (2, 1.0), (4, 2.0)];
 
 /// Differences of absorbance smaller than this are none, for patterns.
 const TOLERANCE: f32 = 0.004;
@@ -94,7 +96,7 @@ fn features(fine: &Fine, window: Window) -> Row {
     let smooth: Vec<f32> = window.of(&maps.smooth, width, 0).collect();
     let part = |count: usize| count as f64 / a.len() as f64;
 
-    let mut sorted: Vec<f64> = smooth.iter().map(|v| f64::from(*v)).collect();
+    let mut sorted: Vec<f64> = smooth.iter().step_by(THINNED).map(|v| f64::from(*v)).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     for q in QUANTILES {
         row.put(Family::Stain, format!("absorbance, quantile {q}"), of_sorted(&sorted, q));
@@ -172,12 +174,15 @@ fn features(fine: &Fine, window: Window) -> Row {
     row
 }
 
+/// Quantiles are those of every third pixel: neighbours are alike.
+const THINNED: usize = 3;
+
 /// Fewer pixels of objects in a patch tell nothing of their texture.
 const MIN_OBJECT: usize = 400;
 
 fn edges(row: &mut Row, fine: &Fine, window: Window) {
     let maps = fine.maps;
-    let mut slopes: Vec<f64> = window.of(&maps.slope, maps.width, 0).map(f64::from).collect();
+    let mut slopes: Vec<f64> = window.of(&maps.slope, maps.width, 0).step_by(THINNED).map(f64::from).collect();
     slopes.sort_unstable_by(f64::total_cmp);
     for q in [0.5, 0.75, 0.9, 0.97, 0.995] {
         row.put(Family::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
@@ -246,45 +251,118 @@ fn tensor(maps: &Maps, sigma: f64, window: f64) -> [Vec<f32>; 2] {
     out
 }
 
-/// Rotation-invariant uniform local binary patterns of eight neighbours (Ojala et al., doi:10.1109/TPAMI.2002.1017623).
-fn pattern(maps: &Maps, radius: i64, sigma: f64) -> Vec<u8> {
+/// Rotation-invariant uniform local binary patterns of eight neighbours (Ojala et al., doi:10.1109/TPAMI.2002.1017623). At the border
+/// the outermost pixels go on.
+fn pattern(maps: &Maps, radius: usize, sigma: f64) -> Vec<u8> {
     let image = if sigma == 0.0 {
-        maps.absorbance.clone()
+        &maps.absorbance
     } else if sigma == 1.0 {
-        maps.smooth.clone()
+        &maps.smooth
     } else {
-        maps.smoother.clone()
+        &maps.smoother
     };
-    let diagonal = (radius * 7 + 5) / 10;
-    let ring = [
-        [radius, 0],
-        [diagonal, diagonal],
-        [0, radius],
-        [-diagonal, diagonal],
-        [-radius, 0],
-        [-diagonal, -diagonal],
-        [0, -radius],
-        [diagonal, -diagonal],
-    ];
-    let (width, height) = (maps.width as i64, maps.height as i64);
+    let (width, height) = (maps.width, maps.height);
+    let wide = width + 2 * radius;
+    let framed = |y: usize| {
+        let row = &image[y.saturating_sub(radius).min(height - 1) * width..][..width];
+        std::iter::repeat_n(row[0], radius)
+            .chain(row.iter().copied())
+            .chain(std::iter::repeat_n(row[width - 1], radius))
+    };
+    let padded: Vec<f32> = (0..height + 2 * radius).flat_map(framed).collect();
+    // cos 45° = 0.7; offsets from the upper left corner of the frame.
+    let near = (radius * 7 + 5) / 10;
+    let (low, mid, high) = (radius - near, radius, radius + near);
+    let ring =
+        [[2 * radius, mid], [high, high], [mid, 2 * radius], [low, high], [0, mid], [low, low], [mid, 0], [high, low]];
     let classes = classes();
     let mut out = vec![0; image.len()];
-    for y in 0..height {
-        for x in 0..width {
-            let at = |x: i64, y: i64| {
-                image[usize::try_from(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)).unwrap_or(0)]
-            };
-            let own = at(x, y) + TOLERANCE;
-            let bits =
-                ring.iter().enumerate().map(|(i, [dx, dy])| usize::from(at(x + dx, y + dy) > own) << i).sum::<usize>();
-            out[usize::try_from(y * width + x).unwrap_or(0)] = classes[bits];
+    for (y, to) in out.chunks_exact_mut(width).enumerate() {
+        let own = &image[y * width..][..width];
+        for (bit, [x0, y0]) in ring.into_iter().enumerate() {
+            compare(own, &padded[(y + y0) * wide + x0..][..width], 1 << bit, to);
         }
+        to.iter_mut().for_each(|bits| *bits = classes[usize::from(*bits)]);
     }
     out
+}
+
+/// Sets a bit where a neighbour is darker.
+#[multiversion(targets = "simd")]
+fn compare(own: &[f32], neighbour: &[f32], bit: u8, to: &mut [u8]) {
+    for ((bits, own), neighbour) in to.iter_mut().zip(own).zip(neighbour) {
+        *bits |= if *neighbour > own + TOLERANCE { bit } else { 0 };
+    }
 }
 
 /// The class of each pattern of eight bits.
 fn classes() -> Vec<u8> {
     let class = |bits: u8| if (bits ^ bits.rotate_left(1)).count_ones() <= 2 { bits.count_ones() } else { 9 };
     (0..=u8::MAX).map(|bits| u8::try_from(class(bits)).unwrap_or(9)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Known, Picture};
+
+    fn maps(width: usize, height: usize, light: impl Fn(usize, usize) -> f64) -> Maps {
+        let grey = (0..width * height).map(|i| crate::number::single(light(i % width, i / width))).collect();
+        Maps::new(&Picture {
+            name: String::new(),
+            group: String::new(),
+            grey,
+            width,
+            full_scale: 255.0,
+            nuclei: Known::Nothing,
+        })
+    }
+
+    #[test]
+    fn patterns_are_those_counted_pixel_by_pixel() {
+        let maps = maps(41, 37, |x, y| 120.0 + ((x * x * 7 + y * 13 + x * y) % 23) as f64);
+        for (radius, sigma) in PATTERNS {
+            let image = if sigma == 0.0 {
+                &maps.absorbance
+            } else if sigma == 1.0 {
+                &maps.smooth
+            } else {
+                &maps.smoother
+            };
+            let near = (radius * 7 + 5) / 10;
+            let r = i64::try_from(radius).unwrap();
+            let n = i64::try_from(near).unwrap();
+            let ring = [[r, 0], [n, n], [0, r], [-n, n], [-r, 0], [-n, -n], [0, -r], [n, -n]];
+            for (i, class) in pattern(&maps, radius, sigma).iter().enumerate() {
+                let (x, y) = ((i % 41) as i64, (i / 41) as i64);
+                let at = |x: i64, y: i64| image[usize::try_from(y.clamp(0, 36) * 41 + x.clamp(0, 40)).unwrap()];
+                let darker: Vec<bool> = ring.iter().map(|[dx, dy]| at(x + dx, y + dy) > at(x, y) + TOLERANCE).collect();
+                let changes = (0..8).filter(|k| darker[*k] != darker[(k + 1) % 8]).count();
+                let slow = if changes <= 2 { darker.iter().filter(|d| **d).count() } else { 9 };
+                assert_eq!(usize::from(*class), slow, "radius {radius}, pixel {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn stripes_are_coherent_and_dark_lines_are_ridges() {
+        let lines = |x: usize, y: usize| if (x + 2 * y) % 24 < 3 { 150.0 } else { 170.0 };
+        let spots = |x: usize, y: usize| if x % 16 < 4 && y % 16 < 4 { 150.0 } else { 170.0 };
+        // A bright margin is the empty slide.
+        let field =
+            |of: fn(usize, usize) -> f64| patches(&maps(200, 200, move |x, y| if x < 40 { 240.0 } else { of(x, y) }));
+        let (lines, spots) = (field(lines), field(spots));
+        assert_eq!((lines.len(), spots.len()), (1, 1));
+        let value = |table: &Table, name: &str| table.column(name).next().unwrap();
+        assert!(value(&lines, "coherence at 1 px") > 0.8 && value(&spots, "coherence at 1 px") < 0.6);
+        assert!(value(&lines, "blobs over ridges at 3 px") < value(&spots, "blobs over ridges at 3 px"));
+    }
+
+    #[test]
+    fn a_field_is_cut_into_patches_from_its_corner() {
+        let table = patches(&maps(430, 250, |x, y| 200.0 + (x % 7) as f64 + (y % 5) as f64));
+        assert_eq!(table.places, [[100.0, 100.0], [300.0, 100.0]]);
+        let names: std::collections::BTreeSet<&str> = table.features.iter().map(|f| f.name.as_str()).collect();
+        assert_eq!(names.len(), table.features.len());
+    }
 }
