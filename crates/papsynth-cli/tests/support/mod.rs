@@ -9,7 +9,7 @@ use std::time::SystemTime;
 
 /// A field that is made in a moment.
 pub(crate) const TINY: &str = "--set field.width_px=96 --set field.height_px=80 --set layout.kind=uniform \
-    --set cells.intermediate.count=2 --set cells.superficial.count=0 --set debris.leukocytes.clusters=1 \
+    --set cells.intermediate.count=2 --set cells.superficial.count=0 --set cells.parabasal.count=0 --set cells.metaplastic.count=0 --set debris.leukocytes.clusters=1 \
     --set debris.bacilli.clusters=1 --set debris.speckles.count=3 --set debris.out_of_focus.count=0";
 
 /// A folder that is removed afterwards.
