@@ -145,21 +145,22 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
     put(page, format_args!("{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r)));
     page.push_str(
         "<table><tr><th>feature</th><th>importance</th><th>AUC alone</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
-         <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th></tr>",
+         <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th>\
+         <th class=\"real\">sd between fields</th><th class=\"synthetic\">sd between fields</th></tr>",
     );
     for g in r.giveaways.iter().take(LISTED) {
         put(
             page,
             format_args!("<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone),
         );
-        for v in g.real.iter().chain(&g.synthetic) {
+        for v in g.real.iter().chain(&g.synthetic).chain(&g.between_fields) {
             put(page, format_args!("<td>{}</td>", short(*v)));
         }
         page.push_str("</tr>");
     }
     page.push_str(
         "</table><p class=\"note\">Importance: how much nearer the mean scores of both sides come, as a part of their distance, when the feature is \
-         shuffled among rows that the classifier has not seen. Of features that tell the same, each alone matters little. AUC alone is above ½ if the feature is larger in synthetic fields.</p>",
+         shuffled among rows that the classifier has not seen. Of features that tell the same, each alone matters little. AUC alone is above ½ if the feature is larger in synthetic fields. Between fields: of their medians.</p>",
     );
     for (synthetic, looks_real, title) in [
         (true, true, "Synthetic, most convincing"),

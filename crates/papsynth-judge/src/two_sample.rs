@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::forest::{Forest, Rows};
 use crate::number::single;
-use crate::statistics::{auc, below, mean, median, of_sorted, shuffle, weighted_auc};
+use crate::statistics::{auc, below, deviation, mean, median, of_sorted, shuffle, weighted_auc};
 use crate::table::{Family, Feature, Table};
 
 /// How the classifier is tried.
@@ -90,6 +90,8 @@ pub struct Giveaway {
     pub real: [f64; 3],
     /// And of the synthetic ones.
     pub synthetic: [f64; 3],
+    /// Standard deviation of the fields' medians, of the real side and of the synthetic one: how much fields differ from each other.
+    pub between_fields: [f64; 2],
 }
 
 /// Rows of both sides, each with its field.
@@ -325,6 +327,14 @@ fn giveaways<'a>(
         values.sort_unstable_by(f64::total_cmp);
         ([0.1, 0.5, 0.9].map(|q| of_sorted(&values, q)), values)
     };
+    let between = |column: usize, side: bool| {
+        let mut fields = vec![Vec::new(); sample.sides.len()];
+        for (value, field) in rows.columns[column].iter().zip(&sample.fields) {
+            fields[*field].push(f64::from(*value));
+        }
+        let of_side = fields.iter_mut().zip(&sample.sides).filter(|(values, s)| **s == side && !values.is_empty());
+        deviation(&of_side.map(|(values, _)| median(values)).collect::<Vec<_>>())
+    };
     let mut list: Vec<Giveaway> = order
         .iter()
         .zip(importances)
@@ -332,7 +342,15 @@ fn giveaways<'a>(
             let (real, low) = spread(column, false);
             let (synthetic, high) = spread(column, true);
             let Feature { name, family } = &features[column];
-            Giveaway { feature: name.clone(), family: *family, importance, alone: auc(&low, &high), real, synthetic }
+            Giveaway {
+                feature: name.clone(),
+                family: *family,
+                importance,
+                alone: auc(&low, &high),
+                real,
+                synthetic,
+                between_fields: [between(column, false), between(column, true)],
+            }
         })
         .collect();
     list.sort_by(|a, b| {
@@ -388,6 +406,8 @@ mod tests {
         assert_eq!(first.feature, "column 3");
         assert!(first.importance > 0.5 && first.alone > 0.8 && first.synthetic[1] > first.real[1] + 0.3, "{first:?}");
         assert!(result.giveaways[1].importance < 0.1);
+        // Fields differ by 0.2 of a uniform number, whose deviation is 1/√12, and by the error of a median of 20.
+        assert!(first.between_fields.iter().all(|sd| (0.03..0.2).contains(sd)), "{first:?}");
         assert_eq!(result.families.len(), 1);
         assert!((result.families[0].auc - result.auc).abs() < 1e-12);
     }
