@@ -63,6 +63,9 @@ pub struct Beside {
     pub curves: Vec<Curve>,
 }
 
+/// Smaller parts of a field are drawn as this.
+const RAREST: f64 = 1e-5;
+
 pub(crate) fn beside(real: &[Field], synthetic: &[Field]) -> Beside {
     let names = real[0].statistics.scalars();
     let scalar = |(i, (name, _)): (usize, &(&str, f64))| {
@@ -74,7 +77,7 @@ pub(crate) fn beside(real: &[Field], synthetic: &[Field]) -> Beside {
         };
         Scalar { name: (*name).to_owned(), real, synthetic, within }
     };
-    let curve = |name: &str, along: &str, at: Vec<f64>, of: &dyn Fn(&Statistics) -> &[f64]| {
+    let curve = |name: &str, along: &str, at: Vec<f64>, of: &dyn Fn(&Statistics) -> Vec<f64>| {
         let spreads =
             |fields: &[Field]| (0..at.len()).map(|i| Spread::of(fields.iter().map(|f| of(&f.statistics)[i]))).collect();
         Curve { name: name.to_owned(), along: along.to_owned(), real: spreads(real), synthetic: spreads(synthetic), at }
@@ -85,9 +88,13 @@ pub(crate) fn beside(real: &[Field], synthetic: &[Field]) -> Beside {
     Beside {
         scalars: names.iter().enumerate().map(scalar).collect(),
         curves: vec![
-            curve("part of the field", "absorbance", bins, &|s| &s.histogram),
-            curve("log10 of the power of absorbance", "log10 of cycles a pixel", rings, &|s| &s.spectrum),
-            curve("absorbance of free cells over their median", "bin from rim to centre", profile, &|s| &s.profile),
+            curve("log10 of the part of the field", "absorbance", bins, &|s| {
+                s.histogram.iter().map(|p| libm::log10(p.max(RAREST))).collect()
+            }),
+            curve("log10 of the power of absorbance", "log10 of cycles a pixel", rings, &|s| s.spectrum.to_vec()),
+            curve("absorbance of free cells over their median", "bin from rim to centre", profile, &|s| {
+                s.profile.to_vec()
+            }),
         ],
     }
 }

@@ -249,11 +249,9 @@ fn moments(page: &mut String, test: &Test<Moments>) {
     }
     page.push_str("</table><div class=\"plots\">");
     for d in &test.result.descriptors {
-        let x = d.quantiles.iter().map(|q| q[1]);
-        let y = d.quantiles.iter().map(|q| q[0]);
         let all: Vec<f64> = d.quantiles.iter().flatten().copied().collect();
         let (low, high) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-        let mut plot = Plot::new(&d.name, "synthetic", "real", x, y);
+        let mut plot = Plot::new(&d.name, "synthetic", "real", all.iter().copied(), all.iter().copied());
         plot.dashes([low, low], [high, high]);
         plot.dots(d.quantiles.iter().map(|q| [q[1], q[0]]), COLOURS[1]);
         page.push_str(&plot.finish());
