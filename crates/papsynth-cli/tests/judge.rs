@@ -44,13 +44,21 @@ fn copies(bench: &Bench, from: &str, to: &str, of: impl Fn(&[u8], usize, usize) 
 #[test]
 fn fields_of_another_seed_pass_and_other_fields_do_not() {
     let bench = Bench::new("judge-kinds");
-    generate(&bench, "a", &format!("--seed 1 {CELLS}"));
-    generate(&bench, "b", &format!("--seed 2 {CELLS}"));
-    let outcome = bench.good("judge a b --out same --quick");
-    assert!(outcome.out.contains("8 real fields and 8 synthetic ones: not told apart"), "{}", outcome.out);
-    assert!(outcome.out.ends_with("same: report.html, report.json\n"), "{}", outcome.out);
+    for (name, seed) in [("a", 1), ("b", 2), ("c", 3), ("d", 4)] {
+        generate(&bench, name, &format!("--seed {seed} {CELLS}"));
+    }
+    // Each test errs once in twenty: of these six or so, two would once in thirty.
+    let mut wrong = 0;
+    for pair in ["a b", "c d"] {
+        let outcome = bench.good(&format!("judge {pair} --out same --quick"));
+        let tests = outcome.out.lines().filter(|line| !line.contains(" synthetic ones: "));
+        wrong += tests.filter(|line| line.ends_with(": told apart")).count();
+        assert!(outcome.out.contains("8 real fields and 8 synthetic ones: "), "{}", outcome.out);
+        assert!(outcome.out.ends_with("same: report.html, report.json\n"), "{}", outcome.out);
+        assert!(wrong <= 1, "{}", outcome.out);
+    }
     let report = json(&bench, "same/report.json");
-    assert_eq!((report["judge_report"].as_u64(), report["verdict"].as_str()), (Some(1), Some("not-told-apart")));
+    assert_eq!(report["judge_report"], 1);
     assert_eq!(report["gauge"]["nuclei_from"], "masks");
     assert_eq!(report["gauge"]["pixel_um"], 0.33);
     let names: Vec<&str> =

@@ -87,7 +87,7 @@ pub struct Report {
     pub fields: [Vec<String>; 2],
     /// What should be known when the numbers are read.
     pub notes: Vec<String>,
-    /// Told apart if any test tells the sides apart.
+    /// Told apart if any test tells the sides apart. Each errs about once in twenty, so that this does about once in eight.
     pub verdict: Verdict,
     /// The classifier on nuclei, cells and patches, then on nuclei of each group that both sides have.
     pub two_sample: Vec<Test<TwoSample>>,
