@@ -6,7 +6,7 @@ use super::tile::{Point, Tile, area};
 use super::wobble::{placed, wobbled_circle};
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::{CellBody, Object, Scene};
+use crate::scene::{CellBody, NucleusBody, Object, Scene};
 use crate::truth::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
@@ -73,7 +73,7 @@ pub(super) fn make(
         // A donor has its own.
         thickness.values.fill(1.0);
     } else {
-        dome(&mut thickness, &outline, nucleus.dome);
+        dome(&mut thickness, &outline, nucleus);
     }
     let mut absorbance = coverage.clone();
     for (i, value) in absorbance.values.iter_mut().enumerate() {
@@ -96,8 +96,9 @@ pub(super) fn make(
     })
 }
 
-/// Thickness of a nucleus relative to its mean, a plate of even thickness and an ellipsoid mixed: `share` is the latter's.
-fn dome(thickness: &mut Tile, outline: &[Point], share: f64) {
+/// Thickness of a nucleus relative to its mean: a plate of even thickness and an ellipsoid mixed, thicker towards one side.
+fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
+    let share = nucleus.dome;
     /// Mean over a disc of the chord √(1 − ρ²) through a ball.
     const MEAN_CHORD: f64 = 2.0 / 3.0;
     // The ellipse of the outline's second moments: those of a curve's points about a circle of radius r are r²/2.
@@ -111,7 +112,8 @@ fn dome(thickness: &mut Tile, outline: &[Point], share: f64) {
         let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
         let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
         let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
-        *value = (1.0 - share + share * chord) as f32;
+        let slant = (dx * nucleus.wedge[0] + dy * nucleus.wedge[1]) / determinant.sqrt().sqrt();
+        *value = ((1.0 - share + share * chord) * (1.0 + slant).max(0.0)) as f32;
     });
 }
 

@@ -474,8 +474,8 @@ impl Default for Camera {
         Self {
             pixel_um: 6.45.into(),
             bits: 8.0.into(),
-            full_well_e: 17_600.0.into(),
-            read_noise_e: 8.0.into(),
+            full_well_e: 32_600.0.into(),
+            read_noise_e: 138.0.into(),
             read_noise_rms_e: 0.0.into(),
             offset_dn: 0.0.into(),
             photon_noise: PhotonNoise::Exact,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::specimen::defaults;
 use super::{
     Acceptance, Bacilli, Background, Camera, CameraPreset, CellMix, Chromatin, Cytoplasm, Debris, DyeAmounts, Field,
-    Focus, Folds, Illumination, Layout, Leukocytes, Light, Nucleus, NucleusForm, Number, Optics, OutOfFocus,
+    Focus, Folds, Group, GroupForm, Illumination, Layout, Leukocytes, Light, Nucleus, NucleusForm, Number, Optics, OutOfFocus, Picture,
     RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, SpeckForm, Speckles, Stain, TintMix,
 };
 
@@ -24,11 +24,36 @@ pub enum Preset {
     HighGrade,
     /// Many leukocytes and bacteria.
     Inflamed,
+    /// Cells of a low-grade lesion (LSIL), many with a cleared space round the nucleus.
+    Lsil,
+    /// Squamous carcinoma.
+    Carcinoma,
+    /// A smear of atrophy: parabasal and basal cells.
+    Atrophic,
+    /// Palisades and honeycombs of endocervical cells, metaplastic cells.
+    Endocervical,
+    /// Squames of the oral mucosa: another smear, of classes of its own.
+    Oral,
+    /// The default slide as a scanner shows it that fuses planes to pictures of extended focus.
+    ExtendedFocus,
 }
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 6] = [Self::Lbc, Self::Paper2015, Self::Sparse, Self::Dense, Self::HighGrade, Self::Inflamed];
+    pub const ALL: [Self; 12] = [
+        Self::Lbc,
+        Self::Paper2015,
+        Self::Sparse,
+        Self::Dense,
+        Self::Lsil,
+        Self::HighGrade,
+        Self::Carcinoma,
+        Self::Inflamed,
+        Self::Atrophic,
+        Self::Endocervical,
+        Self::Oral,
+        Self::ExtendedFocus,
+    ];
 
     /// The name of the preset, as the command line knows it.
     #[must_use]
@@ -40,6 +65,12 @@ impl Preset {
             Self::Dense => "dense",
             Self::HighGrade => "high-grade",
             Self::Inflamed => "inflamed",
+            Self::Lsil => "lsil",
+            Self::Carcinoma => "carcinoma",
+            Self::Atrophic => "atrophic",
+            Self::Endocervical => "endocervical",
+            Self::Oral => "oral",
+            Self::ExtendedFocus => "extended-focus",
         }
     }
 
@@ -53,6 +84,12 @@ impl Preset {
             Self::Dense => "covered with cells, several layers deep",
             Self::HighGrade => "cells of a high-grade lesion among normal ones",
             Self::Inflamed => "many leukocytes and bacteria",
+            Self::Lsil => "cells of a low-grade lesion, koilocytes among them",
+            Self::Carcinoma => "squamous carcinoma: cells of every form, leukocytes, debris",
+            Self::Atrophic => "atrophy: parabasal and basal cells",
+            Self::Endocervical => "palisades and honeycombs of endocervical cells, metaplastic cells",
+            Self::Oral => "the oral mucosa: another smear, of a class file and a few lines",
+            Self::ExtendedFocus => "the default slide as a scanner shows it, planes fused to extended focus, .33 um a pixel",
         }
     }
 
@@ -72,8 +109,89 @@ impl Preset {
             Self::Dense => dense(),
             Self::HighGrade => high_grade(),
             Self::Inflamed => inflamed(),
+            Self::Lsil => lsil(),
+            Self::Carcinoma => carcinoma(),
+            Self::Atrophic => atrophic(),
+            Self::Endocervical => endocervical(),
+            Self::Oral => oral(),
+            Self::ExtendedFocus => extended_focus(),
         }
     }
+}
+
+/// Numbers of cells of a class that lie in groups of a form; the groups' sizes are drawn up to the largest.
+fn grouped(recipe: &mut Recipe, class: &str, count: Number, form: GroupForm, size: Number, distance: Number) {
+    let group = Group { form, size, distance };
+    recipe.cells.insert(class.to_owned(), CellMix { count, group, ..CellMix::default() });
+}
+
+fn lsil() -> Recipe {
+    let mut recipe = lbc();
+    recipe.cells.extend(mix([
+        ("intermediate", Number::uniform(6.0, 16.0)),
+        ("superficial", Number::uniform(2.0, 8.0)),
+        ("lsil", Number::uniform(3.0, 10.0)),
+    ]));
+    recipe
+}
+
+fn carcinoma() -> Recipe {
+    let mut recipe = inflamed();
+    recipe.cells = mix([("intermediate", Number::uniform(2.0, 10.0)), ("severe", Number::uniform(3.0, 12.0))]);
+    let (size, distance) = (Number::uniform(2.0, 12.0), Number::uniform(0.6, 0.9));
+    grouped(&mut recipe, "carcinoma", Number::uniform(8.0, 30.0), GroupForm::Heap, size, distance);
+    recipe
+}
+
+fn atrophic() -> Recipe {
+    let mut recipe = lbc();
+    recipe.cells = mix([("intermediate", Number::uniform(0.0, 6.0)), ("basal", Number::uniform(3.0, 12.0))]);
+    let (size, distance) = (Number::uniform(1.0, 14.0), Number::uniform(0.7, 1.0));
+    grouped(&mut recipe, "parabasal", Number::uniform(18.0, 50.0), GroupForm::Heap, size, distance);
+    recipe
+}
+
+fn endocervical() -> Recipe {
+    let mut recipe = lbc();
+    recipe.cells = mix([("intermediate", Number::uniform(3.0, 12.0)), ("superficial", Number::uniform(0.0, 5.0))]);
+    let (size, distance) = (Number::uniform(5.0, 16.0), Number::uniform(0.40, 0.52));
+    grouped(&mut recipe, "endocervical", Number::uniform(14.0, 40.0), GroupForm::Palisade, size, distance);
+    let (size, distance) = (Number::uniform(12.0, 40.0), Number::uniform(0.75, 0.9));
+    grouped(&mut recipe, "endocervical-en-face", Number::uniform(0.0, 40.0), GroupForm::Honeycomb, size, distance);
+    let (size, distance) = (Number::uniform(1.0, 7.0), Number::uniform(0.75, 0.95));
+    grouped(&mut recipe, "metaplastic", Number::uniform(3.0, 12.0), GroupForm::Heap, size, distance);
+    recipe
+}
+
+fn oral() -> Recipe {
+    let mut recipe = lbc();
+    recipe.cells = mix([
+        ("oral-intermediate", Number::uniform(6.0, 14.0)),
+        ("oral-superficial", Number::uniform(3.0, 10.0)),
+        ("oral-parabasal", Number::uniform(0.0, 2.0)),
+    ]);
+    recipe
+}
+
+/// Numbers of pictures of extended focus: three sets of them, of two scanners.
+fn extended_focus() -> Recipe {
+    let mut recipe = lbc();
+    recipe.field = Field { width_px: 1280.0.into(), height_px: 960.0.into(), pixel_um: 0.33.into(), ..recipe.field };
+    recipe.focus = Focus {
+        planes: 11.0.into(),
+        step_um: 1.0.into(),
+        picture: Picture::Extended,
+        fused_noise_across: Number::uniform(0.20, 0.30),
+        fused_noise_down: Number::uniform(0.36, 0.46),
+        ..recipe.focus
+    };
+    if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
+        *extra_blur_um = Number::uniform(0.30, 0.52);
+    }
+    recipe.camera.full_well_e = 60_000.0.into();
+    recipe.camera.read_noise_e = Number::uniform(180.0, 480.0);
+    recipe.stain.field_texture = Number::log_normal(0.34, 0.3);
+    recipe
 }
 
 fn mix<const N: usize>(counts: [(&str, Number); N]) -> BTreeMap<String, CellMix> {
@@ -95,7 +213,12 @@ fn lbc() -> Recipe {
             radius_um: defaults::radius_um(),
             outside: defaults::outside(),
         },
-        cells: mix([("intermediate", Number::uniform(10.0, 26.0)), ("superficial", Number::uniform(2.0, 10.0))]),
+        cells: mix([
+            ("intermediate", Number::uniform(8.0, 24.0)),
+            ("superficial", Number::uniform(2.0, 10.0)),
+            ("parabasal", Number::uniform(0.0, 1.5)),
+            ("metaplastic", Number::uniform(0.0, 1.5)),
+        ]),
         cytoplasm: Cytoplasm::default(),
         nucleus: Nucleus::default(),
         stain: Stain::default(),
@@ -200,6 +323,7 @@ fn paper() -> Recipe {
         wrinkled: 0.0.into(),
         rim: 0.0.into(),
         dome: 0.0.into(),
+        wedge: 0.0.into(),
         ..Nucleus::default()
     };
     // The paper's stain is a grey value.

@@ -406,6 +406,9 @@ pub struct Nucleus {
     pub rim: Number,
     /// Share of a nucleus's thickness that is domed, 0 (a plate) to 1 (an ellipsoid).
     pub dome: Number,
+    /// How much thicker a nucleus is towards one side (standard deviation of the slope, relative to its thickness and
+    /// radius), 0 to 1.
+    pub wedge: Number,
 }
 
 impl Default for Nucleus {
@@ -424,7 +427,8 @@ impl Default for Nucleus {
             pyknotic: 0.05.into(),
             wrinkled: 0.15.into(),
             rim: Number::uniform(0.0, 0.2),
-            dome: Number::uniform(0.2, 0.9),
+            dome: Number::uniform(0.3, 0.85),
+            wedge: 0.12.into(),
         }
     }
 }
@@ -470,7 +474,7 @@ impl Default for Stain {
             slide_nucleus: Number::log_normal(1.0, 0.08),
             field_cytoplasm: Number::log_normal(1.0, 0.2),
             field_nucleus: Number::log_normal(1.0, 0.09),
-            field_texture: Number::log_normal(0.8, 0.28),
+            field_texture: Number::log_normal(0.6, 0.28),
             slide_balance: 0.15.into(),
             field_balance: 0.05.into(),
             cell_balance: 0.12.into(),

@@ -136,6 +136,11 @@ fn draw_body(
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
         dome: recipe.nucleus.dome.draw(&mut own("nucleus.dome")),
+        wedge: {
+            let mut rng = own("nucleus.wedge");
+            let wedge = recipe.nucleus.wedge.draw(&mut rng);
+            [0, 1].map(|_| wedge * random::normal(&mut rng))
+        },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
         // About as many as there are on average, one more or less.

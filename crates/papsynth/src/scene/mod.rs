@@ -481,6 +481,8 @@ pub struct NucleusBody {
     pub rim: f64,
     /// Share of its thickness that is domed: 0 of a plate, 1 of an ellipsoid.
     pub dome: f64,
+    /// How much thicker it is at its rim than in its middle, to the right and below.
+    pub wedge: [f64; 2],
     /// Small, dark, without structure.
     pub pyknotic: bool,
     /// Strength of wrinkles, 0 if it has none.

@@ -183,6 +183,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
             ("rim", &nucleus.rim, 0.0, 2.0),
             ("dome", &nucleus.dome, 0.0, 1.0),
+            ("wedge", &nucleus.wedge, 0.0, 1.0),
         ],
     );
     check.whole("nucleus", &[("donors", &nucleus.donors)]);
