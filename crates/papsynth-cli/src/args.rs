@@ -8,6 +8,7 @@ use clap::{ArgGroup, Args, Parser, Subcommand};
 use optics_psf::MicroscopeParams;
 use optics_psf::calibrate::Window;
 use papsynth::recipe::{CameraPreset, Preset};
+use papsynth_judge::NucleiFrom;
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
 #[derive(Debug, Parser)]
@@ -39,6 +40,7 @@ pub(crate) enum Verb {
     Preview(Preview),
     Learn(Learn),
     Calibrate(Calibrate),
+    Judge(Judge),
     Inspect(Inspect),
     Schema(SchemaArgs),
     Completions(Completions),
@@ -102,10 +104,15 @@ pub(crate) struct EngineArgs {
 impl EngineArgs {
     /// Threads to work with.
     pub(crate) fn threads(&self) -> usize {
-        match self.threads {
-            Some(threads) => usize::from(threads),
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-        }
+        threads(self.threads)
+    }
+}
+
+/// As many threads as asked for, or one a core.
+pub(crate) fn threads(asked: Option<u16>) -> usize {
+    match asked {
+        Some(threads) => usize::from(threads),
+        None => std::thread::available_parallelism().map_or(1, usize::from),
     }
 }
 
@@ -298,6 +305,59 @@ pub(crate) struct Calibrate {
     pub(crate) out: PathBuf,
 }
 
+/// Tell synthetic fields from real ones, and say what gives them away.
+///
+/// A classifier learns to tell nuclei, free cells and patches of both sides apart, and is tried on fields that it has not
+/// seen; the same between halves of the real fields shows what chance does. Beside it stand the paper's Q-Q slopes of nuclear texture
+/// and statistics of whole fields. Writes report.html, a page that needs nothing else, and report.json with the same numbers.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth judge slides fields --pixel-um 0.33 --out report
+  papsynth judge slides fields --pixel-um 0.33 --group N --out report      negative fields alone
+  papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
+
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images
+(16 bits are fine, of colours green is looked at), where what is known may lie beside them:
+  NAME.csv     points in the nuclei of NAME.png, one `y,x` a line
+  masks/       masks or label images of nuclei, of the same names
+  frames.csv   the group of each image: `frame,grade`
+Nuclei are taken from masks if all fields of both sides have them, else around points if all have
+those or masks, else they are found: always in the same way on both sides. If pixels differ in size,
+the finer side is averaged to the coarser. The page shows pieces of the images.")]
+pub(crate) struct Judge {
+    /// Folder of real fields; two or more
+    #[arg(value_name = "REAL")]
+    pub(crate) real: PathBuf,
+    /// Folder of synthetic fields; two or more
+    #[arg(value_name = "SYNTHETIC")]
+    pub(crate) synthetic: PathBuf,
+    /// Folder to write to; an older report in it is replaced, no other file
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Size of a pixel of the real fields, in micrometres [default: as recorded, else that of the other side]
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
+    pub(crate) pixel_um: Option<f64>,
+    /// Size of a pixel of the synthetic fields, in micrometres [default: as recorded, else that of the other side]
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
+    pub(crate) synthetic_pixel_um: Option<f64>,
+    /// Look at fields of this group alone, on each side that has it; repeatable
+    #[arg(long, value_name = "NAME")]
+    pub(crate) group: Vec<String>,
+    /// Where nuclei are known from [default: masks if all fields have them, else points, else search]
+    #[arg(long, value_name = "HOW", value_parser = nuclei_parser())]
+    pub(crate) nuclei: Option<NucleiFrom>,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Fewer trees, halvings and draws: for a first look
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Threads to work with; the numbers are the same with any [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+}
+
 /// Show what is in a data set.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -345,6 +405,13 @@ fn camera_parser() -> impl TypedValueParser<Value = CameraPreset> {
     let names = CameraPreset::ALL.map(|preset| PossibleValue::new(preset.name()).help(preset.summary()));
     PossibleValuesParser::new(names)
         .try_map(|name| CameraPreset::by_name(&name).ok_or_else(|| format!("there is no camera `{name}`")))
+}
+
+fn nuclei_parser() -> impl TypedValueParser<Value = NucleiFrom> {
+    let names = NucleiFrom::ALL.map(|from| PossibleValue::new(from.name()));
+    PossibleValuesParser::new(names).try_map(|name| {
+        NucleiFrom::ALL.into_iter().find(|from| from.name() == name).ok_or_else(|| format!("there is no way `{name}`"))
+    })
 }
 
 fn parse_range(text: &str) -> Result<Range<u64>, String> {

@@ -8,6 +8,7 @@ mod generate;
 mod init;
 mod inspect;
 mod interrupt;
+mod judge;
 mod learn;
 mod nearest;
 mod preview;
@@ -57,6 +58,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Preview(args) => preview::run(&args),
         Verb::Learn(args) => learn::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
+        Verb::Judge(args) => judge::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();

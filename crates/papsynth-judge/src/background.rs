@@ -174,3 +174,47 @@ fn solve(mut rows: [[f64; TERMS + 1]; TERMS]) -> [f64; TERMS] {
     }
     rows.map(|row| row[TERMS])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_surface_and_the_absorbance_of_what_lies_on_it_are_found() {
+        let (width, height) = (400, 300);
+        let terms = [0.9, 0.004, -0.006, -0.03, 0.002, -0.012];
+        let lamp = Surface(terms);
+        let at = |i: usize| [2.0 * (i % width) as f64 / width as f64 - 1.0, 2.0 * (i / width) as f64 / height as f64 - 1.0];
+        // Half of the field is covered, in two layers.
+        let a = |i: usize| if i % width < 120 { 0.05 } else if i % width < 200 && i / width > 60 { 0.3 } else { 0.0 };
+        let noise = |i: usize| ((i * 7919) % 101) as f64 / 100.0 - 0.5;
+        let grey: Vec<f32> = (0..width * height).map(|i| single((255.0 * lamp.at(at(i)) * libm::pow(10.0, -a(i)) + noise(i)).round())).collect();
+        let found = Background::new(&grey, width, 255.0);
+        for (found, wanted) in found.surface.0.iter().zip(terms) {
+            assert!((found - wanted).abs() < 0.002, "{found}, not {wanted}");
+        }
+        assert!((found.mean() - (0.9 - 0.042 / 3.0)).abs() < 0.002);
+        let absorbance = found.absorbance(&grey, 255.0);
+        for i in [50 * width + 60, 200 * width + 160, 20 * width + 300] {
+            assert!((f64::from(absorbance[i]) - a(i)).abs() < 0.008, "{} {}", absorbance[i], a(i));
+        }
+    }
+
+    #[test]
+    fn six_points_determine_a_surface() {
+        let wanted = Surface([1.0, 2.0, -3.0, 0.5, -0.25, 4.0]);
+        let places = [[-1.0, -1.0], [1.0, -0.5], [0.3, 0.9], [-0.7, 0.4], [0.1, -0.2], [0.8, 0.6]];
+        let found = Surface::fit(&places.map(|p| (p, wanted.at(p))), 0.0);
+        for (a, b) in found.0.iter().zip(wanted.0) {
+            assert!((a - b).abs() < 1e-9, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_picture_without_empty_slide_still_has_a_background() {
+        let grey: Vec<f32> = (0..64 * 64).map(|i| f32::from(u8::try_from((i * 37) % 256).unwrap_or(0))).collect();
+        let found = Background::new(&grey, 64, 255.0);
+        assert!(found.surface.0.iter().all(|t| t.is_finite()) && found.mean() > 0.3);
+        assert!(found.absorbance(&grey, 255.0).iter().all(|a| a.is_finite()));
+    }
+}

@@ -113,3 +113,53 @@ pub(crate) fn halved(image: &[f32], width: usize) -> (Vec<f32>, usize) {
     let rows = smooth.chunks_exact(width).step_by(2);
     (rows.flat_map(|row| row.iter().step_by(2).copied()).collect(), width.div_ceil(2))
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn noise(count: usize, seed: u64) -> Vec<f32> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        (0..count).map(|_| f32::from(u16::try_from(rng.next_u64() >> 48).unwrap()) / 65_535.0).collect()
+    }
+
+    #[test]
+    fn a_blur_is_the_sum_over_its_taps_with_a_mirror_at_the_border() {
+        let (width, height) = (9, 7);
+        let image = noise(width * height, 2);
+        for sigma in [0.5, 1.3, 6.0] {
+            let taps = taps(sigma);
+            let fast = blur(&image, width, sigma);
+            let reach = i64::try_from(taps.len()).unwrap() - 1;
+            let mirror = |i: i64, n: i64| {
+                let i = i.rem_euclid(2 * n);
+                usize::try_from(if i < n { i } else { 2 * n - 1 - i }).unwrap()
+            };
+            for (i, value) in fast.iter().enumerate() {
+                let (x, y) = ((i % width) as i64, (i / width) as i64);
+                let mut sum = 0.0;
+                for dy in -reach..=reach {
+                    for dx in -reach..=reach {
+                        let weight = |d: i64| f64::from(taps[usize::try_from(d.abs()).unwrap()]);
+                        sum += weight(dx) * weight(dy) * f64::from(image[mirror(y + dy, 7) * width + mirror(x + dx, 9)]);
+                    }
+                }
+                assert!((f64::from(*value) - sum).abs() < 1e-5, "sigma {sigma}, pixel {i}: {value}, not {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_constant_survives_and_a_ramp_has_its_slope() {
+        assert!(blur(&[0.7; 64], 8, 2.0).iter().all(|v| (v - 0.7).abs() < 1e-6));
+        let ramp: Vec<f32> = (0..64_u8).map(|i| 3.0 * f32::from(i % 8) - 2.0 * f32::from(i / 8)).collect();
+        let [across, down] = gradient(&ramp, 8);
+        assert_eq!((across[27], down[27]), (3.0, -2.0));
+        assert!((slope(&ramp, 8)[27] - 13.0_f32.sqrt()).abs() < 1e-6);
+        let (half, width) = halved(&[0.25; 15 * 9], 15);
+        assert_eq!((width, half.len()), (8, 8 * 5));
+    }
+}

@@ -95,8 +95,8 @@ fn summary(page: &mut String, report: &Report) {
     page.push_str(
         "</table><p class=\"note\">A classifier tells the sides apart if its area under the ROC curve is larger than 95 of 100 between random \
          halves of the real fields, and the 95 % interval of it (fields drawn with replacement) leaves out ½. Fields are never split between what it learns from and \
-         what it is tried on. Moments tell them apart if a slope or a shift of medians lies outside what 99 of 100 pairs of disjoint \
-         real halves show at the same number of nuclei: by chance, one of six does in one comparison of twenty.</p>",
+         what it is tried on. Moments tell them apart if a slope or a shift of medians lies outside what 199 of 200 pairs of disjoint \
+         real halves show at the same number of nuclei: by chance, one of the twelve does in one comparison of seventeen or fewer.</p>",
     );
 }
 
@@ -150,7 +150,7 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
 /// The AUC and its interval among those between halves.
 fn strip(r: &TwoSample) -> String {
     let all = r.null.iter().copied().chain(r.interval).chain([0.3, 1.0]);
-    let mut plot = Plot::new("AUC (line: 95 % interval) and real halves", "AUC", "", all, [0.0, 3.0].into_iter());
+    let mut plot = Plot::new("AUC with its 95 % interval", "AUC", "1 real halves, 2 the sides", all, [0.0, 3.0].into_iter());
     plot.dashes([0.5, 0.0], [0.5, 3.0]);
     plot.dots(r.null.iter().map(|v| [*v, 1.0]), COLOURS[0]);
     plot.line(r.interval.iter().map(|v| [*v, 2.0]), COLOURS[1]);
@@ -176,7 +176,7 @@ fn scores(r: &TwoSample) -> String {
 fn moments(page: &mut String, test: &Test<Moments>) {
     put(page, format_args!("<h2>{}: {}</h2>", escape(&test.name), verdict(test.verdict)));
     page.push_str(
-        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.5 – 99.5 %)</th><th>shift, sd (5 – 95 %)</th>\
+        "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.25 – 99.75 %)</th><th>shift, sd (5 – 95 %)</th>\
          <th>between real halves</th></tr>",
     );
     for d in &test.result.descriptors {

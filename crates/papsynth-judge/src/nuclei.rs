@@ -176,3 +176,70 @@ fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
     }
     if outer.is_empty() { 0.0 } else { inner - crate::statistics::median(&mut outer) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::region::distance;
+
+    const PIXEL_UM: f64 = 0.33;
+
+    /// Discs of a radius and absorbance on something pale, with rims of 1.2 pixels.
+    fn image(discs: &[([f64; 2], f64, f64)]) -> Vec<f32> {
+        let at = |i: usize| {
+            let rim = |(centre, radius, a): &([f64; 2], f64, f64)| {
+                let inside = radius - distance([(i % 200) as f64, (i / 200) as f64], *centre);
+                0.5 * a * (1.0 + libm::erf(inside / 1.7))
+            };
+            crate::number::single(0.12 + discs.iter().map(rim).sum::<f64>())
+        };
+        (0..200 * 150).map(at).collect()
+    }
+
+    fn areas(image: &[f32], hints: &Hints) -> Vec<usize> {
+        nuclei(image, 200, PIXEL_UM, hints, &NucleiParams::default()).iter().map(|r| r.pixels.len()).collect()
+    }
+
+    #[test]
+    fn a_disc_is_found_to_the_middle_of_its_rim() {
+        for radius in [8.0, 12.0, 20.0] {
+            let image = image(&[([80.2, 70.7], radius, 0.3)]);
+            let found = nuclei(&image, 200, PIXEL_UM, &Hints::Nothing, &NucleiParams::default());
+            assert_eq!(found.len(), 1);
+            let shape = found[0].shape();
+            let wanted = std::f64::consts::PI * radius * radius;
+            assert!((shape.area - wanted).abs() < 0.06 * wanted, "{} {wanted}", shape.area);
+            assert!(distance(shape.centre, [80.2, 70.7]) < 0.2);
+        }
+    }
+
+    #[test]
+    fn what_is_too_small_too_large_too_faint_or_too_long_is_none() {
+        assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &Hints::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &Hints::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &Hints::Nothing), [0; 0]);
+        let chain: Vec<([f64; 2], f64, f64)> = (0..12).map(|i| ([40.0 + 9.0 * f64::from(i), 60.0 + 20.0 * f64::from(i % 2)], 9.0, 0.1)).collect();
+        assert!(areas(&image(&chain), &Hints::Nothing).is_empty());
+    }
+
+    #[test]
+    fn points_choose_what_is_taken_and_masks_are_taken_as_they_are() {
+        let image = image(&[([50.0, 70.0], 10.0, 0.3), ([120.0, 70.0], 12.0, 0.4), ([170.0, 70.0], 10.0, 0.07)]);
+        assert_eq!(areas(&image, &Hints::Nothing).len(), 2);
+        assert_eq!(areas(&image, &Hints::Points(&[[121.0, 72.0], [10.0, 10.0]])).len(), 1);
+        // Marked nuclei may be fainter.
+        assert_eq!(areas(&image, &Hints::Points(&[[170.0, 70.0]])).len(), 1);
+        let mut labels = vec![0; image.len()];
+        for y in 20..40 {
+            labels[y * 200 + 20..y * 200 + 50].fill(7);
+            labels[y * 200 + 60..y * 200 + 65].fill(7);
+        }
+        assert_eq!(areas(&image, &Hints::Masks(&labels)), [600]);
+    }
+
+    #[test]
+    fn neighbours_are_parted() {
+        let image = image(&[([60.0, 70.0], 10.0, 0.3), ([84.0, 70.0], 10.0, 0.35)]);
+        assert_eq!(areas(&image, &Hints::Nothing).len(), 2);
+    }
+}

@@ -106,12 +106,12 @@ impl Picture {
         Self { grey: cut(&self.grey, width, top..y1, left..x1), width: x1 - left, nuclei, ..self.clone() }
     }
 
-    /// The same in pixels that are `factor` ≥ 1 times as large: each the mean of the area that it covers, of labels the one at its centre.
-    pub(crate) fn coarsened(&self, factor: f64) -> Self {
-        if factor <= 1.0 {
-            return self.clone();
-        }
+    /// The same in pixels that are `factor` times as large: each the mean of the area that it covers, of labels the one at its centre. A
+    /// factor of 1 or less changes nothing: what was never seen cannot be made.
+    #[must_use]
+    pub fn coarsened(&self, factor: f64) -> Self {
         let (width, height) = (self.width, self.height());
+        let factor = if factor > 1.0 { factor.min(width.min(height) as f64) } else { return self.clone() };
         let (wide, high) = (whole(width as f64 / factor), whole(height as f64 / factor));
         let across = shares(wide, factor);
         let narrow: Vec<f64> = self

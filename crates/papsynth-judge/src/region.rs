@@ -292,3 +292,77 @@ impl Envelope {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    fn region(width: usize, height: usize, inside: impl Fn(f64, f64) -> bool) -> Region {
+        let inside: Vec<bool> = (0..width * height).map(|i| inside((i % width) as f64, (i / width) as f64)).collect();
+        let mut regions = components(&inside, width);
+        assert_eq!(regions.len(), 1);
+        regions.remove(0)
+    }
+
+    #[test]
+    fn a_disc_has_the_area_and_shape_of_one() {
+        let shape = region(90, 80, |x, y| (x - 40.3) * (x - 40.3) + (y - 38.9) * (y - 38.9) < 900.0).shape();
+        assert!((shape.area - 900.0 * std::f64::consts::PI).abs() < 15.0, "{shape:?}");
+        assert!((shape.centre[0] - 40.3).abs() < 0.05 && (shape.centre[1] - 38.9).abs() < 0.05, "{shape:?}");
+        assert!(shape.eccentricity < 0.1 && shape.solidity > 0.975 && shape.circularity > 0.96, "{shape:?}");
+    }
+
+    #[test]
+    fn an_ellipse_has_its_eccentricity_and_direction() {
+        let (sin, cos) = (libm::sin(0.5), libm::cos(0.5));
+        let inside = |x: f64, y: f64| {
+            let (u, v) = ((x - 60.0) * cos + (y - 50.0) * sin, (y - 50.0) * cos - (x - 60.0) * sin);
+            u * u / 1600.0 + v * v / 400.0 < 1.0
+        };
+        let shape = region(120, 100, inside).shape();
+        assert!((shape.eccentricity - 0.75_f64.sqrt()).abs() < 0.005 && (shape.direction - 0.5).abs() < 0.01, "{shape:?}");
+    }
+
+    #[test]
+    fn a_square_is_less_round_and_a_cross_less_solid() {
+        let square = region(60, 60, |x, y| (10.0..40.0).contains(&x) && (10.0..40.0).contains(&y));
+        assert!((square.shape().circularity - std::f64::consts::FRAC_PI_4).abs() < 0.06, "{:?}", square.shape());
+        assert_eq!(square.outline().len(), 120);
+        assert!((square.shape().solidity - 1.0).abs() < 1e-12);
+        let cross = region(60, 60, |x, y| (20.0..40.0).contains(&x) != (20.0..40.0).contains(&y) || (x - 30.0).abs().max((y - 30.0).abs()) < 10.5);
+        let area = cross.shape().area;
+        assert!((cross.shape().solidity - area / (3600.0 - 4.0 * 200.0)).abs() < 0.02, "{:?}", cross.shape());
+    }
+
+    #[test]
+    fn holes_are_filled_and_one_pixel_is_a_region() {
+        let ring = region(40, 40, |x, y| (100.0..256.0).contains(&((x - 20.0) * (x - 20.0) + (y - 20.0) * (y - 20.0))));
+        let disc = region(40, 40, |x, y| (x - 20.0) * (x - 20.0) + (y - 20.0) * (y - 20.0) < 256.0);
+        let sorted = |region: &Region| {
+            let mut pixels = region.pixels.clone();
+            pixels.sort_unstable();
+            pixels
+        };
+        assert_eq!(sorted(&ring.filled(40)), sorted(&disc));
+        assert_eq!(sorted(&disc.filled(40)), sorted(&disc));
+        let one = region(3, 3, |x, y| x == 1.0 && y == 1.0);
+        assert_eq!((one.shape().area, one.outline().len()), (1.0, 4));
+        assert_eq!(Region::default().shape(), Shape::default());
+    }
+
+    #[test]
+    fn distances_are_those_to_the_nearest_pixel_outside() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+        let (width, height) = (23, 17);
+        let inside: Vec<bool> = (0..width * height).map(|_| rng.next_u64() % 9 != 0).collect();
+        let distances = distance_inside(&inside, width);
+        for (i, d) in distances.iter().enumerate() {
+            let at = |i: usize| [(i % width) as f64, (i / width) as f64];
+            let slow = (0..inside.len()).filter(|j| !inside[*j]).map(|j| distance(at(i), at(j))).fold(f64::INFINITY, f64::min);
+            assert!((f64::from(*d) - slow).abs() < 1e-5, "{i}: {d}, not {slow}");
+        }
+    }
+}

@@ -82,3 +82,52 @@ pub(crate) fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
         items.swap(i, below(i + 1, rng));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+
+    #[test]
+    fn the_auc_of_known_scores_is_known() {
+        assert_eq!(auc(&[1.0, 2.0], &[3.0, 4.0]), 1.0);
+        assert_eq!(auc(&[3.0, 4.0], &[1.0, 2.0]), 0.0);
+        assert_eq!(auc(&[1.0, 1.0], &[1.0]), 0.5);
+        assert_eq!(auc(&[0.1, 0.4, 0.35], &[0.35, 0.8]), 5.5 / 6.0 - 1.0 / 6.0);
+        assert_eq!(auc(&[], &[1.0]), 0.5);
+    }
+
+    #[test]
+    fn weights_stand_for_copies() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        let scores: Vec<(f64, bool, usize)> = (0..40).map(|i| (below(12, &mut rng) as f64, i % 3 == 0, below(4, &mut rng))).collect();
+        let mut weighted: Vec<(f64, bool, f64)> = scores.iter().map(|(s, side, w)| (*s, *side, *w as f64)).collect();
+        let copies = |side: bool| -> Vec<f64> { scores.iter().filter(|s| s.1 == side).flat_map(|s| vec![s.0; s.2]).collect() };
+        assert!((weighted_auc(&mut weighted) - auc(&copies(false), &copies(true))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        assert_eq!(quantile(&mut [4.0, 1.0, 2.0, 3.0], 0.5), 2.5);
+        assert_eq!(quantile(&mut [4.0, 1.0], 0.0), 1.0);
+        assert_eq!(quantile(&mut [4.0, 1.0], 1.0), 4.0);
+        assert_eq!(quantile(&mut [], 0.3), 0.0);
+        assert_eq!((mean(&[1.0, 2.0, 6.0]), deviation(&[1.0, 3.0])), (3.0, 2.0_f64.sqrt()));
+        assert!((correlation(&[1.0, 2.0, 3.0], &[5.0, 3.0, 1.0]) + 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn every_order_is_as_likely() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+        let mut counts = std::collections::BTreeMap::new();
+        for _ in 0..6000 {
+            let mut items = [0, 1, 2];
+            shuffle(&mut items, &mut rng);
+            *counts.entry(items).or_insert(0) += 1;
+        }
+        // Six orders of 1000 each, with a standard error of √(6000 · 1/6 · 5/6) = 29.
+        assert!(counts.len() == 6 && counts.values().all(|c: &i32| (c - 1000).abs() < 4 * 29), "{counts:?}");
+    }
+}

@@ -221,3 +221,56 @@ fn steepness(blobs: &[Blob], i: usize) -> f64 {
     let steps = f64::from(2 * AROUND) * f64::from(STEP);
     perimeter * steps / (outer.area - inner).max(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::region::flood;
+
+    #[test]
+    fn every_blob_is_what_is_connected_at_its_threshold() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+        let width = 31;
+        let noise: Vec<f32> = (0..width * 24).map(|_| f32::from(u8::try_from(rng.next_u64() >> 56).unwrap()) / 255.0).collect();
+        let image = crate::filter::blur(&noise, width, 1.2);
+        let blobs = blobs(&image, width, 0.3, 200.0);
+        assert!(blobs.len() > 100);
+        for blob in &blobs {
+            let mut seen = vec![false; image.len()];
+            let region = flood(blob.pixel as usize, width, image.len(), &mut seen, |p| super::level(image[p], 250) >= blob.level);
+            let shape = region.shape();
+            assert_eq!(shape.area, blob.area);
+            assert!((shape.centre[0] - blob.centre[0]).abs() + (shape.centre[1] - blob.centre[1]).abs() < 1e-9);
+            let sum: f64 = region.pixels.iter().map(|p| f64::from(image[*p as usize])).sum();
+            assert!((sum - blob.sum).abs() < 1e-9);
+            if let Some(parent) = blob.parent.map(|p| &blobs[p as usize]) {
+                assert!(parent.level < blob.level && parent.area > blob.area);
+                let mut seen = vec![false; image.len()];
+                let around = flood(parent.pixel as usize, width, image.len(), &mut seen, |p| super::level(image[p], 250) >= parent.level);
+                assert!(around.pixels.contains(&blob.pixel));
+            }
+        }
+    }
+
+    #[test]
+    fn the_steepness_of_a_cone_is_its_slope() {
+        // A radial ramp of 0.02 a pixel from 0.1 outside to 0.6 in the middle.
+        let width = 90;
+        let ramp = |i: usize| {
+            let (x, y) = ((i % width) as f64 - 45.0, (i / width) as f64 - 45.0);
+            single((0.9 - 0.02 * (x * x + y * y).sqrt()).clamp(0.1, 0.6))
+        };
+        let image: Vec<f32> = (0..width * width).map(ramp).collect();
+        let blobs = blobs(&image, width, 0.12, 5000.0);
+        let middle = blobs.iter().find(|b| b.level == 40).unwrap();
+        assert!((middle.steepness - 0.02).abs() < 0.001, "{middle:?}");
+        assert!((middle.ellipse - 1.0).abs() < 0.01, "{middle:?}");
+    }
+
+    fn single(value: f64) -> f32 {
+        crate::number::single(value)
+    }
+}

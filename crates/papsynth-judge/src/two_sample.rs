@@ -57,6 +57,14 @@ pub struct TwoSample {
     pub scores: [Vec<f64>; 2],
 }
 
+impl TwoSample {
+    /// Mean AUC between random halves of the real fields; NaN if there were too few fields to halve.
+    #[must_use]
+    pub fn null_mean(&self) -> f64 {
+        if self.null.is_empty() { f64::NAN } else { mean(&self.null) }
+    }
+}
+
 /// What the features of one family can tell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FamilyAlone {
@@ -296,4 +304,86 @@ fn giveaways<'a>(sample: &Sample, round: &Round, mut tables: impl Iterator<Item 
         .collect();
     list.sort_by(|a, b| b.importance.total_cmp(&a.importance).then((b.alone - 0.5).abs().total_cmp(&(a.alone - 0.5).abs())));
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::Row;
+
+    const COLUMNS: usize = 8;
+
+    /// Fields with rows of numbers, of which the fourth is shifted, and every ninth unknown.
+    fn tables(shift: f64, seed: u64) -> Vec<Table> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut uniform = move || below(1 << 30, &mut rng) as f64 / f64::from(1 << 30);
+        let mut field = |_| {
+            let mut table = Table::default();
+            let own = 0.2 * uniform();
+            for i in 0..20 {
+                let mut row = Row::default();
+                for c in 0..COLUMNS {
+                    let value = uniform() + own + if c == 3 { shift } else { 0.0 };
+                    row.put(Family::Texture, format!("column {c}"), if (i + c) % 9 == 0 { f64::NAN } else { value });
+                }
+                table.push(row, [0.0; 2]);
+            }
+            table
+        };
+        (0..10).map(&mut field).collect()
+    }
+
+    fn params() -> TwoSampleParams {
+        TwoSampleParams { trees: 60, halvings: 4, bootstrap: 200, shuffled: COLUMNS, ..TwoSampleParams::default() }
+    }
+
+    #[test]
+    fn what_is_alike_is_not_told_apart() {
+        let result = two_sample(&tables(0.0, 1), &tables(0.0, 2), &params(), 5).unwrap();
+        assert!((0.3..0.65).contains(&result.auc), "{}", result.auc);
+        assert_eq!((result.rows, result.fields, result.null.len()), ([200, 200], [10, 10], 4));
+        assert!(result.interval[0] < 0.5);
+    }
+
+    #[test]
+    fn what_differs_is_named_first() {
+        let result = two_sample(&tables(0.0, 1), &tables(0.6, 2), &params(), 5).unwrap();
+        assert!(result.auc > 0.85 && result.interval[0] > 0.75, "{} {:?}", result.auc, result.interval);
+        let first = &result.giveaways[0];
+        assert_eq!(first.feature, "column 3");
+        assert!(first.importance > 0.5 && first.alone > 0.8 && first.synthetic[1] > first.real[1] + 0.3, "{first:?}");
+        assert!(result.giveaways[1].importance < 0.1);
+        assert_eq!(result.families.len(), 1);
+        assert!((result.families[0].auc - result.auc).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_field_is_never_learnt_from_and_tried() {
+        let real: Vec<Table> = tables(0.0, 1);
+        let all: Vec<(&Table, bool)> = real.iter().enumerate().map(|(i, t)| (t, i >= 5)).collect();
+        let sample = Sample::new(&all).unwrap();
+        let of = sample.folds(3, 1);
+        for side in [0..5, 5..10] {
+            let mut counts = [0; 3];
+            side.for_each(|f| counts[of[f]] += 1);
+            assert!(counts.iter().all(|c| (1..=2).contains(c)), "{counts:?}");
+        }
+        let round = round(&sample, 3, 20, 1).unwrap();
+        for (fold, (_, unseen)) in round.folds.iter().enumerate() {
+            assert!(unseen.iter().all(|row| of[sample.fields[*row]] == fold));
+        }
+        assert_eq!(round.folds.iter().map(|f| f.1.len()).sum::<usize>(), 200);
+    }
+
+    #[test]
+    fn fields_without_rows_do_not_count() {
+        let mut real = tables(0.0, 1);
+        real.truncate(2);
+        real.push(Table::default());
+        let result = two_sample(&real, &tables(0.0, 2), &params(), 1).unwrap();
+        assert_eq!((result.fields, result.null.len()), ([2, 10], 0));
+        real.remove(0);
+        assert!(two_sample(&real, &tables(0.0, 2), &params(), 1).is_none());
+        assert!(two_sample(&[], &[], &params(), 1).is_none());
+    }
 }

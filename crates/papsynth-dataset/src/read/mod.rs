@@ -6,10 +6,11 @@
 //! # What is accepted
 //!
 //! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused: how much light of
-//! one wavelength a colour stands for is not known. A colour file whose pixels are all grey (R = G = B, opaque) is read
+//! one wavelength a colour stands for is not known. Fields that are compared alone are read in green ([`field_files`]). A colour file whose pixels are all grey (R = G = B, opaque) is read
 //! as grey. In label images and masks a palette is not looked at, its indices are the labels.
 
 mod components;
+mod fields;
 mod image;
 mod nucleus;
 mod outlines;
@@ -24,6 +25,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 pub use components::{Component, components};
+pub use fields::{FieldFile, FieldImage, FieldNuclei, field_files};
 pub(crate) use image::LevelImage;
 pub use image::{GreyImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};

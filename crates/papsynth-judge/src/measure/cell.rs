@@ -240,3 +240,80 @@ impl Outline {
         Self { corners: count(1.0), notches: count(-1.0), straight }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Known, Picture};
+    use crate::region::Region;
+
+    const PIXEL_UM: f64 = 0.33;
+
+    /// A field of one absorbance image.
+    fn maps(a: impl Fn(f64, f64) -> f64) -> Maps {
+        let (width, height) = (260, 220);
+        let at = |i: usize| crate::number::single(240.0 * libm::pow(10.0, -a((i % width) as f64, (i / width) as f64)));
+        let grey = (0..width * height).map(at).collect();
+        Maps::new(&Picture { name: String::new(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing })
+    }
+
+    fn disc(maps: &Maps, x: f64, y: f64, radius: f64) -> Region {
+        let inside: Vec<bool> = (0..maps.absorbance.len())
+            .map(|i| distance([(i % maps.width) as f64, (i / maps.width) as f64], [x, y]) < radius)
+            .collect();
+        components(&inside, maps.width).remove(0)
+    }
+
+    #[test]
+    fn a_free_cell_has_its_profile_size_and_place() {
+        // Thin at the rim, and twice as dark in the middle.
+        let depth = |x: f64, y: f64| 1.0 - distance([x, y], [120.0, 110.0]) / 70.0;
+        let maps = maps(|x, y| if depth(x, y) > 0.0 { 0.1 + 0.1 * depth(x, y) + if distance([x, y], [127.0, 110.0]) < 10.0 { 0.4 } else { 0.0 } } else { 0.0 });
+        let nuclei = [disc(&maps, 127.0, 110.0, 10.0)];
+        let cells = cells(&maps, &nuclei, PIXEL_UM);
+        assert_eq!(cells.len(), 1);
+        let cell = &cells[0];
+        assert!((cell.shape.area - PI * 4900.0).abs() < 400.0, "{:?}", cell.shape);
+        let profile = cell.profile(&maps);
+        for (i, value) in profile.iter().enumerate().take(8) {
+            let wanted = (0.1 + 0.1 * (i as f64 + 0.5) / 10.0) / cell.middle();
+            // The camera has whole levels of grey, and the outermost bin some of the slide.
+            assert!((value - wanted).abs() < if i == 0 { 0.12 } else { 0.04 }, "{i}: {value}, not {wanted}");
+        }
+        let mut table = crate::table::Table::default();
+        table.push(cell.features(&maps, PIXEL_UM), cell.shape.centre);
+        let value = |name: &str| table.column(name).next().unwrap();
+        assert!((value("nucleus off centre, radii") - 0.1).abs() < 0.02);
+        assert!((value("nucleus over cell area") - 1.0 / 49.0).abs() < 0.002);
+        assert_eq!((value("corners"), value("notches")), (0.0, 0.0));
+    }
+
+    #[test]
+    fn cells_with_two_nuclei_none_or_at_the_border_are_left_out() {
+        let body = |x: f64, y: f64| if distance([x, y], [120.0, 110.0]) < 60.0 || distance([x, y], [0.0, 0.0]) < 50.0 { 0.2 } else { 0.0 };
+        let maps = maps(body);
+        let count = |nuclei: &[Region]| cells(&maps, nuclei, PIXEL_UM).len();
+        let own = disc(&maps, 120.0, 110.0, 9.0);
+        assert_eq!(count(&[]), 0);
+        assert_eq!(count(std::slice::from_ref(&own)), 1);
+        assert_eq!(count(&[own, disc(&maps, 150.0, 110.0, 9.0)]), 0);
+        assert_eq!(count(&[disc(&maps, 15.0, 15.0, 9.0)]), 0);
+    }
+
+    #[test]
+    fn corners_notches_and_straight_runs_are_counted() {
+        let outline = |inside: &dyn Fn(f64, f64) -> bool| {
+            let all: Vec<bool> = (0..200 * 200).map(|i| inside(f64::from(i % 200), f64::from(i / 200))).collect();
+            Outline::new(&components(&all, 200)[0].outline(), CHORD_UM / PIXEL_UM)
+        };
+        let within = |v: f64, low: f64, high: f64| v >= low && v < high;
+        let square = outline(&|x, y| within(x, 40.0, 160.0) && within(y, 40.0, 160.0));
+        assert_eq!((square.corners, square.notches), (4.0, 0.0));
+        assert!(square.straight > 0.6, "{square:?}");
+        let cross = outline(&|x, y| (within(x, 20.0, 180.0) && within(y, 70.0, 130.0)) || (within(y, 20.0, 180.0) && within(x, 70.0, 130.0)));
+        assert_eq!((cross.corners, cross.notches), (8.0, 4.0));
+        let disc = outline(&|x, y| distance([x, y], [100.0, 100.0]) < 40.0);
+        assert_eq!((disc.corners, disc.notches), (0.0, 0.0));
+        assert!(disc.straight < 0.35, "{disc:?}");
+    }
+}

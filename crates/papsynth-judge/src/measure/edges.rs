@@ -57,3 +57,29 @@ fn sigma(slope: f64, wide_slope: f64) -> Option<f64> {
     let square = ratio * ratio;
     (square > 1.0 && square < 4.0).then(|| ((4.0 - square) / (square - 1.0) - DIFFERENCE).max(0.0).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Known, Picture};
+
+    #[test]
+    fn the_blur_of_an_edge_is_found_whatever_its_direction() {
+        let (width, height) = (120, 100);
+        for (sigma, turn) in [(0.8, 0.0), (1.0, 0.3), (1.5, 0.8), (2.0, 1.2), (3.0, 2.5)] {
+            let (sin, cos) = (libm::sin(turn), libm::cos(turn));
+            let at = |i: usize| {
+                let d = ((i % width) as f64 - 60.0) * cos + ((i / width) as f64 - 50.0) * sin;
+                let a = 0.2 * (1.0 + libm::erf(d / (sigma * std::f64::consts::SQRT_2)));
+                crate::number::single(240.0 * libm::pow(10.0, -a))
+            };
+            let grey = (0..width * height).map(at).collect();
+            let picture = Picture { name: String::new(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing };
+            let maps = Maps::new(&picture);
+            let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
+            assert!(sigmas.len() > 80, "{} places", sigmas.len());
+            let found = crate::statistics::median(&mut sigmas);
+            assert!((found - sigma).abs() < 0.06 * sigma + 0.03, "{found}, not {sigma}, turned by {turn}");
+        }
+    }
+}

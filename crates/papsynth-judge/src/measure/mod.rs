@@ -39,6 +39,19 @@ pub enum NucleiFrom {
 }
 
 impl NucleiFrom {
+    /// All of them, from the least to the most that is known.
+    pub const ALL: [Self; 3] = [Self::Search, Self::Points, Self::Masks];
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Search => "search",
+            Self::Points => "points",
+            Self::Masks => "masks",
+        }
+    }
+
     /// The most that a picture allows.
     #[must_use]
     pub fn of(known: &Known) -> Self {
@@ -146,6 +159,8 @@ impl Gauge {
     pub fn measure(&self, picture: &Picture) -> Result<Field, Error> {
         picture.check()?;
         let picture = picture.trimmed();
+        // What is left of it may be too little.
+        picture.check()?;
         let pixel_um = self.params.pixel_um;
         let maps = Maps::new(&picture);
         let regions = self.nuclei(&maps, &picture.nuclei);

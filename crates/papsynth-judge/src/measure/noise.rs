@@ -55,3 +55,36 @@ impl Noise {
         self.products[lag] / self.variance.max(1e-6)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::statistics::below;
+
+    #[test]
+    fn variance_and_correlation_of_noise_are_found() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let (width, height) = (256, 256);
+        // Uniform over ±3: variance 3.
+        let white: Vec<f64> = (0..width * height).map(|_| below(600_001, &mut rng) as f64 / 1e5 - 3.0).collect();
+        let measured = |of: &dyn Fn(usize, usize) -> f64| {
+            let grey: Vec<f32> = (0..width * height).map(|i| crate::number::single(200.0 + 0.01 * (i % width) as f64 + of(i % width, i / width))).collect();
+            let places = (0..height).step_by(BLOCK).flat_map(|y| (0..width).step_by(BLOCK).map(move |x| (x, y)));
+            let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&grey, width, x, y)).collect();
+            Noise::mean(&mut blocks).unwrap()
+        };
+        let plain = measured(&|x, y| white[y * width + x]);
+        // The noisiest fifth is left out: of blocks of 1024 pixels that takes 1 % off.
+        assert!((plain.variance - 3.0).abs() < 0.1, "{plain:?}");
+        assert!((0..5).all(|lag| plain.correlation(lag).abs() < 0.015), "{plain:?}");
+        // Half of the pixel below: correlation 0.5/1.25 = 0.4 down, nothing across.
+        let smeared = measured(&|x, y| white[y * width + x] + 0.5 * white[((y + 1) % height) * width + x]);
+        assert!((smeared.variance - 3.75).abs() < 0.15, "{smeared:?}");
+        let wanted = [0.0, 0.4, 0.0, 0.0, 0.0];
+        assert!((0..5).all(|lag| (smeared.correlation(lag) - wanted[lag]).abs() < 0.02), "{smeared:?}");
+        assert!(Noise::mean(&mut Vec::new()).is_none());
+    }
+}

@@ -1,0 +1,188 @@
+//! `papsynth judge`: two sets of fields in, a report of how they differ out.
+
+use std::path::Path;
+
+use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits, field_files};
+use papsynth_dataset::write_file;
+use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
+use rayon::prelude::*;
+
+use crate::args::{self, threads};
+use crate::exit::{self, Complaint, Failure};
+use crate::text_file::may_replace;
+
+/// Files that are written, and how those begin that may be replaced.
+const PAGE: (&str, &[u8]) = ("report.html", b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<");
+const NUMBERS: (&str, &[u8]) = ("report.json", b"{\n  \"judge_report\":");
+
+/// Pixels that differ by less are of one size.
+const SAME_PIXEL: f64 = 0.01;
+
+/// Fewest fields of a side.
+const LEAST: usize = 2;
+
+/// Giveaways that are printed.
+const PRINTED: usize = 5;
+
+/// Fields of one side.
+struct Side {
+    files: Vec<FieldFile>,
+    /// Size of a pixel of each, µm.
+    pixels_um: Vec<f64>,
+}
+
+pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
+    for (name, begins) in [PAGE, NUMBERS] {
+        may_replace(&args.out.join(name), begins, "an older report")?;
+    }
+    if args.out.exists() && !args.out.is_dir() {
+        let message = format!("--out {}: there is a file of this name; expected a folder", args.out.display());
+        return Err(Failure::input(Complaint::new(message)));
+    }
+    let (real, synthetic) = sides(args)?;
+    let pixel_um = coarsest(&real, &synthetic);
+    let nuclei_from = nuclei_from(args, &real, &synthetic)?;
+    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(refuse)?;
+    let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
+    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(refuse)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(args.threads)).build();
+    let pool = pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))?;
+    let report = pool.install(|| {
+        let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
+        judge.compare(&real, &synthetic).map_err(refuse)
+    })?;
+    let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
+    numbers.push('\n');
+    for ((name, _), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
+        write_file(&args.out.join(name), text.as_bytes())?;
+    }
+    exit::print(&told(&report, &args.out))
+}
+
+fn refuse(error: Error) -> Failure {
+    Failure::input(Complaint::new(error.to_string()))
+}
+
+/// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
+fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
+    let (real, synthetic) = (listed(&args.real, &args.group)?, listed(&args.synthetic, &args.group)?);
+    let recorded = |files: &[FieldFile]| files.iter().find_map(|f| f.pixel_um);
+    let of_real = args.pixel_um.or(recorded(&real));
+    let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
+    let (Some(of_real), Some(of_synthetic)) = (of_real.or(of_synthetic), of_synthetic.or(of_real)) else {
+        let message = "neither folder says how large its pixels are";
+        return Err(Failure::input(Complaint::new(message).help("give --pixel-um, the size of a pixel in micrometres")));
+    };
+    let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
+        let pixels_um = files.iter().map(|f| given.or(f.pixel_um).unwrap_or(else_um)).collect();
+        Side { files, pixels_um }
+    };
+    Ok((side(real, args.pixel_um, of_real), side(synthetic, args.synthetic_pixel_um, of_synthetic)))
+}
+
+/// The fields in a folder; of these groups alone, if it has any of them.
+fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
+    let mut files = field_files(folder)?;
+    let wanted = |file: &FieldFile| groups.contains(&file.group);
+    if files.iter().any(wanted) {
+        files.retain(wanted);
+    } else if !groups.is_empty() && files.iter().any(|f| !f.group.is_empty()) {
+        let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
+        let known: std::collections::BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
+        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter())))));
+    }
+    if files.len() < LEAST {
+        let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
+        return Err(Failure::input(Complaint::new(message).help("fields are never split between what is learnt from and what is tried")));
+    }
+    Ok(files)
+}
+
+/// The size that all pixels are brought to.
+fn coarsest(real: &Side, synthetic: &Side) -> f64 {
+    real.pixels_um.iter().chain(&synthetic.pixels_um).copied().fold(0.0, f64::max)
+}
+
+/// What all fields allow, or what is asked for.
+fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<NucleiFrom, Failure> {
+    let all = |has: fn(&FieldFile) -> bool| real.files.iter().chain(&synthetic.files).find(|f| !has(f));
+    let lacks = |from: NucleiFrom| match from {
+        NucleiFrom::Masks => all(FieldFile::has_masks),
+        NucleiFrom::Points => all(FieldFile::has_points),
+        NucleiFrom::Search => None,
+    };
+    match args.nuclei {
+        None => Ok(NucleiFrom::ALL.into_iter().rev().find(|from| lacks(*from).is_none()).unwrap_or_default()),
+        Some(from) => match lacks(from) {
+            None => Ok(from),
+            Some(file) => {
+                let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
+                Err(Failure::input(Complaint::new(message).help("all fields of both sides must have them")))
+            }
+        },
+    }
+}
+
+fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Failure> {
+    let fields: Vec<Result<Field, Failure>> = side
+        .files
+        .par_iter()
+        .zip(&side.pixels_um)
+        .map(|(file, own_um)| {
+            let factor = pixel_um / own_um;
+            let picture = picture(file)?;
+            let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
+            gauge.measure(&picture).map_err(|error| {
+                Failure::input(Complaint::new(format!("{}: {error}", file.path().display())))
+            })
+        })
+        .collect();
+    fields.into_iter().collect()
+}
+
+fn picture(file: &FieldFile) -> Result<Picture, Failure> {
+    let image = file.read(&Limits::default())?;
+    Ok(Picture {
+        name: file.name.clone(),
+        group: file.group.clone(),
+        grey: image.grey.iter().map(|g| f32::from(*g)).collect(),
+        width: image.width,
+        full_scale: f32::from(image.white),
+        nuclei: match image.nuclei {
+            FieldNuclei::Unknown => Known::Nothing,
+            FieldNuclei::Points(points) => Known::Points(points),
+            FieldNuclei::Labels(labels) => Known::Masks(labels),
+        },
+    })
+}
+
+/// The verdicts in a few lines.
+fn told(report: &Report, out: &Path) -> String {
+    let mut text = String::new();
+    for test in &report.two_sample {
+        let r = &test.result;
+        let [low, high] = r.interval;
+        text.push_str(&format!(
+            "{:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {:.3}: {}\n",
+            test.name,
+            r.auc,
+            r.null_mean(),
+            test.verdict
+        ));
+        for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {
+            text.push_str(&format!("    {:<42} real {:>9.4}  synthetic {:>9.4}\n", g.feature, g.real[1], g.synthetic[1]));
+        }
+    }
+    for test in &report.moments {
+        let outside = test.result.descriptors.iter().filter(|d| !d.is_within()).count();
+        let of = test.result.descriptors.len();
+        text.push_str(&format!("{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n", test.name, test.verdict));
+    }
+    let [real, synthetic] = &report.fields;
+    text.push_str(&format!("{} real fields and {} synthetic ones: {}\n", real.len(), synthetic.len(), report.verdict));
+    for note in &report.notes {
+        text.push_str(&format!("note: {note}\n"));
+    }
+    text.push_str(&format!("{}: {}, {}\n", out.display(), PAGE.0, NUMBERS.0));
+    text
+}

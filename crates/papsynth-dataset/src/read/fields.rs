@@ -1,0 +1,268 @@
+//! Fields of slides with what is known of their nuclei: data sets of ours, and folders of images.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use papsynth::truth::LabelMap;
+
+use super::{LevelImage, Limits, bytes, components, image_files, parse, read_label_map};
+use crate::dataset::{read_manifest, recorded_frames, whole_record};
+use crate::error::{Error, Problem};
+use crate::files::Folder;
+use crate::frame_writer::white;
+use crate::layout::{self, Form};
+use crate::record::Check;
+
+/// The table that says which group each image of a folder belongs to.
+const GROUPS: &str = "frames.csv";
+
+/// Its columns.
+const GROUP_COLUMNS: [&str; 2] = ["frame", "grade"];
+
+/// Largest table that is read.
+const TABLE_BYTES: u64 = 1 << 26;
+
+/// Bits that cameras fill 16-bit files with.
+const DEEP: [u32; 3] = [12, 14, 16];
+
+/// Which of three colours is looked at: stains of nuclei and of cytoplasm absorb green most.
+const GREEN: usize = 1;
+
+/// What is known of the nuclei of a field.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FieldNuclei {
+    /// Nothing.
+    Unknown,
+    /// A point in each: x right, y down, pixels.
+    Points(Vec<[f64; 2]>),
+    /// A label in each pixel, row by row; 0 is none.
+    Labels(Vec<u32>),
+}
+
+/// The same before it is read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum NucleiFile {
+    Unknown,
+    Points(PathBuf),
+    Labels(PathBuf),
+}
+
+/// A field that can be read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldFile {
+    /// Name of its image, without ending.
+    pub name: String,
+    /// Its group in `frames.csv`; empty if there is none.
+    pub group: String,
+    /// Size of a pixel, µm, where the files say it.
+    pub pixel_um: Option<f64>,
+    image: PathBuf,
+    nuclei: NucleiFile,
+    /// The largest grey level, where the files say it.
+    white: Option<u16>,
+}
+
+/// A field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldImage {
+    /// Columns.
+    pub width: usize,
+    /// Grey levels, row by row; of images in colour, green.
+    pub grey: Vec<u16>,
+    /// The grey level of a saturated pixel.
+    pub white: u16,
+    /// Its nuclei.
+    pub nuclei: FieldNuclei,
+}
+
+impl FieldFile {
+    /// Whether its nuclei are known by points or better.
+    #[must_use]
+    pub fn has_points(&self) -> bool {
+        self.nuclei != NucleiFile::Unknown
+    }
+
+    /// Whether there are masks of its nuclei.
+    #[must_use]
+    pub fn has_masks(&self) -> bool {
+        matches!(self.nuclei, NucleiFile::Labels(_))
+    }
+
+    /// The file of its image.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.image
+    }
+
+    /// Reads it. How bright a saturated pixel is, an image of 16 bits does not tell: 12, 14 or 16 bits are assumed, the fewest that hold it.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or its masks are of another size than the image.
+    pub fn read(&self, limits: &Limits) -> Result<FieldImage, Error> {
+        let image = LevelImage::read(&self.image, limits)?;
+        let channel = if image.channels == 3 { GREEN } else { 0 };
+        let grey: Vec<u16> = image.levels.iter().skip(channel).step_by(image.channels).copied().collect();
+        let brightest = grey.iter().copied().max().unwrap_or(0);
+        let deep = || DEEP.map(white).into_iter().find(|w| *w >= brightest).unwrap_or(u16::MAX);
+        let full = self.white.unwrap_or_else(|| if image.white == u16::MAX { deep() } else { image.white });
+        let nuclei = match &self.nuclei {
+            NucleiFile::Unknown => FieldNuclei::Unknown,
+            NucleiFile::Points(path) => FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?),
+            NucleiFile::Labels(path) => {
+                let labels = read_label_map(path, limits)?;
+                let size = |width: usize, len: usize| [width, len / width.max(1)];
+                let (mask, own) = (size(labels.width, labels.ids.len()), size(image.width, grey.len()));
+                if mask != own {
+                    return Err(Error::input(path)(Problem::MaskSize { mask, image: own }));
+                }
+                FieldNuclei::Labels(separate(labels, limits).map_err(Error::input(path))?)
+            }
+        };
+        Ok(FieldImage { width: image.width, grey, white: full.max(brightest), nuclei })
+    }
+}
+
+/// The fields in a folder, in the order of their names: a data set of ours with its masks of nuclei; or images (in the folder,
+/// or in `images`), with masks of the same names in `masks` (labels, or anything above 0), or for each image
+/// a table `NAME.csv` of `y,x` points beside it, and `frames.csv` that says which group each belongs to.
+///
+/// # Errors
+/// If there is no image, the folder cannot be read, or its tables make no sense.
+pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
+    if folder.join(layout::MANIFEST).exists() {
+        return of_dataset(folder);
+    }
+    let images = match image_files(folder) {
+        Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => image_files(&folder.join("images"))?,
+        other => other?,
+    };
+    let masks = if folder.join("masks").is_dir() { image_files(&folder.join("masks"))? } else { BTreeMap::new() };
+    let table = folder.join(GROUPS);
+    let mut groups = if table.exists() {
+        parse(&table, &Limits { max_file_bytes: TABLE_BYTES, ..Limits::default() }, groups)?
+    } else {
+        BTreeMap::new()
+    };
+    let field = |(name, image): (String, PathBuf)| {
+        let points = image.with_extension("csv");
+        let nuclei = match masks.get(&name) {
+            Some(mask) => NucleiFile::Labels(mask.clone()),
+            None if points.exists() => NucleiFile::Points(points),
+            None => NucleiFile::Unknown,
+        };
+        FieldFile { group: groups.remove(&name).unwrap_or_default(), name, pixel_um: None, image, nuclei, white: None }
+    };
+    Ok(images.into_iter().map(field).collect())
+}
+
+/// The whole frames of a data set; of a stack, its image with everything in focus.
+fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
+    let folder = Folder::new(path);
+    let identity = read_manifest(&folder)?.identity;
+    let mut fields = Vec::new();
+    for index in recorded_frames(&folder)? {
+        let Ok(record) = whole_record(&folder, &identity, index, Check::Sizes)? else { continue };
+        let frame = record.summary;
+        let image = match Form::of(frame.planes_um.len()) {
+            Form::Single => layout::image(index, Form::Single),
+            Form::Stack => layout::all_in_focus(index),
+        };
+        fields.push(FieldFile {
+            name: layout::frame_name(index),
+            group: String::new(),
+            pixel_um: Some(frame.pixel_um),
+            image: folder.path(&image),
+            nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
+            white: Some(white(frame.bits)),
+        });
+    }
+    if fields.is_empty() {
+        return Err(Error::Folder { path: path.to_owned(), message: "the data set has no whole frame".to_owned() });
+    }
+    Ok(fields)
+}
+
+/// A mask of one value alone becomes one label a connected region.
+fn separate(labels: LabelMap, limits: &Limits) -> Result<Vec<u32>, Problem> {
+    let first = labels.ids.iter().copied().find(|id| *id != 0);
+    if labels.ids.iter().any(|id| *id != 0 && Some(*id) != first) {
+        return Ok(labels.ids);
+    }
+    let mut ids = vec![0; labels.ids.len()];
+    for (id, region) in (1..).zip(components(&labels, limits)?) {
+        for run in region.mask.runs() {
+            let row = run.y as usize * labels.width;
+            ids[row + run.x0 as usize..row + run.x1 as usize].fill(id);
+        }
+    }
+    Ok(ids)
+}
+
+/// Points of a table of `y,x`, with or without a line that says so.
+fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
+    let mut points = Vec::new();
+    for (line, [y, x]) in rows(bytes)? {
+        let number = |text: &str| text.parse::<f64>().ok().filter(|v| v.is_finite());
+        match (number(&y), number(&x)) {
+            (Some(y), Some(x)) => points.push([x, y]),
+            _ if line == 1 && y == "y" && x == "x" => {}
+            _ => return Err(Problem::Row { line, message: format!("`{y},{x}`; two numbers are wanted: y,x in pixels") }),
+        }
+    }
+    Ok(points)
+}
+
+/// The group of each image, by its name.
+fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
+    let mut rows = rows(bytes)?.into_iter();
+    match rows.next() {
+        Some((_, header)) if header == GROUP_COLUMNS => Ok(rows.map(|(_, [frame, grade])| (frame, grade)).collect()),
+        _ => Err(Problem::Row { line: 1, message: format!("the columns wanted are {}", GROUP_COLUMNS.join(",")) }),
+    }
+}
+
+/// Lines of two values.
+fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| Problem::Broken { format: "CSV", message: e.to_string() })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let (Some(a), Some(b), 2) = (record.get(0), record.get(1), record.len()) else {
+            return Err(Problem::Row { line, message: format!("has {} values; two are wanted", record.len()) });
+        };
+        rows.push((line, [a.trim_start_matches('\u{feff}').to_owned(), b.to_owned()]));
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_read_y_first_with_or_without_a_header() {
+        assert_eq!(points(b"53,88\n73,1072\n").unwrap(), [[88.0, 53.0], [1072.0, 73.0]]);
+        assert_eq!(points(b"y,x\n1.5,2\n").unwrap(), [[2.0, 1.5]]);
+        assert_eq!(points(b"").unwrap(), [[0.0; 2]; 0]);
+        for bad in ["1,2,3", "1", "a,b", "1,nan", "1,2\ny,x"] {
+            assert!(matches!(points(bad.as_bytes()), Err(Problem::Row { .. })), "{bad}");
+        }
+    }
+
+    #[test]
+    fn groups_need_their_columns() {
+        assert_eq!(groups(b"frame,grade\na,N\nb,H\n").unwrap(), BTreeMap::from([("a".into(), "N".into()), ("b".into(), "H".into())]));
+        assert!(groups(b"a,N\n").is_err());
+        assert!(groups(b"").is_err());
+    }
+
+    #[test]
+    fn a_mask_of_one_value_falls_into_its_regions() {
+        let limits = Limits::default();
+        let map = |ids: &[u32]| LabelMap { width: 4, ids: ids.to_vec() };
+        assert_eq!(separate(map(&[255, 255, 0, 255]), &limits).unwrap(), [1, 1, 0, 2]);
+        assert_eq!(separate(map(&[7, 7, 0, 9]), &limits).unwrap(), [7, 7, 0, 9]);
+        assert_eq!(separate(map(&[0; 4]), &limits).unwrap(), [0; 4]);
+    }
+}
