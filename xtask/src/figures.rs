@@ -1,4 +1,4 @@
-//! The paper's figures with our own material.
+//! The paper's figures with our own material, and a picture book of debris.
 
 use std::fs;
 
@@ -11,15 +11,16 @@ use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "figures",
-    usage: "[NUMBER …]",
-    about: "redraws the paper's Figs. 1, 3-10, 12 and 13 with our own material",
-    details: "Writes target/figures/fig-01.png and so on; all of them, or those whose numbers are given.",
+    usage: "[FIGURE …]",
+    about: "redraws the paper's Figs. 1, 3-10, 12 and 13 with our own material, and a picture book of debris",
+    details: "Writes target/figures/fig-01.png and so on, and the picture book as fig-debris.png; all of them, or those that are given.",
     run,
 };
 
 /// A figure, and the example program that draws it to the path it is given.
 struct Figure {
-    number: u32,
+    /// Its number in the paper, or its name.
+    name: &'static str,
     shows: &'static str,
     package: &'static str,
     example: &'static str,
@@ -27,43 +28,50 @@ struct Figure {
     arguments: &'static [&'static str],
 }
 
-const fn engine(number: u32, shows: &'static str, arguments: &'static [&'static str]) -> Figure {
-    Figure { number, shows, package: "papsynth", example: "figures", arguments }
+const fn engine(name: &'static str, shows: &'static str, arguments: &'static [&'static str]) -> Figure {
+    Figure { name, shows, package: "papsynth", example: "figures", arguments }
 }
 
-const FIGURES: [Figure; 11] = [
-    engine(1, "bacilli, leukocytes, speckles, objects out of focus", &["1"]),
-    Figure { number: 3, shows: "drawn outlines", package: "fsd-shape", example: "sheet", arguments: &[] },
+const FIGURES: [Figure; 12] = [
+    engine("1", "bacilli, leukocytes, speckles, objects out of focus", &["1"]),
+    Figure { name: "3", shows: "drawn outlines", package: "fsd-shape", example: "sheet", arguments: &[] },
     Figure {
-        number: 4,
+        name: "4",
         shows: "patches and their overlaps",
         package: "quilt-texture",
         example: "nucleus",
         arguments: &[],
     },
-    engine(5, "a nucleus and its three donors", &["5"]),
-    Figure { number: 6, shows: "the sheet in its outline", package: "cloth-verlet", example: "figure", arguments: &[] },
-    engine(7, "levels of detail of a cytoplasm", &["7"]),
-    engine(8, "weight maps and what they scatter", &["8"]),
-    engine(9, "a cluster of leukocytes, step by step", &["9"]),
-    Figure { number: 10, shows: "blur with depth", package: "optics-psf", example: "depth", arguments: &[] },
-    engine(12, "a whole field", &["12"]),
-    engine(13, "high-grade cells", &["13"]),
+    engine("5", "a nucleus and its three donors", &["5"]),
+    Figure { name: "6", shows: "the sheet in its outline", package: "cloth-verlet", example: "figure", arguments: &[] },
+    engine("7", "levels of detail of a cytoplasm", &["7"]),
+    engine("8", "weight maps and what they scatter", &["8"]),
+    engine("9", "a cluster of leukocytes, step by step", &["9"]),
+    Figure { name: "10", shows: "blur with depth", package: "optics-psf", example: "depth", arguments: &[] },
+    engine("12", "a whole field", &["12"]),
+    engine("13", "high-grade cells", &["13"]),
+    Figure {
+        name: "debris",
+        shows: "every kind of debris with its name",
+        package: "papsynth",
+        example: "picture_book",
+        arguments: &[],
+    },
 ];
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let wanted = arguments.rest().into_iter().map(|word| {
-        let number = word.parse().ok().filter(|number| FIGURES.iter().any(|figure| figure.number == *number));
-        number.with_context(|| format!("`{word}` is no figure that is redrawn; expected 1, 3 to 10, 12 or 13"))
+        let figure = FIGURES.iter().find(|figure| figure.name == word).map(|figure| figure.name);
+        figure.with_context(|| format!("`{word}` is no figure that is redrawn; expected 1, 3 to 10, 12, 13 or debris"))
     });
-    let wanted: Vec<u32> = wanted.collect::<Result<_>>()?;
+    let wanted: Vec<&str> = wanted.collect::<Result<_>>()?;
     let folder = workspace.target.join("figures");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut table = String::new();
-    for figure in FIGURES.iter().filter(|figure| wanted.is_empty() || wanted.contains(&figure.number)) {
-        let Figure { number, shows, package, example, arguments } = figure;
+    for figure in FIGURES.iter().filter(|figure| wanted.is_empty() || wanted.contains(&figure.name)) {
+        let Figure { name, shows, package, example, arguments } = figure;
         workspace.expect_target(package, "example", example)?;
-        let path = folder.join(format!("fig-{number:02}.png"));
+        let path = folder.join(format!("fig-{name:0>2}.png"));
         let mut command = workspace.cargo();
         command
             .args(["run", "--quiet", "--release", "--package", package, "--example", example, "--"])
@@ -74,7 +82,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         let own = arguments.iter().map(|word| format!("{word} ")).collect::<String>();
         let place = workspace.shown(&path);
         table.push_str(&format!(
-            "Fig. {number:<3} {shows:<52} cargo run --release -p {package} --example {example} -- {own}{place}\n"
+            "Fig. {name:<7} {shows:<52} cargo run --release -p {package} --example {example} -- {own}{place}\n"
         ));
     }
     print!("{table}");

@@ -11,7 +11,7 @@ use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene};
 use crate::threads::{self, Threads};
 use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Passage, Slide};
-use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts};
+use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts, with_layers};
 
 /// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
 #[derive(Debug, Default)]
@@ -174,6 +174,7 @@ impl Rendering {
                 number += 1;
             }
         }
+        let mut objects = with_layers(objects);
         for group in Group::ALL {
             let chosen: Vec<usize> = (0..objects.len()).filter(|&i| objects[i].group() == group).collect();
             let painted: Vec<(u32, f64, &Mask)> =

@@ -449,7 +449,7 @@ fn nuclei_from_images_are_not_blurred_twice() {
     }];
     let mut recipe = small();
     recipe.debris = empty().debris;
-    recipe.cells.remove("superficial");
+    recipe.cells.retain(|class, _| class == "intermediate");
     recipe.nucleus.pyknotic = 0.0.into();
     recipe.slide.depth_um = 0.0.into();
     recipe.slide.stacking_um = 0.0.into();

@@ -66,7 +66,7 @@ impl Default for Bacilli {
             width_um: Number::normal(0.6, 0.05),
             bend_deg: Number::uniform(0.0, 35.0),
             chained: 0.12.into(),
-            absorbance: Number::log_normal(0.12, 0.35),
+            absorbance: Number::log_normal(0.09, 0.35),
             phase_rad: Number::uniform(0.1, 0.25),
         }
     }

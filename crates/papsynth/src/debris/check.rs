@@ -8,6 +8,9 @@ pub(crate) const MOST_PHASE_RAD: f64 = 3.0;
 /// Largest absorbance that a recipe may ask for.
 const DARKEST: f64 = 4.0;
 
+/// As far from the cells as the outside of a slide.
+const FARTHEST_UM: f64 = 1000.0;
+
 /// Largest amount of a dye.
 const MOST_DYE: f64 = 100.0;
 
@@ -47,6 +50,11 @@ impl<'a> Section<'a> {
 
     pub(crate) fn phase_rad(&mut self, field: &str, number: &Number) {
         self.number(field, number, -MOST_PHASE_RAD, MOST_PHASE_RAD);
+    }
+
+    /// Where something on the glass lies.
+    pub(crate) fn height_um(&mut self, field: &str, number: &Number) {
+        self.number(field, number, -FARTHEST_UM, FARTHEST_UM);
     }
 
     /// Amounts of dyes.

@@ -13,6 +13,8 @@ use crate::random;
 use crate::recipe::{DyeAmounts, Number};
 
 /// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
+///
+/// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Dirt {
@@ -54,15 +56,15 @@ pub struct Fleck {
 impl Default for Dirt {
     fn default() -> Self {
         Self {
-            drifts: Number::log_normal(14.0, 0.5),
+            drifts: Number::log_normal(20.0, 0.7),
             per_drift: Number::log_normal(4.0, 0.8).at_least(1.0),
             drift_um: Number::log_normal(22.0, 0.6),
-            length_um: Number::log_normal(2.0, 0.45),
+            length_um: Number::log_normal(2.1, 0.5),
             width_um: Number::log_normal(1.1, 0.35),
             aligned: 0.6.into(),
-            absorbance: Number::Drawn { law: crate::recipe::Law::LogNormal(0.045, 0.6), min: 0.01, max: 0.2 },
+            absorbance: Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15),
             phase_rad: Number::uniform(0.0, 0.12),
-            dyes: DyeAmounts { light_green: 1.4, haematein: 0.4, neutral: 0.2, ..DyeAmounts::none() },
+            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The slide on which debris is strewn: where its cells lie, and the clusters that lie among them.
 
+use super::ClueCells;
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
@@ -62,6 +63,11 @@ impl<'a> Ground<'a> {
         Self { field, stain, size_um: view.size_um(), cells, kind: "", section: "", objects }
     }
 
+    /// Gives cells their coats.
+    pub(super) fn dress(&mut self, clue_cells: &ClueCells) {
+        clue_cells.draw(self.field, self.objects);
+    }
+
     pub(super) fn begin(&mut self, kind: &'static str, section: &'static str) {
         (self.kind, self.section) = (kind, section);
     }
@@ -79,6 +85,11 @@ impl<'a> Ground<'a> {
     /// Dyes as this field was stained.
     pub(super) fn dyes(&self, dyes: &DyeAmounts) -> dye_spectra::Amounts {
         self.stain.balanced(dyes)
+    }
+
+    /// How strongly the field's nuclei are stained.
+    pub(super) fn nuclear_stain(&self) -> f64 {
+        self.stain.nucleus
     }
 
     /// Dyes of pale cytoplasm.
@@ -133,6 +144,7 @@ impl<'a> Ground<'a> {
             depth_um,
             rotation_deg,
             bethesda: String::new(),
+            coat: None,
             body,
         });
     }

@@ -52,7 +52,7 @@ pub struct Leukocytes {
     pub cell_um: Number,
     /// Probability that a lobed leukocyte is degenerated: its nucleus smudged, its cytoplasm frayed; 0 to 1.
     pub degenerated: Number,
-    /// Absorbance, 0 to 4.
+    /// Absorbance, 0 to 4, before the field's stain of nuclei.
     pub absorbance: Number,
     /// Absorbance of the pale cytoplasm round the nucleus, 0 to 4.
     pub halo: Number,
@@ -92,18 +92,14 @@ impl Default for Leukocytes {
             touching: 0.7.into(),
             on_cells: 0.45.into(),
             form: NucleusForm::Lobed,
-            radius_um: Number::normal(3.15, 0.28),
+            radius_um: Number::normal(3.2, 0.28),
             alpha: 0.10.into(),
             beta: 0.10.into(),
-            lobes: Number::Drawn {
-                law: crate::recipe::Law::Choice(vec![1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
-                min: f64::NEG_INFINITY,
-                max: f64::INFINITY,
-            },
-            cell_um: Number::normal(10.0, 0.7),
+            lobes: Number::choice([1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
+            cell_um: Number::normal(9.6, 0.7),
             degenerated: 0.2.into(),
-            absorbance: Number::normal(0.42, 0.06),
-            halo: Number::log_normal(0.12, 0.35),
+            absorbance: Number::normal(0.34, 0.05),
+            halo: Number::log_normal(0.10, 0.35),
         }
     }
 }
@@ -154,7 +150,7 @@ impl Kinds for Leukocytes {
                     lobes,
                     alpha: self.alpha.draw(&mut rng),
                     beta: self.beta.draw(&mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
+                    absorbance: self.absorbance.draw(&mut rng) * ground.nuclear_stain(),
                     halo: self.halo.draw(&mut rng),
                     cell_um,
                     degenerated,

@@ -5,15 +5,27 @@
 //! scene's bodies and the truth's classes. Adding a kind means adding its file and its entry.
 
 mod bacillus;
+mod bare_nucleus;
+mod bubble;
+mod candida;
 mod check;
+mod clue;
+mod coccus;
+mod crystal;
 mod dirt;
+mod dust;
+mod fibre;
 mod ground;
 mod leukocyte;
+mod mucus;
 mod out_of_focus;
 mod paint;
+mod red_cell;
+mod scratch;
 mod site;
 mod smudge;
 mod speckle;
+mod trichomonad;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,13 +34,26 @@ use crate::phantom::{Phantom, Pools};
 use crate::scene::{CellBody, Object, Scene};
 
 pub use bacillus::{Bacilli, Bacillus};
+pub use bare_nucleus::{BareNuclei, BareNucleus};
+pub use bubble::{Bubble, Bubbles};
+pub use candida::{Candida, Candidas, Growth};
 pub(crate) use check::{MOST_PHASE_RAD, Section};
+pub(crate) use clue::cover;
+pub use clue::{ClueCells, Coat};
+pub use coccus::{Cocci, Colony};
+pub use crystal::{Crystal, Crystals};
 pub use dirt::{Dirt, Fleck};
+pub use dust::{Dust, Grain};
+pub use fibre::{Fibre, Fibres};
 pub(crate) use ground::Ground;
 pub use leukocyte::{Leukocyte, Leukocytes, NucleusForm};
+pub use mucus::{Mucus, Strand};
 pub use out_of_focus::{Blob, OutOfFocus};
+pub use red_cell::{RedCell, RedCells};
+pub use scratch::{Scratch, Scratches};
 pub use smudge::{Smudge, Smudges};
 pub use speckle::{SpeckForm, Speckle, Speckles};
+pub use trichomonad::{Trichomonad, Trichomonads};
 
 use site::Site;
 
@@ -59,6 +84,8 @@ macro_rules! kinds {
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         pub struct Debris {
+            /// Clue cells: epithelial cells covered with coccobacilli.
+            pub clue_cells: ClueCells,
             $($(#[$doc])* pub $field: $Section,)*
         }
 
@@ -94,6 +121,14 @@ macro_rules! kinds {
             }
         }
 
+        impl Kind {
+            /// Whether all of it in an image is one row and one mask of the truth: a layer that nobody counts.
+            #[must_use]
+            pub fn is_layer(self) -> bool {
+                self == Self::Dirt
+            }
+        }
+
         impl Body {
             /// The kind of the object.
             #[must_use]
@@ -123,11 +158,15 @@ macro_rules! kinds {
             /// A slide with nothing but cells.
             #[must_use]
             pub fn none() -> Self {
-                Self { $($field: $Section::none(),)* }
+                Self { clue_cells: ClueCells::none(), $($field: $Section::none(),)* }
             }
 
             /// Finds what is out of range; `find` is told the section's name.
             pub(crate) fn check(&self, find: &mut impl FnMut(&str, &str, String)) {
+                {
+                    let mut add = |field: &str, message: String| find("clue_cells", field, message);
+                    self.clue_cells.check(&mut Section::new(&mut add));
+                }
                 $({
                     let mut add = |field: &str, message: String| find(stringify!($field), field, message);
                     self.$field.check(&mut Section::new(&mut add));
@@ -136,6 +175,7 @@ macro_rules! kinds {
 
             /// Draws everything that lies on a slide with these cells.
             pub(crate) fn draw(&self, ground: &mut Ground<'_>) {
+                ground.dress(&self.clue_cells);
                 $(
                     ground.begin($name, stringify!($field));
                     self.$field.draw(ground);
@@ -167,4 +207,29 @@ kinds! {
     smudges: Smudges => Smudge(Smudge), "smudge";
     /// Faint flecks of background dirt.
     dirt: Dirt => Dirt(Fleck), "dirt";
+    /// Cocci and coccobacilli, colony by colony.
+    cocci: Cocci => Coccus(Colony), "coccus";
+    /// *Candida*: pseudohyphae and budding yeasts.
+    candida: Candidas => Candida(Candida), "candida";
+    /// Trichomonads, pale pear-shaped flagellates.
+    trichomonads: Trichomonads => Trichomonad(Trichomonad), "trichomonad";
+    /// Red blood cells and their ghosts.
+    red_cells: RedCells => RedCell(RedCell), "red-cell";
+    /// Strands of mucus.
+    mucus: Mucus => Mucus(Strand), "mucus";
+    /// Bare nuclei.
+    bare_nuclei: BareNuclei => BareNucleus(BareNucleus), "bare-nucleus";
+    /// Precipitated dye: dark, angular, refracting grains.
+    crystals: Crystals => Crystal(Crystal), "crystal";
+    /// Dust on the glass, out of focus.
+    dust: Dust => Dust(Grain), "dust";
+    /// Fibres of cotton and cloth.
+    fibres: Fibres => Fibre(Fibre), "fibre";
+    /// Air bubbles in the mountant.
+    bubbles: Bubbles => Bubble(Bubble), "bubble";
+    /// Scratches in the glass.
+    scratches: Scratches => Scratch(Scratch), "scratch";
 }
+
+#[cfg(test)]
+mod tests;

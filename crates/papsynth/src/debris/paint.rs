@@ -53,8 +53,17 @@ impl Painting {
         Self { absorbance: coverage.blank(), coverage }
     }
 
-    /// Adds a stroke that absorbs so much where it covers a pixel.
+    /// Adds a stroke that absorbs so much where it covers a pixel, on top of what is there.
     pub(super) fn stroke(&mut self, stroke: &Stroke, absorbance: f64) {
+        self.blend(stroke, |value, share| *value += share * absorbance as f32);
+    }
+
+    /// The same beside what is there: where strokes meet, the darker one counts.
+    pub(super) fn line(&mut self, stroke: &Stroke, absorbance: f64) {
+        self.blend(stroke, |value, share| *value = value.max(share * absorbance as f32));
+    }
+
+    fn blend(&mut self, stroke: &Stroke, add: impl Fn(&mut f32, f32)) {
         let (width, height) = (self.coverage.width, self.coverage.height());
         let reach = stroke.half_widths[0].max(stroke.half_widths[1]) + 1.0;
         let origin = self.coverage.origin.map(|at| at as f64);
@@ -67,14 +76,30 @@ impl Painting {
         };
         for y in span(1, height) {
             for x in span(0, width) {
-                let share = stroke.share([x as f64 + origin[0], y as f64 + origin[1]]);
+                let share = stroke.share([x as f64 + origin[0], y as f64 + origin[1]]) as f32;
                 if share > 0.0 {
                     let at = y * width + x;
                     let cover = &mut self.coverage.values[at];
-                    *cover = cover.max(share as f32);
-                    self.absorbance.values[at] += (share * absorbance) as f32;
+                    *cover = cover.max(share);
+                    add(&mut self.absorbance.values[at], share);
                 }
             }
+        }
+    }
+
+    /// Adds a polygon of even absorbance.
+    pub(super) fn fill(&mut self, polygon: &[Point], absorbance: f64) {
+        let mut shape = self.coverage.blank();
+        shape.cover(polygon);
+        self.lay(&shape, |share| share * absorbance as f32);
+    }
+
+    /// Adds a tile of the painting's own size, of which each share of a pixel absorbs so much.
+    pub(super) fn lay(&mut self, shape: &Tile, absorbance: impl Fn(f32) -> f32) {
+        let values = self.coverage.values.iter_mut().zip(&mut self.absorbance.values);
+        for ((cover, value), share) in values.zip(&shape.values) {
+            *cover = cover.max(*share);
+            *value += absorbance(*share);
         }
     }
 

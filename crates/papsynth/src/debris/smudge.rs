@@ -64,14 +64,14 @@ impl Default for Smudges {
         Self {
             count: Number::log_normal(7.0, 0.8),
             on_cells: 0.25.into(),
-            diameter_um: Number::Drawn { law: crate::recipe::Law::LogNormal(5.5, 0.65), min: 2.0, max: 45.0 },
+            diameter_um: Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0),
             elongation: Number::log_normal(1.5, 0.3).at_least(1.0),
             grain_um: Number::uniform(0.6, 1.1),
             granularity: Number::uniform(0.3, 0.7),
             ragged: Number::uniform(0.6, 1.3),
-            absorbance: Number::Drawn { law: crate::recipe::Law::LogNormal(0.085, 0.6), min: 0.015, max: 0.4 },
+            absorbance: Number::log_normal(0.05, 0.65).at_least(0.012).at_most(0.4),
             phase_rad: Number::uniform(0.0, 0.2),
-            dyes: DyeAmounts { light_green: 1.6, haematein: 0.3, eosin_y: 0.3, neutral: 0.2, ..DyeAmounts::none() },
+            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
         }
     }
 }

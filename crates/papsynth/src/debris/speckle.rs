@@ -57,7 +57,7 @@ impl Default for Speckles {
             count: Number::log_normal(6.0, 0.7),
             form: SpeckForm::Round,
             dilations: Number::log_normal(0.35, 0.9),
-            absorbance: Number::log_normal(0.12, 0.6),
+            absorbance: Number::log_normal(0.09, 0.6),
             phase_rad: Number::normal(0.25, 0.15),
         }
     }

@@ -66,9 +66,13 @@ pub(crate) fn make(
             _ => None,
         })
         .collect();
-    let mut cells = cell::make(studio, scene, pools, &cells)?.into_iter();
-    let made = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
-    Ok(objects.iter().map(made).map(Option::unwrap_or_default).collect())
+    let mut made = cell::make(studio, scene, pools, &cells)?;
+    for ((object, _), phantom) in cells.iter().zip(&mut made) {
+        debris::cover(scene, pools, object, phantom);
+    }
+    let mut cells = made.into_iter();
+    let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
+    Ok(objects.iter().map(&mut phantom).map(Option::unwrap_or_default).collect())
 }
 
 /// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.

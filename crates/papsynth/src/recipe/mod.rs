@@ -16,7 +16,10 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use crate::debris::{Bacilli, Debris, Dirt, Leukocytes, NucleusForm, OutOfFocus, Smudges, SpeckForm, Speckles};
+pub use crate::debris::{
+    Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
+    NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
+};
 pub use check::Problem;
 pub use imaging::{
     Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,

@@ -79,6 +79,12 @@ impl Number {
         Self::law(Law::LogNormal(median, log_sd))
     }
 
+    /// One of these values, all equally likely.
+    #[must_use]
+    pub fn choice(values: impl Into<Vec<f64>>) -> Self {
+        Self::law(Law::Choice(values.into()))
+    }
+
     fn law(law: Law) -> Self {
         Self::Drawn { law, min: f64::NEG_INFINITY, max: f64::INFINITY }
     }
@@ -89,6 +95,15 @@ impl Number {
         match self {
             Self::Drawn { law, min, max } => Self::Drawn { law, min: min.max(floor), max },
             Self::Fixed(value) => Self::Fixed(value.max(floor)),
+        }
+    }
+
+    /// Cuts the number above.
+    #[must_use]
+    pub fn at_most(self, ceiling: f64) -> Self {
+        match self {
+            Self::Drawn { law, min, max } => Self::Drawn { law, min, max: max.min(ceiling) },
+            Self::Fixed(value) => Self::Fixed(value.min(ceiling)),
         }
     }
 

@@ -31,7 +31,7 @@ impl Default for Slide {
             relief_um: 90.0.into(),
             median_um: 20.0.into(),
             stacking_um: 0.6.into(),
-            spacing_um: 9.0.into(),
+            spacing_um: Number::uniform(10.0, 18.0),
             fields: 16,
         }
     }
@@ -88,7 +88,7 @@ pub(super) mod defaults {
     }
 
     pub(crate) fn radius_um() -> Number {
-        Number::uniform(18.0, 45.0)
+        Number::uniform(14.0, 34.0)
     }
 
     pub(crate) fn width_um() -> Number {
@@ -309,23 +309,23 @@ impl Default for Cytoplasm {
             sheet: Sheet::Xpbd,
             excess: Number::uniform(1.04, 1.16),
             folds: Folds::default(),
-            corners: Number::uniform(0.35, 0.9),
-            notches: Number::uniform(0.0, 1.4),
-            tongues: Number::uniform(0.0, 1.2),
+            corners: Number::uniform(0.15, 0.65),
+            notches: Number::uniform(0.0, 3.0),
+            tongues: Number::uniform(0.0, 2.4),
             wrinkles: Number::log_normal(7.0, 0.6),
             wrinkle: Number::log_normal(0.5, 0.45),
             wrinkle_um: Number::uniform(0.18, 0.42),
-            endoplasm: Number::log_normal(0.22, 0.5),
-            clouds: Number::uniform(0.03, 0.10),
-            clouds_um: 3.0.into(),
+            endoplasm: Number::log_normal(0.16, 0.5),
+            clouds: Number::uniform(0.06, 0.22),
+            clouds_um: Number::uniform(2.5, 9.0),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
             flecks_threshold: Number::uniform(0.55, 0.85),
             cytoskeleton: Number::uniform(0.05, 0.18),
             grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::log_normal(0.35, 0.6),
-            rim_um: Number::uniform(0.3, 1.5),
+            fray_um: Number::log_normal(0.55, 0.5),
+            rim_um: Number::log_normal(2.0, 0.4),
             phase_rad: Number::uniform(0.05, 0.15),
         }
     }
@@ -428,7 +428,7 @@ impl Default for Nucleus {
             wrinkled: 0.15.into(),
             rim: Number::uniform(0.0, 0.2),
             dome: Number::uniform(0.3, 0.85),
-            wedge: 0.12.into(),
+            wedge: 0.2.into(),
         }
     }
 }

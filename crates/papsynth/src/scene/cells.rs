@@ -62,6 +62,7 @@ pub(super) fn draw_cells(
                 depth_um: relief.at(place.centre_um) + stacking,
                 rotation_deg,
                 bethesda: class.bethesda.clone(),
+                coat: None,
                 body: Body::Cell(Box::new(body)),
             });
         }

@@ -25,7 +25,7 @@ impl FieldNumbers {
         self.key.stream("field", 0, path)
     }
 
-    pub(super) fn draw(&self, path: &str, number: &Number) -> f64 {
+    pub(crate) fn draw(&self, path: &str, number: &Number) -> f64 {
         number.draw(&mut self.stream(path))
     }
 

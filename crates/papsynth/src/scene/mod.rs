@@ -16,7 +16,10 @@ use serde::Serialize;
 use crate::key::Key;
 use crate::recipe::{Binning, Imaging, Mixing, PhotonNoise, Rendition, Restore, Subsampling};
 
-pub use crate::debris::{Bacillus, Blob, Body, Fleck, Kind, Leukocyte, Smudge, Speckle};
+pub use crate::debris::{
+    Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Kind,
+    Leukocyte, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
+};
 pub(crate) use cells::unknown_class;
 pub(crate) use draw::FieldNumbers;
 pub use draw::draw;
@@ -358,6 +361,9 @@ pub struct Object {
     pub rotation_deg: f64,
     /// Category of the Bethesda system, of a cell whose class has one; else empty.
     pub bethesda: String,
+    /// The bacteria that cover it, if it is a clue cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coat: Option<Coat>,
     /// What it is.
     pub body: Body,
 }

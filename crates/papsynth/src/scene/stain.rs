@@ -21,7 +21,7 @@ pub(crate) struct FieldStain<'a> {
     /// Factor on the absorbance of cytoplasm.
     pub(super) cytoplasm: f64,
     /// Factor on the absorbance of nuclei.
-    pub(super) nucleus: f64,
+    pub(crate) nucleus: f64,
     /// Factor on the contrast of the texture inside nuclei.
     pub(super) texture: f64,
     /// Factors on the amounts of dyes.

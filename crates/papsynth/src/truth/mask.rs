@@ -71,6 +71,21 @@ impl Mask {
         Self { runs }
     }
 
+    /// All pixels of these masks.
+    #[must_use]
+    pub fn union<'a>(masks: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut all: Vec<Run> = masks.into_iter().flat_map(|mask| &mask.runs).copied().collect();
+        all.sort_unstable_by_key(|run| (run.y, run.x0));
+        let mut runs: Vec<Run> = Vec::with_capacity(all.len());
+        for run in all {
+            match runs.last_mut() {
+                Some(last) if last.y == run.y && run.x0 <= last.x1 => last.x1 = last.x1.max(run.x1),
+                _ => runs.push(run),
+            }
+        }
+        Self { runs }
+    }
+
     /// The runs in raster order.
     #[must_use]
     pub fn runs(&self) -> &[Run] {
@@ -142,6 +157,16 @@ fn run(y: i64, left: i64, from: usize, to: usize) -> Run {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_union_has_every_pixel_once() {
+        let masks = [[0.0, 1.0, 1.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]]
+            .map(|tile| Mask::from_tile(&tile, 3, [0, 0], 9, 9, |v| v > 0.5));
+        let union = Mask::union(&masks);
+        let pixels: std::collections::BTreeSet<usize> = masks.iter().flat_map(|mask| mask.pixels(9)).collect();
+        assert_eq!(union.pixels(9).collect::<Vec<_>>(), pixels.into_iter().collect::<Vec<_>>());
+        assert_eq!(union, Mask::from_runs(union.runs().to_vec()), "its runs do not touch");
+    }
 
     #[test]
     fn a_tile_is_clipped_and_measured_as_by_hand() {

@@ -3,12 +3,14 @@
 //! Truth comes from the scene and from exact coverage, never from the image.
 
 mod labels;
+mod layer;
 mod mask;
 
 use crate::scene::Kind;
 
 pub(crate) use labels::fronts;
 pub use labels::{LabelMap, front_masks};
+pub(crate) use layer::with_layers;
 pub use mask::{Bounds, Mask, Run};
 
 /// Coverage from which on a pixel belongs to a mask.
@@ -116,6 +118,7 @@ pub struct Truth {
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out.
+    /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out,
+    /// and all objects of a [layer](Kind::is_layer) share one.
     pub objects: Vec<ObjectTruth>,
 }

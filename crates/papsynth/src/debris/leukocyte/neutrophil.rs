@@ -44,7 +44,7 @@ const VACUOLE_UM: f64 = 0.3;
 
 /// Width of the darker border of the cytoplasm, µm, and how much darker it is.
 const BORDER_UM: f64 = 0.5;
-const BORDER: f32 = 0.35;
+const BORDER: f32 = 0.2;
 
 pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let mut rng = site.stream("shape");

@@ -139,6 +139,9 @@ fn poked(outline: &[Point], depth: f64, rng: &mut Stream) -> Vec<Point> {
         .collect()
 }
 
+/// Strength of the jags of a torn rim, a few micrometres long, relative to its fraying.
+const JAGGED: f64 = 2.0;
+
 /// An outline whose points are pushed in and out a little, finely and unevenly: the frayed rim of a real cell.
 pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mut Stream) -> Vec<Point> {
     if depth_px < 0.05 || outline.len() < 3 {
@@ -147,7 +150,7 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
     let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
     let fine = fsd_shape::resample(outline, count);
     // Slow waves say where the rim is frayed, quick ones how: a first-order autoregression of either.
-    let (mut slow, mut quick) = (random::normal(rng), random::normal(rng));
+    let (mut slow, mut quick, mut middle) = (random::normal(rng), random::normal(rng), random::normal(rng));
     let step = |state: f64, memory: f64, rng: &mut Stream| {
         memory * state + (1.0 - memory * memory).sqrt() * random::normal(rng)
     };
@@ -155,10 +158,12 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
         .map(|i| {
             slow = step(slow, 0.985, rng);
             quick = step(quick, 0.6, rng);
+            middle = step(middle, 0.88, rng);
             let [before, here, after] = [fine[(i + count - 1) % count], fine[i], fine[(i + 1) % count]];
             let (tx, ty) = (after[0] - before[0], after[1] - before[1]);
             let length = (tx * tx + ty * ty).sqrt().max(1e-9);
-            let push = (0.5 * depth_px * quick * (0.35 + slow.max(0.0))).clamp(-2.0 * depth_px, 2.0 * depth_px);
+            let frayed = quick * (0.35 + slow.max(0.0)) + JAGGED * middle;
+            let push = (0.5 * depth_px * frayed).clamp(-2.5 * depth_px, 2.5 * depth_px);
             [here[0] + push * ty / length, here[1] - push * tx / length]
         })
         .collect()

@@ -1,12 +1,13 @@
 //! Recipes to start from: what a slide looks like.
 
+mod paper;
+
 use std::collections::BTreeMap;
 
 use super::specimen::defaults;
 use super::{
-    Acceptance, Bacilli, Background, Camera, CameraPreset, CellMix, Chromatin, Cytoplasm, Debris, DyeAmounts, Field,
-    Focus, Folds, Group, GroupForm, Illumination, Layout, Leukocytes, Light, Nucleus, NucleusForm, Number, Optics, OutOfFocus, Picture,
-    RECIPE_VERSION, Recipe, Restore, Seam, ShapeSpread, Sheet, Slide, SpeckForm, Speckles, Stain, TintMix,
+    Background, Camera, CellMix, Cytoplasm, Debris, Field, Focus, Group, GroupForm, Layout, Light, Nucleus, Number,
+    Optics, Picture, RECIPE_VERSION, Recipe, Slide, Stain, TintMix,
 };
 
 /// A named recipe.
@@ -20,18 +21,26 @@ pub enum Preset {
     Sparse,
     /// A field that is covered with cells several layers deep.
     Dense,
-    /// A field with cells of a high-grade lesion (HSIL), as in the paper's Fig. 13.
-    HighGrade,
-    /// Many leukocytes and bacteria.
-    Inflamed,
+    /// A conventional smear: thick, uneven, with blood, mucus and leukocytes.
+    Conventional,
     /// Cells of a low-grade lesion (LSIL), many with a cleared space round the nucleus.
     Lsil,
+    /// A field with cells of a high-grade lesion (HSIL), as in the paper's Fig. 13.
+    HighGrade,
     /// Squamous carcinoma.
     Carcinoma,
     /// A smear of atrophy: parabasal and basal cells.
     Atrophic,
     /// Palisades and honeycombs of endocervical cells, metaplastic cells.
     Endocervical,
+    /// Many leukocytes, bacteria and debris.
+    Inflamed,
+    /// Bacterial vaginosis: clue cells and clouds of cocci, no lactobacilli.
+    BacterialVaginosis,
+    /// *Candida*: pseudohyphae and yeasts among inflamed cells.
+    Candida,
+    /// Trichomonads among inflamed cells.
+    Trichomonas,
     /// Squames of the oral mucosa: another smear, of classes of its own.
     Oral,
     /// The default slide as a scanner shows it that fuses planes to pictures of extended focus.
@@ -40,57 +49,57 @@ pub enum Preset {
 
 impl Preset {
     /// All presets.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 16] = [
         Self::Lbc,
         Self::Paper2015,
         Self::Sparse,
         Self::Dense,
+        Self::Conventional,
         Self::Lsil,
         Self::HighGrade,
         Self::Carcinoma,
-        Self::Inflamed,
         Self::Atrophic,
         Self::Endocervical,
+        Self::Inflamed,
+        Self::BacterialVaginosis,
+        Self::Candida,
+        Self::Trichomonas,
         Self::Oral,
         Self::ExtendedFocus,
     ];
 
+    /// Its name, what it shows in a line, and its recipe.
+    fn entry(self) -> (&'static str, &'static str, fn() -> Recipe) {
+        match self {
+            Self::Lbc => ("lbc", "liquid-based cytology: free cells and small groups (default)", lbc),
+            Self::Paper2015 => ("paper-2015", "the simulator of the 2015 paper, with the values of its released code", paper::recipe),
+            Self::Sparse => ("sparse", "few cells, hardly any debris", sparse),
+            Self::Dense => ("dense", "covered with cells, several layers deep", dense),
+            Self::Conventional => ("conventional", "a conventional smear: thick and uneven, with blood, mucus and leukocytes", conventional),
+            Self::Lsil => ("lsil", "cells of a low-grade lesion, koilocytes among them", lsil),
+            Self::HighGrade => ("high-grade", "cells of a high-grade lesion among normal ones", high_grade),
+            Self::Carcinoma => ("carcinoma", "squamous carcinoma: cells of every form, leukocytes, debris", carcinoma),
+            Self::Atrophic => ("atrophic", "atrophy: parabasal and basal cells", atrophic),
+            Self::Endocervical => ("endocervical", "palisades and honeycombs of endocervical cells, metaplastic cells", endocervical),
+            Self::Inflamed => ("inflamed", "many leukocytes, bacteria and debris", inflamed),
+            Self::BacterialVaginosis => ("bacterial-vaginosis", "bacterial vaginosis: clue cells and clouds of cocci", bacterial_vaginosis),
+            Self::Candida => ("candida", "Candida: pseudohyphae and budding yeasts", candida),
+            Self::Trichomonas => ("trichomonas", "trichomonads among leukocytes", trichomonas),
+            Self::Oral => ("oral", "the oral mucosa: another smear, made of a class file and a few lines", oral),
+            Self::ExtendedFocus => ("extended-focus", "the default slide from a scanner that fuses planes, 0.33 µm a pixel", extended_focus),
+        }
+    }
+
     /// The name of the preset, as the command line knows it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Lbc => "lbc",
-            Self::Paper2015 => "paper-2015",
-            Self::Sparse => "sparse",
-            Self::Dense => "dense",
-            Self::HighGrade => "high-grade",
-            Self::Inflamed => "inflamed",
-            Self::Lsil => "lsil",
-            Self::Carcinoma => "carcinoma",
-            Self::Atrophic => "atrophic",
-            Self::Endocervical => "endocervical",
-            Self::Oral => "oral",
-            Self::ExtendedFocus => "extended-focus",
-        }
+        self.entry().0
     }
 
     /// What the preset shows, in a line.
     #[must_use]
     pub fn summary(self) -> &'static str {
-        match self {
-            Self::Lbc => "liquid-based cytology: free cells and small groups (default)",
-            Self::Paper2015 => "the simulator of the 2015 paper, with the values of its released code",
-            Self::Sparse => "few cells, hardly any debris",
-            Self::Dense => "covered with cells, several layers deep",
-            Self::HighGrade => "cells of a high-grade lesion among normal ones",
-            Self::Inflamed => "many leukocytes and bacteria",
-            Self::Lsil => "cells of a low-grade lesion, koilocytes among them",
-            Self::Carcinoma => "squamous carcinoma: cells of every form, leukocytes, debris",
-            Self::Atrophic => "atrophy: parabasal and basal cells",
-            Self::Endocervical => "palisades and honeycombs of endocervical cells, metaplastic cells",
-            Self::Oral => "the oral mucosa: another smear, of a class file and a few lines",
-            Self::ExtendedFocus => "the default slide as a scanner shows it, planes fused to extended focus, .33 um a pixel",
-        }
+        self.entry().1
     }
 
     /// The preset of a name.
@@ -102,24 +111,10 @@ impl Preset {
     /// The recipe.
     #[must_use]
     pub fn recipe(self) -> Recipe {
-        match self {
-            Self::Lbc => lbc(),
-            Self::Paper2015 => paper(),
-            Self::Sparse => sparse(),
-            Self::Dense => dense(),
-            Self::HighGrade => high_grade(),
-            Self::Inflamed => inflamed(),
-            Self::Lsil => lsil(),
-            Self::Carcinoma => carcinoma(),
-            Self::Atrophic => atrophic(),
-            Self::Endocervical => endocervical(),
-            Self::Oral => oral(),
-            Self::ExtendedFocus => extended_focus(),
-        }
+        self.entry().2()
     }
 }
 
-/// Numbers of cells of a class that lie in groups of a form; the groups' sizes are drawn up to the largest.
 fn grouped(recipe: &mut Recipe, class: &str, count: Number, form: GroupForm, size: Number, distance: Number) {
     let group = Group { form, size, distance };
     recipe.cells.insert(class.to_owned(), CellMix { count, group, ..CellMix::default() });
@@ -181,16 +176,16 @@ fn extended_focus() -> Recipe {
         planes: 11.0.into(),
         step_um: 1.0.into(),
         picture: Picture::Extended,
-        fused_noise_across: Number::uniform(0.20, 0.30),
-        fused_noise_down: Number::uniform(0.36, 0.46),
+        fused_noise_across: Number::uniform(0.24, 0.34),
+        fused_noise_down: Number::uniform(0.40, 0.48),
         ..recipe.focus
     };
     if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
-        *extra_blur_um = Number::uniform(0.30, 0.52);
+        *extra_blur_um = Number::uniform(0.30, 0.54);
     }
-    recipe.camera.full_well_e = 60_000.0.into();
-    recipe.camera.read_noise_e = Number::uniform(180.0, 480.0);
-    recipe.stain.field_texture = Number::log_normal(0.34, 0.3);
+    recipe.camera.full_well_e = 40_000.0.into();
+    recipe.camera.read_noise_e = Number::uniform(90.0, 300.0);
+    recipe.stain.field_texture = Number::log_normal(0.35, 0.3);
     recipe
 }
 
@@ -234,10 +229,13 @@ fn sparse() -> Recipe {
     let mut recipe = lbc();
     recipe.layout = Layout::Uniform {};
     recipe.cells = mix([("intermediate", Number::uniform(3.0, 8.0)), ("superficial", Number::uniform(1.0, 4.0))]);
-    recipe.debris.leukocytes.clusters = Number::uniform(0.0, 2.0);
-    recipe.debris.bacilli.clusters = Number::uniform(0.0, 3.0);
-    recipe.debris.speckles.count = Number::uniform(10.0, 50.0);
-    recipe.debris.out_of_focus.count = Number::uniform(0.0, 1.0);
+    let debris = &mut recipe.debris;
+    debris.leukocytes.clusters = Number::log_normal(0.8, 0.7);
+    debris.bacilli.clusters = Number::uniform(0.0, 3.0);
+    debris.speckles.count = Number::log_normal(2.5, 0.7);
+    debris.smudges.count = Number::log_normal(2.0, 0.7);
+    debris.dirt.drifts = Number::log_normal(7.0, 0.6);
+    debris.out_of_focus.count = Number::uniform(0.0, 1.0);
     recipe
 }
 
@@ -255,6 +253,29 @@ fn dense() -> Recipe {
     recipe
 }
 
+/// Spread by hand and dried: thick and uneven, material in strands, blood and leukocytes over everything.
+fn conventional() -> Recipe {
+    let mut recipe = dense();
+    recipe.layout = Layout::Swath { width_um: Number::uniform(60.0, 140.0), outside: Number::uniform(0.1, 0.3) };
+    recipe.cells = mix([
+        ("intermediate", Number::uniform(35.0, 70.0)),
+        ("superficial", Number::uniform(10.0, 30.0)),
+        ("parabasal", Number::uniform(0.0, 6.0)),
+    ]);
+    recipe.slide.depth_um = Number::uniform(6.0, 16.0);
+    recipe.slide.stacking_um = 2.5.into();
+    recipe.cytoplasm.folds.flap = 0.5.into();
+    recipe.cytoplasm.folds.cigar = 0.06.into();
+    let debris = &mut recipe.debris;
+    debris.leukocytes.clusters = Number::uniform(15.0, 50.0);
+    debris.leukocytes.degenerated = 0.4.into();
+    debris.red_cells.clusters = Number::uniform(3.0, 14.0);
+    debris.mucus.strands = Number::uniform(2.0, 8.0);
+    debris.smudges.count = Number::log_normal(40.0, 0.5);
+    debris.bare_nuclei.count = Number::log_normal(3.0, 0.7);
+    recipe
+}
+
 fn high_grade() -> Recipe {
     let mut recipe = lbc();
     recipe.cells = mix([
@@ -267,147 +288,54 @@ fn high_grade() -> Recipe {
 
 fn inflamed() -> Recipe {
     let mut recipe = lbc();
-    recipe.debris.leukocytes.clusters = Number::uniform(20.0, 60.0);
-    recipe.debris.leukocytes.per_cluster = Number::log_normal(5.0, 0.9).at_least(1.0);
-    recipe.debris.leukocytes.cluster_um = Number::uniform(4.0, 14.0);
-    recipe.debris.bacilli.clusters = Number::uniform(20.0, 50.0);
-    recipe.debris.bacilli.per_cluster = Number::log_normal(25.0, 0.7).at_least(1.0);
+    let debris = &mut recipe.debris;
+    debris.leukocytes.clusters = Number::uniform(15.0, 40.0);
+    debris.leukocytes.per_cluster = Number::log_normal(4.0, 0.9).at_least(1.0);
+    debris.leukocytes.degenerated = 0.3.into();
+    debris.bacilli.clusters = Number::uniform(4.0, 15.0);
+    debris.cocci.colonies = Number::log_normal(4.0, 0.6);
+    debris.smudges.count = Number::log_normal(25.0, 0.5);
+    debris.mucus.strands = Number::log_normal(1.5, 0.6);
+    debris.red_cells.clusters = Number::log_normal(1.5, 0.8);
+    debris.bare_nuclei.count = Number::log_normal(2.0, 0.7);
     recipe
 }
 
-/// The values of the paper where it states them, else those of the authors' released code.
-fn paper() -> Recipe {
+fn bacterial_vaginosis() -> Recipe {
     let mut recipe = lbc();
-    recipe.slide = Slide {
-        depth_um: 0.4.into(),
-        relief_um: 60.0.into(),
-        median_um: 8.0.into(),
-        stacking_um: 0.0.into(),
-        spacing_um: 0.0.into(),
-        fields: 1,
-    };
-    recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
-    recipe.cells = mix([("intermediate", 30.0.into())]);
-    recipe.cytoplasm = Cytoplasm {
-        shape: ShapeSpread::Independent,
-        sheet: Sheet::Verlet,
-        excess: 1.0.into(),
-        folds: Folds { flap: 0.0.into(), roll: 0.0.into(), cigar: 0.0.into(), ..Folds::default() },
-        corners: 0.0.into(),
-        notches: 0.0.into(),
-        tongues: 0.0.into(),
-        wrinkles: 0.0.into(),
-        wrinkle: 0.0.into(),
-        wrinkle_um: 0.3.into(),
-        endoplasm: 0.0.into(),
-        clouds: 0.2.into(),
-        clouds_um: 1.75.into(),
-        flecks: 0.7.into(),
-        flecks_threshold: 0.5.into(),
-        cytoskeleton: 0.3.into(),
-        grain: 0.0.into(),
-        granular: 0.0.into(),
-        granules: 0.0.into(),
-        fray_um: 0.0.into(),
-        rim_um: 0.0.into(),
-        phase_rad: 0.0.into(),
-    };
-    recipe.nucleus = Nucleus {
-        shape: ShapeSpread::Independent,
-        chromatin: Chromatin::Quilt,
-        acceptance: Acceptance::Threshold,
-        d_max: 0.06.into(),
-        seam: Seam::Feather,
-        restore: Restore::AfterDetection,
-        pyknotic: 0.0.into(),
-        wrinkled: 0.0.into(),
-        rim: 0.0.into(),
-        dome: 0.0.into(),
-        wedge: 0.0.into(),
-        ..Nucleus::default()
-    };
-    // The paper's stain is a grey value.
-    recipe.stain = Stain {
-        slide_cytoplasm: 1.0.into(),
-        slide_nucleus: 1.0.into(),
-        field_cytoplasm: 1.0.into(),
-        field_nucleus: 1.0.into(),
-        field_texture: 1.0.into(),
-        slide_balance: 0.0.into(),
-        field_balance: 0.0.into(),
-        cell_balance: 0.0.into(),
-        cyanophilic: DyeAmounts::grey(),
-        eosinophilic: DyeAmounts::grey(),
-        orangeophilic: DyeAmounts::grey(),
-        nucleus: DyeAmounts::grey(),
-        bacillus: DyeAmounts::grey(),
-        speckle: DyeAmounts::grey(),
-    };
-    recipe.debris = paper_debris();
-    recipe.background = Background {
-        level: (235.0 / 255.0).into(),
-        illumination: Illumination::Border { exponent: 0.02.into() },
-        scatter: (10.0 / 255.0).into(),
-        scatter_um: 55.0.into(),
-    };
-    // 70 photo-electrons a grey level of 8 bits; the released read noise is one grey level.
-    recipe.camera = CameraPreset::Paper.camera();
-    recipe.optics = Optics::gaussian();
+    let debris = &mut recipe.debris;
+    debris.clue_cells.share = Number::uniform(0.3, 0.7);
+    debris.clue_cells.density = Number::uniform(2.0, 6.0);
+    debris.cocci.colonies = Number::log_normal(14.0, 0.5);
+    debris.cocci.per_colony = Number::log_normal(60.0, 0.9).at_least(2.0);
+    debris.bacilli.clusters = 0.0.into();
+    debris.smudges.count = Number::log_normal(18.0, 0.5);
     recipe
 }
 
-/// The paper's four kinds of debris.
-fn paper_debris() -> Debris {
-    let mut debris = Debris::none();
-    debris.leukocytes = Leukocytes {
-        clusters: 8.0.into(),
-        per_cluster: Number::uniform(3.0, 6.0),
-        cluster_um: Number::uniform(2.5, 6.0),
-        on_cells: 0.5.into(),
-        form: NucleusForm::Round,
-        radius_um: Number::normal(2.6, 0.25),
-        alpha: 0.10.into(),
-        beta: 0.10.into(),
-        absorbance: 0.70.into(),
-        halo: 0.0.into(),
-        ..Leukocytes::default()
-    };
-    debris.bacilli = Bacilli {
-        clusters: 8.0.into(),
-        per_cluster: Number::uniform(8.0, 20.0),
-        cluster_um: Number::uniform(6.0, 22.0),
-        on_cells: 0.75.into(),
-        length_um: Number::log_normal(2.4, 0.35),
-        width_um: Number::normal(0.55, 0.06),
-        bend_deg: 0.0.into(),
-        chained: 0.0.into(),
-        absorbance: 0.15.into(),
-        phase_rad: 0.0.into(),
-    };
-    debris.speckles = Speckles {
-        count: 120.0.into(),
-        form: SpeckForm::Dilated,
-        dilations: Number::Drawn {
-            law: super::Law::Choice(vec![0.0, 0.0, 1.0]),
-            min: f64::NEG_INFINITY,
-            max: f64::INFINITY,
-        },
-        absorbance: 0.25.into(),
-        phase_rad: 0.0.into(),
-    };
-    debris.out_of_focus = OutOfFocus {
-        count: 5.0.into(),
-        radius_um: Number::log_normal(9.0, 0.5),
-        alpha: 0.15.into(),
-        beta: 0.2.into(),
-        depth_um: Number::uniform(14.0, 40.0),
-        absorbance: 0.35.into(),
-    };
-    debris
+fn candida() -> Recipe {
+    let mut recipe = lbc();
+    let debris = &mut recipe.debris;
+    debris.candida.colonies = Number::uniform(1.0, 5.0);
+    debris.leukocytes.clusters = Number::uniform(4.0, 15.0);
+    debris.smudges.count = Number::log_normal(12.0, 0.5);
+    recipe
+}
+
+fn trichomonas() -> Recipe {
+    let mut recipe = lbc();
+    let debris = &mut recipe.debris;
+    debris.trichomonads.groups = Number::uniform(2.0, 7.0);
+    debris.leukocytes.clusters = Number::uniform(10.0, 30.0);
+    debris.leukocytes.per_cluster = Number::log_normal(4.0, 0.9).at_least(1.0);
+    debris.cocci.colonies = Number::log_normal(3.0, 0.6);
+    debris.smudges.count = Number::log_normal(15.0, 0.5);
+    recipe
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Seam, Sheet};
     use super::*;
 
     #[test]

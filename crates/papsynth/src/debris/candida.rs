@@ -1,0 +1,272 @@
+//! *Candida*: pseudohyphae, long and septate with constrictions and branches, and budding yeasts.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::paint::Stroke;
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::key::Stream;
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// *Candida*: colonies of pseudohyphae and budding yeasts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Candidas {
+    /// Number of colonies, 0 to 10000; drawn once a field.
+    pub colonies: Number,
+    /// Pseudohyphae of a colony, 0 to 1000.
+    pub hyphae: Number,
+    /// Yeasts of a colony, most of them budding, 0 to 10000.
+    pub yeasts: Number,
+    /// Radius (standard deviation) of a colony, µm, 0 to 1000.
+    pub colony_um: Number,
+    /// Share of the colonies that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Segments of a pseudohypha, 1 to 30.
+    pub segments: Number,
+    /// Length of a segment, µm, 2 to 50.
+    pub segment_um: Number,
+    /// Width of a pseudohypha, µm, 0.5 to 10.
+    pub width_um: Number,
+    /// Diameter of a yeast, µm, 0.5 to 20.
+    pub yeast_um: Number,
+    /// Probability of a branch at each septum, 0 to 1.
+    pub branches: Number,
+    /// Probability of buds at each septum, 0 to 1.
+    pub buds: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+    /// Its dyes.
+    pub dyes: DyeAmounts,
+}
+
+/// What a piece of *Candida* is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Growth {
+    /// A pseudohypha with its branches and buds.
+    Hypha,
+    /// A yeast with its bud, if it has one.
+    Yeast,
+}
+
+/// A pseudohypha or a yeast, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Candida {
+    /// What it is.
+    pub growth: Growth,
+    /// Segments of a pseudohypha.
+    pub segments: usize,
+    /// Length of a segment, µm.
+    pub segment_um: f64,
+    /// Width of the pseudohypha, or diameter of the yeast, µm.
+    pub width_um: f64,
+    /// Diameter of buds, µm.
+    pub yeast_um: f64,
+    /// Probability of a branch at each septum.
+    pub branches: f64,
+    /// Probability of buds at each septum, or on the yeast.
+    pub buds: f64,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+    /// Its dyes where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for Candidas {
+    fn default() -> Self {
+        Self {
+            colonies: Number::log_normal(0.08, 0.9),
+            hyphae: Number::uniform(1.0, 5.0),
+            yeasts: Number::log_normal(7.0, 0.7),
+            colony_um: Number::uniform(10.0, 25.0),
+            on_cells: 0.7.into(),
+            segments: Number::uniform(2.0, 6.0),
+            segment_um: Number::log_normal(10.0, 0.25),
+            width_um: Number::normal(2.4, 0.2),
+            yeast_um: Number::normal(3.6, 0.35),
+            branches: 0.2.into(),
+            buds: 0.4.into(),
+            absorbance: Number::log_normal(0.16, 0.25),
+            phase_rad: Number::uniform(0.2, 0.5),
+            dyes: DyeAmounts { eosin_y: 2.2, haematein: 0.55, orange_g: 0.6, ..DyeAmounts::none() },
+        }
+    }
+}
+
+impl Kinds for Candidas {
+    fn none() -> Self {
+        Self { colonies: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("colonies", &self.colonies, 0.0, 1e4);
+        section.count("hyphae", &self.hyphae, 0.0, 1000.0);
+        section.count("yeasts", &self.yeasts, 0.0, 1e4);
+        section.number("colony_um", &self.colony_um, 0.0, 1000.0);
+        section.share("on_cells", &self.on_cells);
+        section.count("segments", &self.segments, 1.0, 30.0);
+        section.number("segment_um", &self.segment_um, 2.0, 50.0);
+        section.number("width_um", &self.width_um, 0.5, 10.0);
+        section.number("yeast_um", &self.yeast_um, 0.5, 20.0);
+        section.share("branches", &self.branches);
+        section.share("buds", &self.buds);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for index in 0..ground.count("colonies", &self.colonies) {
+            let mut rng = ground.stream(index, "colony");
+            let colony = ground.cluster(&self.on_cells, &self.colony_um, &mut rng);
+            let hyphae = self.hyphae.draw_count(&mut rng);
+            let yeasts = self.yeasts.draw_count(&mut rng);
+            for member in 0..hyphae + yeasts {
+                let number = member_number(index, member as u64);
+                let mut rng = ground.stream(number, "body");
+                let growth = if member < hyphae { Growth::Hypha } else { Growth::Yeast };
+                let yeast_um = self.yeast_um.draw(&mut rng);
+                let width_um = self.width_um.draw(&mut rng);
+                let candida = Candida {
+                    growth,
+                    segments: self.segments.draw_count(&mut rng).max(1),
+                    segment_um: self.segment_um.draw(&mut rng),
+                    width_um: if growth == Growth::Hypha { width_um } else { yeast_um },
+                    yeast_um,
+                    branches: self.branches.draw(&mut rng),
+                    buds: self.buds.draw(&mut rng),
+                    absorbance: self.absorbance.draw(&mut rng),
+                    phase_rad: self.phase_rad.draw(&mut rng),
+                    dyes,
+                };
+                let centre_um = colony.place(&mut rng);
+                let depth_um = colony.depth_um + 0.5 * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                ground.add(number, cluster_id(index), lie, candida);
+            }
+        }
+    }
+}
+
+/// Width at a septum relative to a segment's middle.
+const WAIST: f64 = 0.62;
+
+/// Standard deviation of the angle between segments, and angle of a branch, radians.
+const BEND: f64 = 0.18;
+const FORK: f64 = 0.75;
+
+/// Length of a yeast relative to its width.
+const OVAL: f64 = 1.3;
+
+/// Thickness of the wall, µm, and absorbance of what it encloses relative to it.
+const WALL_UM: f64 = 0.35;
+const INSIDE: f32 = 0.55;
+
+impl Thing for Candida {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let mut strokes = Vec::new();
+        match self.growth {
+            Growth::Hypha => {
+                let start = [-0.5 * self.segments as f64 * self.segment_um, 0.0];
+                self.filament(start, 0.0, self.segments, self.width_um, &mut strokes, &mut rng);
+            }
+            Growth::Yeast => {
+                self.oval([0.0, 0.0], 0.0, self.width_um, &mut strokes);
+                if random::chance(0.5 + 0.5 * self.buds, &mut rng) {
+                    let (way, bud) = (0.6 * random::normal(&mut rng), random::between(0.4, 0.85, &mut rng));
+                    let distance = 0.5 * self.width_um * (OVAL + 0.9 * bud);
+                    let at = [distance * libm::cos(way), distance * libm::sin(way)];
+                    self.oval(at, way, bud * self.width_um, &mut strokes);
+                }
+            }
+        }
+        let placed: Vec<Stroke> = strokes
+            .iter()
+            .map(|(ends, widths)| Stroke {
+                ends: ends.map(|end| site.place(end)),
+                half_widths: widths.map(|width| site.px(0.5 * width)),
+            })
+            .collect();
+        let widest = self.width_um.max(self.yeast_um);
+        let mut painting = site.painting(placed.iter().flat_map(|stroke| &stroke.ends), 0.5 * widest);
+        let wall = site.px(WALL_UM);
+        for stroke in &placed {
+            let inner = stroke.half_widths.map(|half| half - wall);
+            if inner[0].min(inner[1]) > 0.0 {
+                painting.stroke(&Stroke { half_widths: inner, ..*stroke }, 0.0);
+            }
+        }
+        // What lies within the wall is paler.
+        let inside = core::mem::replace(&mut painting.coverage.values, vec![0.0; painting.absorbance.values.len()]);
+        for stroke in &placed {
+            painting.stroke(stroke, 0.0);
+        }
+        let values = painting.absorbance.values.iter_mut().zip(&painting.coverage.values).zip(&inside);
+        for ((value, cover), inner) in values {
+            *value = self.absorbance as f32 * (cover - (1.0 - INSIDE) * inner.min(*cover));
+        }
+        let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
+        phantom.traits.push(match self.growth {
+            Growth::Hypha => "hypha",
+            Growth::Yeast => "yeast",
+        });
+        phantom
+    }
+}
+
+/// Ends of a stroke and its widths there, µm.
+type Limb = ([Point; 2], [f64; 2]);
+
+impl Candida {
+    /// A row of segments, with branches and buds at their septa.
+    fn filament(&self, start: Point, way: f64, segments: usize, width: f64, limbs: &mut Vec<Limb>, rng: &mut Stream) {
+        let (mut at, mut way) = (start, way);
+        for segment in 0..segments {
+            let length = self.segment_um * random::between(0.75, 1.25, rng);
+            way += BEND * random::normal(rng);
+            let along = |share: f64| [at[0] + share * length * libm::cos(way), at[1] + share * length * libm::sin(way)];
+            let last = segment + 1 == segments;
+            let widths = [WAIST * width, width, if last { 0.8 * width } else { WAIST * width }];
+            limbs.push(([at, along(0.3)], [widths[0], widths[1]]));
+            limbs.push(([along(0.3), along(0.75)], [widths[1], widths[1]]));
+            limbs.push(([along(0.75), along(1.0)], [widths[1], widths[2]]));
+            at = along(1.0);
+            if last {
+                break;
+            }
+            let side = if random::chance(0.5, rng) { 1.0 } else { -1.0 };
+            if segments > 2 && random::chance(self.branches, rng) {
+                let rest = 1 + random::below(segments / 2, rng);
+                self.filament(at, way + side * FORK, rest.min(2), 0.9 * width, limbs, rng);
+            } else if random::chance(self.buds, rng) {
+                let out = way + side * random::between(0.6, 1.4, rng);
+                let size = self.yeast_um * random::between(0.6, 1.0, rng);
+                let distance = 0.5 * (width * WAIST + size * OVAL);
+                self.oval([at[0] + distance * libm::cos(out), at[1] + distance * libm::sin(out)], out, size, limbs);
+            }
+        }
+    }
+
+    /// An oval that is so wide, longer the way it points.
+    fn oval(&self, centre: Point, way: f64, width: f64, limbs: &mut Vec<Limb>) {
+        let reach = 0.5 * (OVAL - 1.0) * width;
+        let end = |side: f64| [centre[0] + side * reach * libm::cos(way), centre[1] + side * reach * libm::sin(way)];
+        limbs.push(([end(-1.0), end(1.0)], [width, width]));
+    }
+}

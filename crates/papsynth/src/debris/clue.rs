@@ -1,0 +1,203 @@
+//! Clue cells: epithelial cells covered with coccobacilli, densely at their rim and beyond it.
+//!
+//! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
+//! cell's row in the truth has the trait `clue`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Section;
+use super::paint::{Painting, Stroke};
+use crate::phantom::pools::Look;
+use crate::phantom::tile::Tile;
+use crate::phantom::{Phantom, Pools};
+use crate::random;
+use crate::recipe::Number;
+use crate::scene::{Body, FieldNumbers, Object, Scene};
+
+/// Clue cells: cells covered with coccobacilli, and cells with patches of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ClueCells {
+    /// Share of the cells that carry a coat, 0 to 1; drawn once a field.
+    pub share: Number,
+    /// Coccobacilli per µm² where a coat is dense, 0 to 10.
+    pub density: Number,
+    /// Share of the cell that the dense patches of its coat cover, 0 to 1.
+    pub cover: Number,
+    /// How far the coat reaches beyond the cell's rim, µm, 0 to 20.
+    pub beyond_um: Number,
+    /// Width of a coccobacillus, µm, 0.1 to 5.
+    pub width_um: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+}
+
+/// The coat of a clue cell, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Coat {
+    /// Coccobacilli per µm² where it is dense.
+    pub density: f64,
+    /// Share of the cell that dense patches cover.
+    pub cover: f64,
+    /// How far it reaches beyond the rim, µm.
+    pub beyond_um: f64,
+    /// Width of a coccobacillus, µm.
+    pub width_um: f64,
+    /// Absorbance of one.
+    pub absorbance: f64,
+}
+
+impl Default for ClueCells {
+    fn default() -> Self {
+        Self {
+            share: Number::log_normal(0.004, 1.3).at_most(0.8),
+            density: Number::uniform(1.5, 4.5),
+            cover: Number::uniform(0.35, 0.95),
+            beyond_um: Number::uniform(0.8, 3.0),
+            width_um: Number::normal(0.6, 0.04),
+            absorbance: Number::log_normal(0.045, 0.25),
+        }
+    }
+}
+
+impl ClueCells {
+    /// A slide without any.
+    pub(super) fn none() -> Self {
+        Self { share: 0.0.into(), ..Self::default() }
+    }
+
+    pub(super) fn check(&self, section: &mut Section<'_>) {
+        section.share("share", &self.share);
+        section.number("density", &self.density, 0.0, 10.0);
+        section.share("cover", &self.cover);
+        section.number("beyond_um", &self.beyond_um, 0.0, 20.0);
+        section.number("width_um", &self.width_um, 0.1, 5.0);
+        section.absorbance("absorbance", &self.absorbance);
+    }
+
+    /// Gives cells their coats.
+    pub(super) fn draw(&self, field: &FieldNumbers, objects: &mut [Object]) {
+        let share = field.draw("debris.clue_cells.share", &self.share);
+        if share <= 0.0 {
+            return;
+        }
+        for object in objects.iter_mut().filter(|object| matches!(object.body, Body::Cell(_))) {
+            let mut rng = field.key.stream("cell", object.number, "coat");
+            object.coat = random::chance(share, &mut rng).then(|| Coat {
+                density: self.density.draw(&mut rng),
+                cover: self.cover.draw(&mut rng),
+                beyond_um: self.beyond_um.draw(&mut rng),
+                width_um: self.width_um.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+            });
+        }
+    }
+}
+
+/// Size (standard deviation) of the patches of a coat, µm.
+const PATCH_UM: f64 = 3.0;
+
+/// How dense a coat is between its patches, along the rim, and how dense the patches are.
+const THIN: f64 = 0.08;
+const RIM: f64 = 0.5;
+
+/// How fast a patch thickens from its border inwards, for each standard deviation of the field it is cut from.
+const SOFT: f64 = 1.2;
+
+/// Size (standard deviation) of the tufts beyond the rim, µm, and how dense it is between them.
+const TUFT_UM: f64 = 0.8;
+const TUFTED: f64 = 0.15;
+
+/// Distance over which a coat thickens towards the rim, µm.
+const RIM_UM: f64 = 2.0;
+
+/// Lays its coat on a cell.
+pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: &mut Phantom) {
+    let (Some(coat), Some(cell)) = (&object.coat, phantom.pieces.first()) else { return };
+    let mut rng = scene.key.stream("cell", object.number, "coat.shape");
+    let pixel_um = scene.grid().pixel_um;
+    let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
+    let corner = cell.coverage.origin.map(|at| at as f64);
+    let opposite = [corner[0] + (cell.coverage.width - 1) as f64, corner[1] + (cell.coverage.height() - 1) as f64];
+    let mut painting = Painting::around(&[corner, opposite], margin);
+    let inside = widened(&cell.coverage, &painting.coverage);
+    let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
+    let (rim, beyond) = (near(RIM_UM), near(coat.beyond_um));
+    // Beyond the rim bacteria hang together in tufts.
+    let tufts = Look::clouds(TUFT_UM / pixel_um, &mut rng);
+    let mut tufted = Vec::with_capacity(painting.coverage.values.len());
+    painting.rows(pools.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
+    // How dense the coat is at each pixel.
+    let threshold = pools.clouds().quantile(1.0 - coat.cover);
+    let look = Look::clouds(PATCH_UM / pixel_um, &mut rng);
+    let width = painting.coverage.width;
+    let mut density = vec![0.0_f64; painting.coverage.values.len()];
+    let mut row = 0;
+    painting.rows(pools.clouds(), &look, |_, _, _, field| {
+        for (x, patch) in field.iter().enumerate() {
+            let at = row * width + x;
+            let covered = f64::from(inside.values[at]);
+            let patchy = (0.5 + SOFT * f64::from(*patch - threshold)).clamp(THIN, 1.0);
+            let at_rim = RIM * (2.0 * (1.0 - f64::from(rim.values[at]))).min(1.0);
+            let outside = (2.0 * f64::from(beyond.values[at])).min(1.0);
+            let tuft = (TUFTED + (1.0 - TUFTED) * f64::from(tufted[at])).clamp(0.0, 1.0);
+            density[at] = covered * (patchy + at_rim).min(1.0) + (1.0 - covered) * outside * tuft * patchy.max(RIM);
+        }
+        row += 1;
+    });
+    let origin = painting.coverage.origin.map(|at| at as f64);
+    let height = painting.coverage.height();
+    let tries = random::count(coat.density * (width * height) as f64 * pixel_um * pixel_um);
+    let half_width = 0.5 * coat.width_um / pixel_um;
+    for _ in 0..tries {
+        let (x, y) = (random::below(width, &mut rng), random::below(height, &mut rng));
+        if !random::chance(density[y * width + x], &mut rng) {
+            continue;
+        }
+        let at = [x as f64 + origin[0] + random::uniform(&mut rng), y as f64 + origin[1] + random::uniform(&mut rng)];
+        let (way, length) = (random::direction(&mut rng), half_width * random::between(0.0, 2.0, &mut rng));
+        let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
+        painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
+    }
+    *phantom = core::mem::take(phantom).stained(painting.absorbance, scene.dyes.bacillus);
+    phantom.traits.push("clue");
+}
+
+/// A tile on the place of a wider one.
+fn widened(tile: &Tile, place: &Tile) -> Tile {
+    let mut wide = place.blank();
+    let origin = wide.origin;
+    crate::phantom::tile::lay_at(&mut wide.values, place.width, origin, tile.as_ref(), |row, values| {
+        row.copy_from_slice(values);
+    });
+    wide
+}
+
+/// Means over squares of 2·radius + 1.
+fn averaged(tile: &Tile, radius: usize) -> Tile {
+    let mut out = tile.clone();
+    let (width, height) = (tile.width, tile.height());
+    let mut line = Vec::new();
+    let mut along = |values: &mut [f32], start: usize, step: usize, count: usize| {
+        line.clear();
+        line.extend((0..count).map(|i| values[start + i * step]));
+        let mut sum: f32 = line.iter().take(radius).sum();
+        for i in 0..count {
+            if i + radius < count {
+                sum += line[i + radius];
+            }
+            if i > radius {
+                sum -= line[i - radius - 1];
+            }
+            values[start + i * step] = (sum / (2 * radius + 1) as f32).clamp(0.0, 1.0);
+        }
+    };
+    for y in 0..height {
+        along(&mut out.values, y * width, 1, width);
+    }
+    for x in 0..width {
+        along(&mut out.values, x, width, height);
+    }
+    out
+}

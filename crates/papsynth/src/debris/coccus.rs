@@ -1,0 +1,184 @@
+//! Cocci and coccobacilli: round bacteria in pairs, chains and clouds. A colony is one object.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie};
+use super::paint::Stroke;
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::key::Stream;
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::Number;
+
+/// Cocci and coccobacilli, colony by colony.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Cocci {
+    /// Number of colonies, 0 to 100000; drawn once a field.
+    pub colonies: Number,
+    /// Cocci of a colony, 1 to 20000.
+    pub per_colony: Number,
+    /// Radius (standard deviation) of a cloud, µm, 0 to 500.
+    pub cloud_um: Number,
+    /// Share of the colonies that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Share of the colonies that are one chain, 0 to 1.
+    pub chains: Number,
+    /// Diameter of a coccus, µm, 0.1 to 5.
+    pub diameter_um: Number,
+    /// Length of a coccus relative to its diameter, 1 to 5: above 1.3 it is a coccobacillus.
+    pub elongation: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through a coccus, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+}
+
+/// A colony of cocci, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Colony {
+    /// Number of cocci.
+    pub cocci: usize,
+    /// Radius of the cloud, µm.
+    pub cloud_um: f64,
+    /// Whether they hang together in one chain.
+    pub chain: bool,
+    /// Diameter of a coccus, µm.
+    pub diameter_um: f64,
+    /// Its length relative to that.
+    pub elongation: f64,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+}
+
+impl Default for Cocci {
+    fn default() -> Self {
+        Self {
+            colonies: Number::log_normal(0.6, 1.1),
+            per_colony: Number::log_normal(30.0, 0.9).at_least(2.0),
+            cloud_um: Number::log_normal(3.5, 0.5),
+            on_cells: 0.6.into(),
+            chains: 0.15.into(),
+            diameter_um: Number::normal(0.8, 0.05),
+            elongation: Number::uniform(1.0, 1.6),
+            absorbance: Number::log_normal(0.11, 0.3),
+            phase_rad: Number::uniform(0.05, 0.2),
+        }
+    }
+}
+
+impl Kinds for Cocci {
+    fn none() -> Self {
+        Self { colonies: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("colonies", &self.colonies, 0.0, 1e5);
+        section.count("per_colony", &self.per_colony, 1.0, 2e4);
+        section.number("cloud_um", &self.cloud_um, 0.0, 500.0);
+        section.share("on_cells", &self.on_cells);
+        section.share("chains", &self.chains);
+        section.number("diameter_um", &self.diameter_um, 0.1, 5.0);
+        section.number("elongation", &self.elongation, 1.0, 5.0);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        for number in 0..ground.count("colonies", &self.colonies) {
+            let mut rng = ground.stream(number, "body");
+            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
+            let colony = Colony {
+                cocci: self.per_colony.draw_count(&mut rng).max(1),
+                cloud_um: self.cloud_um.draw(&mut rng),
+                chain: random::chance(self.chains.draw(&mut rng), &mut rng),
+                diameter_um: self.diameter_um.draw(&mut rng),
+                elongation: self.elongation.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+                phase_rad: self.phase_rad.draw(&mut rng),
+            };
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            ground.add(number, 0, lie, colony);
+        }
+    }
+}
+
+/// Longest chain.
+const LONGEST_CHAIN: usize = 24;
+
+/// Cocci to a clump of a cloud, on average, and the width of a clump relative to its cloud.
+const CLUMP: usize = 9;
+const CLUMP_WIDTH: f64 = 0.28;
+
+/// Standard deviation of the angle from one coccus of a chain to the next, radians.
+const KINK: f64 = 0.45;
+
+/// How far from the middle of a normal cloud a coccus may lie, in standard deviations.
+const FARTHEST: f64 = 4.0;
+
+impl Thing for Colony {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let places = if self.chain { self.chain(&mut rng) } else { self.cloud(&mut rng) };
+        let places: Vec<(Point, f64)> = places.iter().map(|(at, way)| (site.place(*at), *way)).collect();
+        let half_width = 0.5 * self.diameter_um;
+        let margin_um = half_width * self.elongation;
+        let mut painting = site.painting(places.iter().map(|(at, _)| at), margin_um);
+        for (at, way) in &places {
+            let size = random::between(0.8, 1.15, &mut rng);
+            let reach = site.px(size * half_width * (self.elongation - 1.0));
+            let (dx, dy) = (reach * libm::cos(*way), reach * libm::sin(*way));
+            let stroke = Stroke::even([at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy], site.px(size * half_width));
+            painting.stroke(&stroke, self.absorbance);
+        }
+        painting.finish(site.scene.dyes.bacillus, self.phase_rad, self.absorbance)
+    }
+}
+
+impl Colony {
+    /// Places of a chain and the way it runs there, µm and radians.
+    fn chain(&self, rng: &mut Stream) -> Vec<(Point, f64)> {
+        let count = self.cocci.min(LONGEST_CHAIN);
+        let step = self.diameter_um * self.elongation;
+        let (mut at, mut way) = ([-0.5 * step * count as f64, 0.0], 0.0);
+        (0..count)
+            .map(|_| {
+                let here = at;
+                way += KINK * random::normal(rng);
+                at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
+                (here, way)
+            })
+            .collect()
+    }
+
+    /// Places of a cloud of clumps, most of the cocci in pairs.
+    fn cloud(&self, rng: &mut Stream) -> Vec<(Point, f64)> {
+        let clumps: Vec<Point> =
+            (0..self.cocci.div_ceil(CLUMP)).map(|_| scattered([0.0; 2], self.cloud_um, rng)).collect();
+        let mut places = Vec::with_capacity(self.cocci);
+        while places.len() < self.cocci {
+            let clump = clumps[random::below(clumps.len(), rng)];
+            let (at, way) = (scattered(clump, CLUMP_WIDTH * self.cloud_um, rng), random::direction(rng));
+            places.push((at, way));
+            if places.len() < self.cocci {
+                let step = 0.95 * self.diameter_um * self.elongation;
+                places.push(([at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)], way));
+            }
+        }
+        places
+    }
+}
+
+/// A place about another one, normal in both directions.
+fn scattered(about: Point, sd: f64, rng: &mut Stream) -> Point {
+    about.map(|v| v + sd * random::normal(rng).clamp(-FARTHEST, FARTHEST))
+}

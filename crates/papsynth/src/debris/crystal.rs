@@ -1,0 +1,112 @@
+//! Precipitated dye: dark, angular, refracting grains.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie};
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// Precipitated dye: dark, angular, refracting grains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Crystals {
+    /// Number of grains, 0 to 100000; drawn once a field.
+    pub count: Number,
+    /// Share of the grains that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Diameter, µm, 0.2 to 50.
+    pub diameter_um: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+    /// Its dyes.
+    pub dyes: DyeAmounts,
+}
+
+/// A grain of dye, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Crystal {
+    /// Diameter, µm.
+    pub diameter_um: f64,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+    /// Its dyes where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for Crystals {
+    fn default() -> Self {
+        Self {
+            count: Number::log_normal(0.45, 0.9),
+            on_cells: 0.3.into(),
+            diameter_um: Number::log_normal(1.2, 0.4),
+            absorbance: Number::log_normal(0.6, 0.4),
+            phase_rad: Number::uniform(0.3, 1.0),
+            dyes: DyeAmounts { haematein: 0.9, eosin_y: 0.4, orange_g: 0.4, ..DyeAmounts::none() },
+        }
+    }
+}
+
+impl Kinds for Crystals {
+    fn none() -> Self {
+        Self { count: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("count", &self.count, 0.0, 1e5);
+        section.share("on_cells", &self.on_cells);
+        section.number("diameter_um", &self.diameter_um, 0.2, 50.0);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for number in 0..ground.count("count", &self.count) {
+            let mut rng = ground.stream(number, "body");
+            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
+            let crystal = Crystal {
+                diameter_um: self.diameter_um.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+                phase_rad: self.phase_rad.draw(&mut rng),
+                dyes,
+            };
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            ground.add(number, 0, lie, crystal);
+        }
+    }
+}
+
+impl Thing for Crystal {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let outline = site.places(&shard(0.5 * self.diameter_um, 5 + random::below(3, &mut rng), 0.3, &mut rng));
+        let mut painting = site.painting(&outline, 0.0);
+        painting.fill(&outline, self.absorbance);
+        painting.finish(self.dyes, self.phase_rad, self.absorbance)
+    }
+}
+
+/// A polygon with sharp corners about the origin, those so unevenly far out.
+pub(super) fn shard(radius: f64, corners: usize, uneven: f64, rng: &mut crate::key::Stream) -> Vec<Point> {
+    (0..corners)
+        .map(|i| {
+            let angle = core::f64::consts::TAU * (i as f64 + 0.6 * random::uniform(rng)) / corners as f64;
+            let reach = radius * random::between(1.0 - uneven, 1.0 + uneven, rng);
+            [reach * libm::cos(angle), reach * libm::sin(angle)]
+        })
+        .collect()
+}

@@ -1,0 +1,142 @@
+//! Fibres of cotton and cloth: long, of even width, sharply bounded, with refracting edges.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie};
+use super::paint::Stroke;
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::Number;
+
+/// Fibres of cotton and cloth, in the mountant or on the glass.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fibres {
+    /// Number of fibres, 0 to 10000; drawn once a field.
+    pub count: Number,
+    /// Length, µm, 5 to 500.
+    pub length_um: Number,
+    /// Width, µm, 0.5 to 50.
+    pub width_um: Number,
+    /// How wavy it is, 0 to 2: 0 is straight.
+    pub waves: Number,
+    /// How far above the cells it lies, µm, -1000 to 1000: 170 is the outside of a cover glass, less lies within the
+    /// mountant.
+    pub height_um: Number,
+    /// Absorbance, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through its middle, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+}
+
+/// A fibre, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fibre {
+    /// Length, µm.
+    pub length_um: f64,
+    /// Width, µm.
+    pub width_um: f64,
+    /// How wavy it is.
+    pub waves: f64,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through its middle, radians.
+    pub phase_rad: f64,
+}
+
+impl Default for Fibres {
+    fn default() -> Self {
+        Self {
+            count: Number::log_normal(0.1, 0.8),
+            length_um: Number::uniform(60.0, 200.0),
+            width_um: Number::uniform(5.0, 15.0),
+            waves: Number::uniform(0.0, 0.8),
+            height_um: Number::uniform(-2.0, 15.0),
+            absorbance: Number::uniform(0.03, 0.2),
+            phase_rad: Number::uniform(0.4, 1.2),
+        }
+    }
+}
+
+impl Kinds for Fibres {
+    fn none() -> Self {
+        Self { count: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("count", &self.count, 0.0, 1e4);
+        section.number("length_um", &self.length_um, 5.0, 500.0);
+        section.number("width_um", &self.width_um, 0.5, 50.0);
+        section.number("waves", &self.waves, 0.0, 2.0);
+        section.height_um("height_um", &self.height_um);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        for number in 0..ground.count("count", &self.count) {
+            let mut rng = ground.stream(number, "body");
+            let centre_um = ground.anywhere(&mut rng);
+            let fibre = Fibre {
+                length_um: self.length_um.draw(&mut rng),
+                width_um: self.width_um.draw(&mut rng),
+                waves: self.waves.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+                phase_rad: self.phase_rad.draw(&mut rng),
+            };
+            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
+            ground.add(number, 0, lie, fibre);
+        }
+    }
+}
+
+/// Straight parts of a fibre.
+const PARTS: usize = 40;
+
+/// Angle to which a fibre of waviness 1 swings, radians.
+const SWING: f64 = 0.5;
+
+/// Absorbance along the edges relative to the middle: they throw light out of the objective.
+const EDGE: f32 = 2.5;
+
+/// Width of an edge relative to the fibre's.
+const EDGE_WIDTH: f64 = 0.12;
+
+impl Thing for Fibre {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let step = self.length_um / PARTS as f64;
+        let (phase, turns) = (random::direction(&mut rng), random::between(0.5, 2.0, &mut rng));
+        let bow = 0.6 * self.waves * random::normal(&mut rng);
+        let mut at = [-0.5 * self.length_um, 0.0];
+        let mut spine: Vec<Point> = Vec::with_capacity(PARTS + 1);
+        for part in 0..=PARTS {
+            spine.push(site.place(at));
+            let t = part as f64 / PARTS as f64;
+            let way = self.waves * SWING * libm::sin(core::f64::consts::TAU * turns * t + phase) + bow * (t - 0.5);
+            at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
+        }
+        let mut painting = site.painting(&spine, 0.5 * self.width_um);
+        let half_width = site.px(0.5 * self.width_um);
+        for part in spine.windows(2) {
+            painting.stroke(&Stroke::even(part[0], part[1], half_width * (1.0 - 2.0 * EDGE_WIDTH)), 0.0);
+        }
+        let inside = core::mem::replace(&mut painting.coverage.values, vec![0.0; painting.absorbance.values.len()]);
+        for part in spine.windows(2) {
+            painting.stroke(&Stroke::even(part[0], part[1], half_width), 0.0);
+        }
+        let values = painting.absorbance.values.iter_mut().zip(&painting.coverage.values).zip(&inside);
+        for ((value, cover), inner) in values {
+            *value = self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0));
+        }
+        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+    }
+}

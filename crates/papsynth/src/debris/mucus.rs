@@ -1,0 +1,189 @@
+//! Strands of mucus: long bundles of faint parallel fibres.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie};
+use super::paint::Stroke;
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::pools::Look;
+use crate::phantom::tile::Point;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// Strands of mucus, bundles of faint fibres.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mucus {
+    /// Number of strands, 0 to 10000; drawn once a field.
+    pub strands: Number,
+    /// Share of the strands that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Length of a strand, µm, 5 to 400.
+    pub length_um: Number,
+    /// Width of a strand, µm, 1 to 100.
+    pub width_um: Number,
+    /// Fibres across a strand, 1 to 200.
+    pub fibres: Number,
+    /// Width of a fibre, µm, 0.1 to 5.
+    pub fibre_um: Number,
+    /// Absorbance of a fibre, 0 to 4.
+    pub absorbance: Number,
+    /// How late light comes through a fibre, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+    /// Its dyes.
+    pub dyes: DyeAmounts,
+}
+
+/// A strand of mucus, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Strand {
+    /// Length, µm.
+    pub length_um: f64,
+    /// Width, µm.
+    pub width_um: f64,
+    /// Fibres across it.
+    pub fibres: usize,
+    /// Width of a fibre, µm.
+    pub fibre_um: f64,
+    /// Absorbance of a fibre.
+    pub absorbance: f64,
+    /// How late light comes through a fibre, radians.
+    pub phase_rad: f64,
+    /// Its dyes where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for Mucus {
+    fn default() -> Self {
+        Self {
+            strands: Number::log_normal(0.3, 0.8),
+            on_cells: 0.3.into(),
+            length_um: Number::log_normal(40.0, 0.45).at_least(10.0).at_most(150.0),
+            width_um: Number::log_normal(5.0, 0.4),
+            fibres: Number::uniform(6.0, 20.0),
+            fibre_um: Number::uniform(0.4, 1.1),
+            absorbance: Number::log_normal(0.05, 0.4),
+            phase_rad: Number::uniform(0.0, 0.12),
+            dyes: DyeAmounts { light_green: 2.5, eosin_y: 0.5, ..DyeAmounts::none() },
+        }
+    }
+}
+
+impl Kinds for Mucus {
+    fn none() -> Self {
+        Self { strands: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("strands", &self.strands, 0.0, 1e4);
+        section.share("on_cells", &self.on_cells);
+        section.number("length_um", &self.length_um, 5.0, 400.0);
+        section.number("width_um", &self.width_um, 1.0, 100.0);
+        section.count("fibres", &self.fibres, 1.0, 200.0);
+        section.number("fibre_um", &self.fibre_um, 0.1, 5.0);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for number in 0..ground.count("strands", &self.strands) {
+            let mut rng = ground.stream(number, "body");
+            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
+            let strand = Strand {
+                length_um: self.length_um.draw(&mut rng),
+                width_um: self.width_um.draw(&mut rng),
+                fibres: self.fibres.draw_count(&mut rng).max(1),
+                fibre_um: self.fibre_um.draw(&mut rng),
+                absorbance: self.absorbance.draw(&mut rng),
+                phase_rad: self.phase_rad.draw(&mut rng),
+                dyes,
+            };
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            ground.add(number, 0, lie, strand);
+        }
+    }
+}
+
+/// Straight parts of a strand.
+const PARTS: usize = 40;
+
+/// Standard deviation of the bend from part to part, radians.
+const BEND: f64 = 0.03;
+
+/// Absorbance of what lies between the fibres relative to them, how cloudy that is, and the size of its clouds, µm.
+const VEIL: f64 = 0.3;
+const CLOUDY: f32 = 0.8;
+const CLOUD_UM: f64 = 0.7;
+
+/// Share of the length over which either end thins out.
+const TAPER: f64 = 0.3;
+
+/// Narrowest place of a strand relative to its width: where it was drawn out.
+const NECK: f64 = 0.35;
+
+impl Thing for Strand {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let step = self.length_um / PARTS as f64;
+        let (mut at, mut way, mut bend) = ([0.0, 0.0], 0.0, 0.0);
+        let mut spine: Vec<(Point, f64)> = Vec::with_capacity(PARTS + 1);
+        for _ in 0..=PARTS {
+            spine.push((at, way));
+            bend = 0.9 * bend + BEND * random::normal(&mut rng);
+            way += bend;
+            at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];
+        }
+        let middle = spine[PARTS / 2].0;
+        let waves: [f64; 3] = core::array::from_fn(|_| random::direction(&mut rng));
+        // The strand's half-width along its length.
+        let half: Vec<f64> = (0..=PARTS)
+            .map(|i| {
+                let t = i as f64 / PARTS as f64;
+                let swell = 0.5 + 0.5 * libm::sin(7.0 * t + waves[0]) * libm::cos(3.0 * t + waves[1]);
+                let taper = (t / TAPER).min((1.0 - t) / TAPER).min(1.0);
+                0.5 * self.width_um * (NECK + (1.0 - NECK) * swell) * (0.15 + 0.85 * taper)
+            })
+            .collect();
+        let mut fibres: Vec<Vec<Point>> = Vec::with_capacity(self.fibres);
+        for _ in 0..self.fibres {
+            // Fibres keep their place across the strand, more or less; some begin late or end early.
+            let mut across = random::between(-1.0, 1.0, &mut rng);
+            let first = if random::chance(0.5, &mut rng) { 0 } else { random::below(PARTS / 2, &mut rng) };
+            let last = if random::chance(0.5, &mut rng) { PARTS } else { PARTS - random::below(PARTS / 2, &mut rng) };
+            let fibre = (first..=last)
+                .map(|i| {
+                    across = (across + 0.06 * random::normal(&mut rng)).clamp(-1.0, 1.0);
+                    let ([x, y], way) = spine[i];
+                    let off = across * half[i];
+                    site.place([x - middle[0] - off * libm::sin(way), y - middle[1] + off * libm::cos(way)])
+                })
+                .collect();
+            fibres.push(fibre);
+        }
+        let mut painting = site.painting(fibres.iter().flatten(), self.fibre_um + 0.5 * self.width_um);
+        for (part, half) in spine.windows(2).zip(half.windows(2)) {
+            let ends = [part[0].0, part[1].0].map(|p| site.place([p[0] - middle[0], p[1] - middle[1]]));
+            let half_widths = [site.px(half[0]), site.px(half[1])];
+            painting.line(&Stroke { ends, half_widths }, VEIL * self.absorbance);
+        }
+        let look = Look::clouds(site.px(CLOUD_UM), &mut rng);
+        painting.texture(site.pools.clouds(), &look, CLOUDY);
+        for fibre in &fibres {
+            let half_width = site.px(0.5 * self.fibre_um * random::between(0.6, 1.3, &mut rng));
+            let strength = self.absorbance * random::between(0.4, 1.4, &mut rng);
+            for part in fibre.windows(2) {
+                painting.line(&Stroke::even(part[0], part[1], half_width), strength);
+            }
+        }
+        painting.finish(self.dyes, self.phase_rad, self.absorbance)
+    }
+}

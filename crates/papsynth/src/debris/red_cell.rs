@@ -1,0 +1,161 @@
+//! Red blood cells: discs with a pale middle, and the ghosts that are left of them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::tile::Point;
+use crate::phantom::wobble::wobbled_circle;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// Red blood cells, in clusters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RedCells {
+    /// Number of clusters, 0 to 100000; drawn once a field.
+    pub clusters: Number,
+    /// Red cells of a cluster, 1 to 10000.
+    pub per_cluster: Number,
+    /// Radius (standard deviation) of a cluster, µm, 0 to 1000.
+    pub cluster_um: Number,
+    /// Share of the clusters that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Diameter, µm, 1 to 30.
+    pub diameter_um: Number,
+    /// Absorbance of the middle relative to the rim, 0 to 1.
+    pub pallor: Number,
+    /// Probability that it is a ghost that has lost its haemoglobin, 0 to 1.
+    pub ghosts: Number,
+    /// Absorbance, 0 to 4: haemoglobin in a disc of 2 µm absorbs 0.1 at 0.57 µm.
+    pub absorbance: Number,
+    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
+    pub phase_rad: Number,
+    /// Its dyes: haemoglobin and eosin are much alike.
+    pub dyes: DyeAmounts,
+}
+
+/// A red blood cell, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RedCell {
+    /// Diameter, µm.
+    pub diameter_um: f64,
+    /// Absorbance of the middle relative to the rim.
+    pub pallor: f64,
+    /// Whether it has lost its haemoglobin.
+    pub ghost: bool,
+    /// Absorbance.
+    pub absorbance: f64,
+    /// How late light comes through it, radians.
+    pub phase_rad: f64,
+    /// Its dyes where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for RedCells {
+    fn default() -> Self {
+        Self {
+            clusters: Number::log_normal(0.22, 0.9),
+            per_cluster: Number::log_normal(4.0, 0.9).at_least(1.0),
+            cluster_um: Number::uniform(8.0, 25.0),
+            on_cells: 0.3.into(),
+            diameter_um: Number::normal(7.0, 0.35),
+            pallor: Number::uniform(0.3, 0.6),
+            ghosts: 0.3.into(),
+            absorbance: Number::normal(0.10, 0.015),
+            phase_rad: Number::uniform(0.1, 0.3),
+            dyes: DyeAmounts { eosin_y: 4.5, orange_g: 1.5, haematein: 0.35, ..DyeAmounts::none() },
+        }
+    }
+}
+
+impl Kinds for RedCells {
+    fn none() -> Self {
+        Self { clusters: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("clusters", &self.clusters, 0.0, 1e5);
+        section.count("per_cluster", &self.per_cluster, 1.0, 1e4);
+        section.number("cluster_um", &self.cluster_um, 0.0, 1000.0);
+        section.share("on_cells", &self.on_cells);
+        section.number("diameter_um", &self.diameter_um, 1.0, 30.0);
+        section.share("pallor", &self.pallor);
+        section.share("ghosts", &self.ghosts);
+        section.absorbance("absorbance", &self.absorbance);
+        section.phase_rad("phase_rad", &self.phase_rad);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for index in 0..ground.count("clusters", &self.clusters) {
+            let mut rng = ground.stream(index, "cluster");
+            let cluster = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
+            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = ground.stream(number, "body");
+                let centre_um = cluster.place(&mut rng);
+                let red_cell = RedCell {
+                    diameter_um: self.diameter_um.draw(&mut rng),
+                    pallor: self.pallor.draw(&mut rng),
+                    ghost: random::chance(self.ghosts.draw(&mut rng), &mut rng),
+                    absorbance: self.absorbance.draw(&mut rng),
+                    phase_rad: self.phase_rad.draw(&mut rng),
+                    dyes,
+                };
+                let depth_um = cluster.depth_um + 0.5 * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                ground.add(number, cluster_id(index), lie, red_cell);
+            }
+        }
+    }
+}
+
+/// Haemoglobin that a ghost has left, and the width of its seam relative to the radius.
+const GHOST: f64 = 0.35;
+const SEAM: f64 = 0.18;
+
+/// Where a disc is thickest, relative to its radius.
+const THICKEST: f64 = 0.68;
+
+impl Thing for RedCell {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let radius_um = 0.5 * self.diameter_um;
+        let squeeze = random::between(0.88, 1.0, &mut rng);
+        let circle = wobbled_circle(radius_um, 0.03, 0.05, &mut rng);
+        let outline: Vec<Point> = circle.iter().map(|p| site.place([p[0], squeeze * p[1]])).collect();
+        let mut painting = site.painting(&outline, 0.0);
+        painting.coverage.cover(&outline);
+        let radius = site.px(radius_um);
+        let cover = &painting.coverage.values;
+        let mut index = 0;
+        painting.absorbance.for_each(|p, value| {
+            let (dx, dy) = (p[0] - site.centre[0], p[1] - site.centre[1]);
+            let r = (dx * dx + dy * dy).sqrt() / radius;
+            let thickness = if self.ghost {
+                let seam = ((r - 1.0 + SEAM) / SEAM).clamp(0.0, 1.0);
+                GHOST * (self.pallor + (1.0 - self.pallor) * seam)
+            } else {
+                // Biconcave: from the dent in the middle to the thick ring.
+                let ring = (r / THICKEST).min(1.0);
+                self.pallor + (1.0 - self.pallor) * ring * ring * (3.0 - 2.0 * ring)
+            };
+            *value = cover[index] * (self.absorbance * thickness) as f32;
+            index += 1;
+        });
+        let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
+        if self.ghost {
+            phantom.traits.push("ghost");
+        }
+        phantom
+    }
+}

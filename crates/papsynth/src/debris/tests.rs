@@ -1,0 +1,250 @@
+//! What holds for every kind.
+
+use proptest::prelude::*;
+use serde_json::Value;
+
+use super::*;
+use crate::key::Key;
+use crate::model::Model;
+use crate::phantom::pools::PoolMaker;
+use crate::recipe::{Number, Optics, Preset, Recipe};
+use crate::scene;
+
+const KEY: Key = Key { seed: 17, index: 3 };
+
+/// A small field with a few cells and this debris, on a coarse grid.
+fn recipe(debris: Debris) -> Recipe {
+    let mut recipe = Preset::Lbc.recipe();
+    recipe.field.width_px = 96.0.into();
+    recipe.field.height_px = 72.0.into();
+    recipe.field.pixel_um = 0.5.into();
+    recipe.optics = Optics::gaussian();
+    recipe.slide.spacing_um = 1.0.into();
+    for mix in recipe.cells.values_mut() {
+        mix.count = 1.0.into();
+    }
+    recipe.debris = debris;
+    recipe
+}
+
+fn draw(debris: &Debris) -> Scene {
+    scene::draw(&recipe(debris.clone()), &Model::builtin(), None, KEY).unwrap()
+}
+
+/// The phantoms of everything but cells.
+fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
+    let maker = PoolMaker::new(spectral_field::Fft::Portable).unwrap();
+    let pools = maker.make(scene.key);
+    let made = |object: &Object| Some((object.body.kind(), phantom(scene, &pools, object)?));
+    scene.objects.iter().filter_map(made).collect()
+}
+
+/// How many clusters or objects there are of each kind, and how many objects one is, where that is fixed here.
+fn counted(debris: &mut Debris, kind: Kind, count: f64) -> usize {
+    let number = || Number::Fixed(count);
+    match kind {
+        Kind::Cell => return 0,
+        Kind::Leukocyte => (debris.leukocytes.clusters, debris.leukocytes.per_cluster) = (number(), 4.0.into()),
+        Kind::Bacillus => (debris.bacilli.clusters, debris.bacilli.per_cluster) = (number(), 4.0.into()),
+        Kind::Speckle => debris.speckles.count = number(),
+        Kind::OutOfFocus => debris.out_of_focus.count = number(),
+        Kind::Smudge => debris.smudges.count = number(),
+        Kind::Dirt => (debris.dirt.drifts, debris.dirt.per_drift) = (number(), 4.0.into()),
+        Kind::Coccus => debris.cocci.colonies = number(),
+        Kind::Candida => {
+            debris.candida.colonies = number();
+            (debris.candida.hyphae, debris.candida.yeasts) = (1.0.into(), 3.0.into());
+        }
+        Kind::Trichomonad => (debris.trichomonads.groups, debris.trichomonads.per_group) = (number(), 4.0.into()),
+        Kind::RedCell => (debris.red_cells.clusters, debris.red_cells.per_cluster) = (number(), 4.0.into()),
+        Kind::Mucus => debris.mucus.strands = number(),
+        Kind::BareNucleus => debris.bare_nuclei.count = number(),
+        Kind::Crystal => debris.crystals.count = number(),
+        Kind::Dust => debris.dust.count = number(),
+        Kind::Fibre => debris.fibres.count = number(),
+        Kind::Bubble => debris.bubbles.count = number(),
+        Kind::Scratch => debris.scratches.count = number(),
+    }
+    let clustered = matches!(
+        kind,
+        Kind::Leukocyte | Kind::Bacillus | Kind::Dirt | Kind::Candida | Kind::Trichomonad | Kind::RedCell
+    );
+    count as usize * if clustered { 4 } else { 1 }
+}
+
+#[test]
+fn names_are_what_is_written() {
+    for kind in Kind::ALL {
+        assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+    }
+    let mut names = Kind::ALL.map(Kind::name);
+    names.sort_unstable();
+    assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
+}
+
+#[test]
+fn there_are_as_many_as_asked_and_none_where_there_are_none() {
+    let of_kind = |scene: &Scene, kind| scene.objects.iter().filter(|o| o.body.kind() == kind).count();
+    let empty = draw(&Debris::none());
+    assert_eq!(of_kind(&empty, Kind::Cell), empty.objects.len());
+    assert!(empty.objects.iter().all(|object| object.coat.is_none()));
+    for kind in Kind::ALL.into_iter().skip(1) {
+        let mut debris = Debris::none();
+        let expected = counted(&mut debris, kind, 3.0);
+        let scene = draw(&debris);
+        assert_eq!(of_kind(&scene, kind), expected, "{kind:?}");
+        assert_eq!(of_kind(&scene, kind) + of_kind(&scene, Kind::Cell), scene.objects.len(), "{kind:?} alone");
+        assert_eq!(scene.objects[..2], empty.objects[..2], "{kind:?} moves no cell");
+    }
+    let mut debris = Debris::none();
+    debris.clue_cells.share = 1.0.into();
+    assert!(draw(&debris).objects.iter().all(|object| object.coat.is_some()));
+}
+
+#[test]
+fn a_phantom_is_the_same_alone_and_among_others() {
+    let mut all = Debris::none();
+    for kind in Kind::ALL {
+        counted(&mut all, kind, 2.0);
+    }
+    let among = phantoms(&draw(&all));
+    for kind in Kind::ALL.into_iter().skip(1) {
+        let mut debris = Debris::none();
+        counted(&mut debris, kind, 1.0);
+        let alone = phantoms(&draw(&debris));
+        let same = among.iter().filter(|(other, _)| *other == kind);
+        for ((_, alone), (_, among)) in alone.iter().zip(same) {
+            let tiles = |phantom: &Phantom| -> Vec<_> {
+                phantom.pieces.iter().map(|p| (p.absorbance.clone(), p.coverage.clone())).collect()
+            };
+            assert_eq!(tiles(alone), tiles(among), "{kind:?}");
+        }
+    }
+}
+
+#[test]
+fn what_absorbs_is_covered_and_areas_are_those_of_the_cover() {
+    let mut all = Debris::none();
+    for kind in Kind::ALL {
+        counted(&mut all, kind, 6.0);
+    }
+    for (kind, phantom) in phantoms(&draw(&all)) {
+        let whole = &phantom.pieces[0];
+        assert!(whole.coverage.values.iter().all(|share| (0.0..=1.0).contains(share)), "{kind:?}");
+        let covered: f64 = whole.coverage.values.iter().map(|share| f64::from(*share)).sum();
+        // Rods and blobs give the area of their shape, of which pixels cover as much but for rounding.
+        assert!((whole.area_px / covered - 1.0).abs() < 0.25, "{kind:?}: {} {covered}", whole.area_px);
+        let same = whole.absorbance.values.len() == whole.coverage.values.len();
+        assert!(same, "{kind:?}");
+        for (value, share) in whole.absorbance.values.iter().zip(&whole.coverage.values) {
+            assert!(value.is_finite() && *value >= 0.0, "{kind:?}");
+            assert!(*share > 0.0 || *value == 0.0, "{kind:?} absorbs beside itself");
+        }
+    }
+}
+
+#[test]
+fn even_things_absorb_what_they_are_told() {
+    let mut debris = Debris::none();
+    for kind in [Kind::Bacillus, Kind::Speckle, Kind::Dirt, Kind::Crystal, Kind::Dust, Kind::Scratch] {
+        counted(&mut debris, kind, 5.0);
+    }
+    let scene = draw(&debris);
+    let bodies = scene.objects.iter().filter(|object| object.body.kind() != Kind::Cell);
+    for ((kind, phantom), object) in phantoms(&scene).iter().zip(bodies) {
+        let [whole] = &phantom.pieces[..] else { panic!("{kind:?}") };
+        let (mut absorbed, mut covered) = (0.0, 0.0);
+        for (value, share) in whole.absorbance.values.iter().zip(&whole.coverage.values) {
+            absorbed += f64::from(*value);
+            covered += f64::from(*share);
+        }
+        let told = object.body.absorbance();
+        assert!((absorbed / covered / told - 1.0).abs() < 1e-3, "{kind:?}: {} {told}", absorbed / covered);
+    }
+}
+
+#[test]
+fn sizes_are_those_asked_for() {
+    let mut debris = Debris::none();
+    counted(&mut debris, Kind::RedCell, 4.0);
+    debris.red_cells.diameter_um = 7.0.into();
+    counted(&mut debris, Kind::Bubble, 4.0);
+    debris.bubbles.radius_um = 12.0.into();
+    counted(&mut debris, Kind::BareNucleus, 4.0);
+    debris.bare_nuclei.radius_um = 3.6.into();
+    let disc = |radius_um: f64| core::f64::consts::PI * radius_um * radius_um;
+    for (kind, phantom) in phantoms(&draw(&debris)) {
+        let area_um2 = phantom.pieces[0].area_px * 0.25;
+        let (least, most) = match kind {
+            // Discs are a little squeezed.
+            Kind::RedCell => (0.82 * disc(3.5), 1.05 * disc(3.5)),
+            Kind::Bubble => (0.98 * disc(12.0), 1.02 * disc(12.0)),
+            _ => (0.9 * disc(3.6), 1.1 * disc(3.6)),
+        };
+        assert!((least..=most).contains(&area_um2), "{kind:?}: {area_um2} not in {least} to {most}");
+    }
+}
+
+#[test]
+fn a_coat_follows_its_cell() {
+    let mut debris = Debris::none();
+    debris.clue_cells.share = 1.0.into();
+    debris.clue_cells.beyond_um = 0.0.into();
+    let engine = |debris: Debris| {
+        crate::Engine::new(&recipe(debris), &Model::builtin(), &crate::Inputs::default()).unwrap().frame(KEY).unwrap()
+    };
+    let (coated, bare) = (engine(debris), engine(Debris::none()));
+    let rows = |frame: &crate::Frame| frame.finished.truth.objects.clone();
+    for (coated, bare) in rows(&coated).iter().zip(&rows(&bare)) {
+        assert_eq!(coated.amodal, bare.amodal, "a coat is no part of the cell's outline");
+        assert!(coated.traits.split(';').any(|word| word == "clue"), "{}", coated.traits);
+        assert!(!bare.traits.contains("clue"));
+    }
+    let sum = |frame: &crate::Frame| frame.planes[0].noise_free.iter().map(|v| f64::from(*v)).sum::<f64>();
+    assert!(sum(&coated) < sum(&bare), "bacteria absorb");
+}
+
+/// Every number of a JSON value with the path to it.
+fn numbers(value: &Value, path: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Number(_) => found.push(path.to_owned()),
+        Value::Object(map)
+            if ["uniform", "normal", "log_normal", "choice"].iter().any(|law| map.contains_key(*law)) =>
+        {
+            found.push(path.to_owned());
+        }
+        Value::Object(map) => map.iter().for_each(|(name, inner)| numbers(inner, &format!("{path}/{name}"), found)),
+        _ => {}
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_a_recipe_may_hold_can_be_drawn(picks in proptest::collection::vec(0_usize..14, 400)) {
+        const VALUES: [f64; 13] = [0.0, 0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 5.0, 12.0, 30.0, 100.0, 500.0, -3.0];
+        const FEW: f64 = 3.0;
+        let mut json = serde_json::to_value(Debris::default()).unwrap();
+        let mut paths = Vec::new();
+        numbers(&json, "", &mut paths);
+        for (path, pick) in paths.iter().zip(picks) {
+            let Some(value) = VALUES.get(pick) else { continue };
+            let counts = ["count", "clusters", "colonies", "groups", "strands", "drifts", "per_", "hyphae", "yeasts", "share"];
+            let value = if counts.iter().any(|word| path.contains(word)) { value.min(FEW) } else { *value };
+            let before = json.pointer(path).cloned().unwrap();
+            *json.pointer_mut(path).unwrap() = serde_json::json!(value);
+            let accepted = serde_json::from_value(json.clone()).is_ok_and(|debris| recipe(debris).problems().is_empty());
+            if !accepted {
+                *json.pointer_mut(path).unwrap() = before;
+            }
+        }
+        let debris: Debris = serde_json::from_value(json).unwrap();
+        for (kind, phantom) in phantoms(&draw(&debris)) {
+            for piece in &phantom.pieces {
+                prop_assert!(piece.absorbance.values.iter().all(|v| v.is_finite() && *v >= 0.0), "{:?}", kind);
+                prop_assert!(piece.area_px.is_finite() && piece.phase_rad.is_finite(), "{:?}", kind);
+            }
+        }
+    }
+}

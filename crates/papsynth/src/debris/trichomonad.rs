@@ -1,0 +1,181 @@
+//! Trichomonads: pale pear-shaped flagellates with a small, spindle-shaped nucleus.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::paint::{Painting, Stroke};
+use super::site::Site;
+use super::{Kinds, Section, Thing};
+use crate::phantom::Phantom;
+use crate::phantom::pools::Look;
+use crate::phantom::tile::Point;
+use crate::phantom::wobble::smooth;
+use crate::random;
+use crate::recipe::{DyeAmounts, Number};
+
+/// Trichomonads, pale pear-shaped flagellates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Trichomonads {
+    /// Number of groups, 0 to 100000; drawn once a field.
+    pub groups: Number,
+    /// Trichomonads of a group, 1 to 10000.
+    pub per_group: Number,
+    /// Radius (standard deviation) of a group, µm, 0 to 1000.
+    pub group_um: Number,
+    /// Share of the groups that lie on a cell, 0 to 1.
+    pub on_cells: Number,
+    /// Length, µm, 2 to 60.
+    pub length_um: Number,
+    /// Width relative to the length, 0.2 to 1.
+    pub width: Number,
+    /// Absorbance of the pale body, 0 to 4.
+    pub absorbance: Number,
+    /// Absorbance of the nucleus above the body, 0 to 4.
+    pub nucleus: Number,
+    /// Its dyes; the nucleus takes those of other nuclei.
+    pub dyes: DyeAmounts,
+}
+
+/// A trichomonad, its numbers drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trichomonad {
+    /// Length, µm.
+    pub length_um: f64,
+    /// Width relative to it.
+    pub width: f64,
+    /// Absorbance of the body.
+    pub absorbance: f64,
+    /// Absorbance of the nucleus above the body.
+    pub nucleus: f64,
+    /// Dyes of the body where its absorbance is 1.
+    pub dyes: dye_spectra::Amounts,
+}
+
+impl Default for Trichomonads {
+    fn default() -> Self {
+        Self {
+            groups: Number::log_normal(0.07, 0.9),
+            per_group: Number::log_normal(5.0, 0.7).at_least(1.0),
+            group_um: Number::uniform(12.0, 30.0),
+            on_cells: 0.4.into(),
+            length_um: Number::normal(12.0, 1.0),
+            width: Number::uniform(0.55, 0.8),
+            absorbance: Number::log_normal(0.09, 0.25),
+            nucleus: Number::uniform(0.08, 0.2),
+            dyes: DyeAmounts { light_green: 2.2, eosin_y: 0.6, haematein: 0.15, ..DyeAmounts::none() },
+        }
+    }
+}
+
+impl Kinds for Trichomonads {
+    fn none() -> Self {
+        Self { groups: 0.0.into(), ..Self::default() }
+    }
+
+    fn check(&self, section: &mut Section<'_>) {
+        section.count("groups", &self.groups, 0.0, 1e5);
+        section.count("per_group", &self.per_group, 1.0, 1e4);
+        section.number("group_um", &self.group_um, 0.0, 1000.0);
+        section.share("on_cells", &self.on_cells);
+        section.number("length_um", &self.length_um, 2.0, 60.0);
+        section.number("width", &self.width, 0.2, 1.0);
+        section.absorbance("absorbance", &self.absorbance);
+        section.absorbance("nucleus", &self.nucleus);
+        section.dyes("dyes", &self.dyes);
+    }
+
+    fn draw(&self, ground: &mut Ground<'_>) {
+        let dyes = ground.dyes(&self.dyes);
+        for index in 0..ground.count("groups", &self.groups) {
+            let mut rng = ground.stream(index, "group");
+            let group = ground.cluster(&self.on_cells, &self.group_um, &mut rng);
+            for member in 0..self.per_group.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = ground.stream(number, "body");
+                let centre_um = group.place(&mut rng);
+                let trichomonad = Trichomonad {
+                    length_um: self.length_um.draw(&mut rng),
+                    width: self.width.draw(&mut rng),
+                    absorbance: self.absorbance.draw(&mut rng),
+                    nucleus: self.nucleus.draw(&mut rng),
+                    dyes,
+                };
+                let depth_um = group.depth_um + 0.5 * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                ground.add(number, cluster_id(index), lie, trichomonad);
+            }
+        }
+    }
+}
+
+/// Corners of the outline before it is smoothed, and points between two of them.
+const CORNERS: usize = 16;
+const BETWEEN: usize = 4;
+
+/// How much wider the front of the pear is than its tail.
+const PEAR: f64 = 0.32;
+
+/// Strength of the cytoplasm's grain, and its size, µm.
+const GRAIN: f32 = 0.2;
+const GRAIN_UM: f64 = 0.4;
+
+/// Width of a flagellum, µm, and its absorbance relative to the body's.
+const FLAGELLUM_UM: f64 = 0.25;
+const FLAGELLUM: f64 = 0.3;
+
+impl Thing for Trichomonad {
+    fn absorbance(&self) -> f64 {
+        self.absorbance
+    }
+
+    fn phantom(&self, site: &Site<'_>) -> Phantom {
+        let mut rng = site.stream("shape");
+        let (a, b) = (0.5 * self.length_um, 0.5 * self.length_um * self.width);
+        let corners: Vec<Point> = (0..CORNERS)
+            .map(|i| {
+                let angle = core::f64::consts::TAU * i as f64 / CORNERS as f64;
+                let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+                let wobble = 1.0 + 0.05 * random::normal(&mut rng);
+                [a * cos * wobble, b * sin * wobble * (1.0 + PEAR * cos)]
+            })
+            .collect();
+        let outline = site.places(&smooth(&corners, BETWEEN));
+        // Flagella start in front, the axostyle sticks out behind.
+        let mut threads: Vec<[Point; 3]> = (0..3 + random::below(2, &mut rng))
+            .map(|_| {
+                let mut ahead = |reach: f64| [reach * a, 0.3 * a * random::normal(&mut rng)];
+                [[0.85 * a, 0.0], ahead(1.25), ahead(1.6)]
+            })
+            .collect();
+        threads.push([[-0.8 * a, 0.0], [-1.1 * a, 0.05 * a], [-1.3 * a, 0.1 * a * random::normal(&mut rng)]]);
+        let threads: Vec<[Point; 3]> = threads.iter().map(|thread| thread.map(|p| site.place(p))).collect();
+        let mut painting = site.painting(outline.iter().chain(threads.iter().flatten()), 0.5);
+        painting.fill(&outline, self.absorbance);
+        let look = Look::clouds(site.px(GRAIN_UM), &mut rng);
+        painting.texture(site.pools.clouds(), &look, GRAIN);
+        let mut hairs = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
+        let half_width = site.px(0.5 * FLAGELLUM_UM);
+        for pair in threads.iter().flat_map(|thread| thread.windows(2)) {
+            hairs.stroke(&Stroke::even(pair[0], pair[1], half_width), FLAGELLUM * self.absorbance);
+        }
+        let mut nucleus = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
+        let (at, tilt) = ([0.42 * a, 0.2 * b * random::normal(&mut rng)], 0.4 * random::normal(&mut rng));
+        let reach = 0.15 * self.length_um;
+        let tip =
+            |side: f64| site.place([at[0] + side * reach * libm::cos(tilt), at[1] + side * reach * libm::sin(tilt)]);
+        let (middle, thick) = (site.place(at), site.px(0.07 * self.length_um));
+        for side in [-1.0, 1.0] {
+            let half_widths = [thick, 0.35 * thick];
+            nucleus.stroke(&Stroke { ends: [middle, tip(side)], half_widths }, 0.0);
+        }
+        let both = nucleus.absorbance.values.iter_mut().zip(&nucleus.coverage.values);
+        both.for_each(|(value, cover)| *value = self.nucleus as f32 * cover);
+        // Flagella are no part of its outline: nobody would draw it round them.
+        painting
+            .finish(self.dyes, 0.0, self.absorbance)
+            .stained(nucleus.absorbance, site.scene.dyes.nucleus)
+            .stained(hairs.absorbance, self.dyes)
+    }
+}
