@@ -13,7 +13,7 @@ use crate::recipe::{Setting, recipe, simulated};
 use crate::refine::{Forward, distance, propose};
 use crate::regression::{Estimate, Regression};
 use crate::summary::{Summary, Window};
-use crate::table::{Step, Table, TableParams, Tell, simulate, spread_out};
+use crate::table::{Step, Table, TableParams, Tell, spread_out};
 use crate::view::{MakeEngine, View};
 
 /// Whether the size of a pixel is known.
@@ -144,8 +144,8 @@ pub struct Match {
     base: Recipe,
 }
 
-/// An interval wider than this part of its range says too little.
-const WIDEST: f64 = 0.5;
+/// An interval wider than this part of its range says too little: the parameter counts as not identified.
+pub const WIDEST: f64 = 0.5;
 
 /// Fewest nuclei that stain and sizes are learnt from.
 const LEAST_NUCLEI: usize = 8;
@@ -358,19 +358,4 @@ impl Search<'_> {
 fn width_of_value(parameter: Parameter, e: &Estimate) -> f64 {
     let prior = parameter.prior();
     prior.place(e.high) - prior.place(e.low)
-}
-
-/// Used by trials that share one table: what windows of a whole set are like.
-///
-/// # Errors
-/// If the engine cannot make them.
-pub fn windows_of(
-    setting: &Setting,
-    values: &Values,
-    view: &View,
-    make: &MakeEngine<'_>,
-    windows: usize,
-    first: Key,
-) -> Result<Summary, Error> {
-    simulate(setting, values, |_| true, view, make, windows, first)
 }

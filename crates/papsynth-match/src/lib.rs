@@ -18,7 +18,7 @@ mod text;
 mod view;
 
 pub use error::Error;
-pub use fit::{Answer, Distance, Fit, Match, MatchParams, Origin, PixelSize, Statistic, windows_of};
+pub use fit::{Answer, Distance, Fit, Match, MatchParams, Origin, PixelSize, Statistic, WIDEST};
 pub use measured::{Measured, measure};
 pub use parameter::{PARAMETERS, Parameter, Prior, Scale, Source, Values};
 pub use recipe::{Setting, Spreads, recipe};

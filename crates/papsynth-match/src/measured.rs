@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::interval::{of_deviation, of_mean};
-use crate::noise::{pattern, relative_noise};
+use crate::noise::{Empty, pattern};
 use crate::number::{deviation, mean, quantile};
 use crate::parameter::Parameter;
 use crate::recipe::{LEVELS, Spreads};
@@ -24,11 +24,18 @@ const MEAN_SQUARE: f64 = 0.3667;
 /// What no statistic knows better than: dirt and unevenness of the slide add to noise, a part of it.
 const NOISE_ERROR: f64 = 0.02;
 
+/// To the part of noise that is a pattern, a part of it.
+const PATTERN_ERROR: f64 = 0.06;
+
 /// To a correlation.
 const CORRELATION_ERROR: f64 = 0.012;
 
-/// To the level, a part of full scale.
-const LEVEL_ERROR: f64 = 0.002;
+/// To a correlation where noise is faint, times the variance: rounding is shared with none.
+const ROUNDING_ERROR: f64 = 0.05;
+
+/// To the level, a part of full scale; and where all is covered, and what is taken for empty is not.
+const LEVEL_ERROR: f64 = 0.003;
+const COVERED_ERROR: f64 = 0.025;
 
 /// To a curvature.
 const BOWL_ERROR: f64 = 0.003;
@@ -63,9 +70,8 @@ struct Light {
     level: f64,
     across: f64,
     down: f64,
-    noise: f64,
-    shared: [f64; 2],
-    relative: Vec<f32>,
+    coverage: f64,
+    empty: Empty,
 }
 
 /// Measures what a statistic determines by itself. `pixel_um` is the size of a pixel as far as it is known.
@@ -89,10 +95,11 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     let of = |known: &Known| NucleiFrom::of(known);
     let nuclei_from = fields.iter().map(|f| of(&f.nuclei)).min().unwrap_or_default();
     let view = View::new(size_px, pixel_um, nuclei_from)?;
+    let scale = f64::from(first.full_scale);
     let lights: Vec<Result<Light, Error>> = fields.par_iter().map(|field| light(field, &view)).collect();
     let lights: Vec<Light> = lights.into_iter().collect::<Result<_, _>>()?;
     let column = |f: &dyn Fn(&Light) -> f64| -> Vec<f64> { lights.iter().map(f).filter(|v| v.is_finite()).collect() };
-    let shared = [0, 1].map(|i| column(&|l| l.shared[i]));
+    let shared = [0, 1].map(|i| column(&|l| l.empty.shared[i]));
     let extended = shared.iter().all(|s| !s.is_empty()) && shared.iter().map(|s| mean(s)).fold(0.0, f64::max) > FUSED;
 
     let mut estimates = Vec::new();
@@ -107,14 +114,18 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
             estimates.push((parameter, Estimate { value: middle, low: low.min(middle), high: high.max(middle) }));
         }
     };
-    put(Parameter::Level, &levels, LEVEL_ERROR);
+    let covered = mean(&column(&|l| l.coverage));
+    let level_error = LEVEL_ERROR + COVERED_ERROR * covered * covered;
+    put(Parameter::Level, &levels, level_error);
     put(Parameter::BowlAcross, &column(&|l| l.across.max(0.0)), BOWL_ERROR);
     put(Parameter::BowlDown, &column(&|l| l.down.max(0.0)), BOWL_ERROR);
     if extended {
-        put(Parameter::Across, &shared[0], CORRELATION_ERROR);
-        put(Parameter::Down, &shared[1], CORRELATION_ERROR);
+        let variance = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
+        let error = CORRELATION_ERROR + ROUNDING_ERROR * (scale / LEVELS).max(1.0) / variance;
+        put(Parameter::Across, &shared[0], error);
+        put(Parameter::Down, &shared[1], error);
     }
-    let noise: Vec<f64> = column(&|l| l.noise).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
+    let noise: Vec<f64> = column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
     if !noise.is_empty() {
         let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR;
         let prior = Parameter::Noise.prior();
@@ -125,21 +136,25 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
         let sd = deviation(&levels);
         let [low, high] = of_deviation(levels.len()).map(|factor| factor * sd);
         let most = Parameter::LevelSpread.prior().high;
-        estimates.push((Parameter::LevelSpread, Estimate { value: sd, low: (low - LEVEL_ERROR).max(0.0), high: (high + LEVEL_ERROR).min(most.max(sd)) }));
+        estimates.push((Parameter::LevelSpread, Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) }));
     }
-    let relative: Vec<Vec<f32>> = lights.iter().map(|l| l.relative.clone()).collect();
-    if let Some([variance, error]) = pattern(&relative) {
-        let half = 2.0 * error + 0.06 * variance.abs();
-        let [value, low, high] = [0.0, -half, half].map(|d| (variance + d).max(0.0).sqrt());
-        let most = Parameter::Pattern.prior().high;
-        estimates.push((Parameter::Pattern, Estimate { value, low, high: high.min(most.max(value)) }));
+    let [sd_across, sd_down] = [deviation(&column(&|l| l.across)), deviation(&column(&|l| l.down))];
+    let variances = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
+    let squares = mean(&column(&|l| l.level * l.level)) * scale * scale;
+    let restored = mean(&column(&|l| l.empty.restored()));
+    let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();
+    if let Some([variance, error]) = pattern(&relative).map(|found| found.map(|v| v * restored)) {
+        let per_noise = squares / variances;
+        let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
+        let [value, low, high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
+        estimates.push((Parameter::Pattern, Estimate { value, low, high }));
     }
     estimates.sort_by_key(|(parameter, _)| *parameter);
     let or_default = |sd: f64, default: f64| if sd.is_finite() { sd } else { default };
     let usual = Spreads::default();
     let spreads = Spreads {
-        across: or_default(deviation(&column(&|l| l.across)), usual.across),
-        down: or_default(deviation(&column(&|l| l.down)), usual.down),
+        across: or_default(sd_across, usual.across),
+        down: or_default(sd_down, usual.down),
         noise: or_default(deviation(&noise), usual.noise),
     };
     Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, spreads })
@@ -154,9 +169,8 @@ fn light(field: &Picture, view: &View) -> Result<Light, Error> {
         level: middle / LEVELS,
         across,
         down,
-        noise: s.noise_dn,
-        shared: [s.noise_across, s.noise_down],
-        relative: relative_noise(&field.grey, field.width, grey),
+        coverage: s.coverage,
+        empty: Empty::new(&field.grey, field.width, grey),
     })
 }
 

@@ -61,20 +61,72 @@ pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> f64 {
 }
 
 /// Width of the Gaussian whose remainder is noise, pixels.
-const NOISE_PX: f64 = 3.0;
+const NOISE_PX: f64 = 6.0;
 
-/// A pixel is empty slide if a Gaussian of that width is within this part of the light of the slide.
-const NEAR: f32 = 0.03;
+/// Of that whose difference from a wider one shows that something lies there.
+const THINGS_PX: f64 = 2.5;
 
-/// The noise of a field where its slide is empty, over its light there; NaN elsewhere.
-pub(crate) fn relative_noise(grey: &[f32], width: usize, empty: f64) -> Vec<f32> {
-    let smooth = blur(grey, width, NOISE_PX);
-    let wide = blur(grey, width, 4.0 * NOISE_PX);
-    let empty = single(empty);
-    grey.iter()
-        .zip(smooth.iter().zip(&wide))
-        .map(|(g, (s, w))| if *s > (1.0 - NEAR) * empty && (s - w).abs() < 0.004 * empty { (g - s) / s } else { f32::NAN })
-        .collect()
+/// How many times its usual size that difference may have where nothing lies.
+const USUAL: f64 = 3.0;
+
+/// Empty slide is within this part of its light.
+const NEAR: f32 = 0.04;
+
+/// Fewest pixels of empty slide that noise is measured on.
+const LEAST_EMPTY: usize = 4000;
+
+/// Noise of the empty parts of a field.
+pub(crate) struct Empty {
+    /// Over the light there; NaN elsewhere.
+    pub(crate) relative: Vec<f32>,
+    /// Its standard deviation, in the levels of the picture; NaN where too little is empty.
+    pub(crate) deviation: f64,
+    /// What it shares with the next pixel of the row and of the column.
+    pub(crate) shared: [f64; 2],
+}
+
+/// What a Gaussian takes of the covariance of noise when it is taken off: this part of the sum over all distances. A
+/// remainder g − G∗g has the covariance γ − (2G − G∗G)∗γ, and noise is narrow beside G.
+const TAKEN: f64 = 3.0 / (4.0 * std::f64::consts::PI * NOISE_PX * NOISE_PX);
+
+impl Empty {
+    /// Of a picture whose empty slide is at a level.
+    pub(crate) fn new(grey: &[f32], width: usize, level: f64) -> Self {
+        let wide = blur(grey, width, NOISE_PX);
+        let things: Vec<f32> = blur(grey, width, THINGS_PX).iter().zip(&wide).map(|(a, b)| a - b).collect();
+        let slide = single((1.0 - f64::from(NEAR)) * level);
+        let mut sizes: Vec<f64> = things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
+        // The median size of a normal is 0.674 of its deviation; what lies there makes it larger, by little.
+        let most = single(USUAL * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
+        let rest: Vec<f32> =
+            grey.iter().zip(&wide).zip(&things).map(|((g, w), t)| if *w > slide && t.abs() < most { g - w } else { f32::NAN }).collect();
+        let relative = rest.iter().zip(&wide).map(|(r, w)| r / w).collect();
+        let product = |step: usize| {
+            let (mut sum, mut count) = (0.0, 0_usize);
+            for (a, b) in rest.iter().zip(&rest[step..]) {
+                let value = f64::from(a * b);
+                if value.is_finite() {
+                    sum += value;
+                    count += 1;
+                }
+            }
+            if count < LEAST_EMPTY { f64::NAN } else { sum / count as f64 }
+        };
+        let found = [0, 1, width].map(product);
+        let mut own = found;
+        /// Each round leaves a fiftieth of the error of the one before.
+        const ROUNDS: usize = 6;
+        for _ in 0..ROUNDS {
+            let all = own[0] * (1.0 + 2.0 * own[1] / own[0]) * (1.0 + 2.0 * own[2] / own[0]);
+            own = found.map(|f| f + TAKEN * all);
+        }
+        Self { relative, deviation: own[0].sqrt(), shared: [own[1] / own[0], own[2] / own[0]] }
+    }
+
+    /// By what to multiply variances of [`relative`](Self::relative): the Gaussian took a part of them.
+    pub(crate) fn restored(&self) -> f64 {
+        1.0 / (1.0 - TAKEN * (1.0 + 2.0 * self.shared[0]) * (1.0 + 2.0 * self.shared[1]))
+    }
 }
 
 /// Fewest pixels that two fields have empty in common.
@@ -118,17 +170,34 @@ mod tests {
 
     #[test]
     fn what_fields_share_is_found() {
-        let (width, height) = (200, 150);
+        let (width, height) = (400, 300);
         let shared = noise(1, width * height, 0.01);
         let field = |seed: u64| {
             let own = noise(seed, width * height, 2.0);
             let grey: Vec<f32> = shared.iter().zip(own).map(|(s, o)| 220.0 * (1.0 + s) + o).collect();
-            relative_noise(&grey, width, 220.0)
+            Empty::new(&grey, width, 220.0)
         };
-        let [variance, error] = pattern(&[field(2), field(3), field(4)]).unwrap();
-        // Three pairs of 3·10⁴ pixels: 4·10⁻⁷ of error; the Gaussian takes a hundredth.
-        assert!((variance - 1e-4).abs() < 4e-6, "{variance} {error}");
-        assert_eq!(pattern(&[field(2)]), None);
+        let fields = [field(2), field(3), field(4)];
+        let [variance, error] = pattern(&fields.each_ref().map(|f| f.relative.clone())).unwrap();
+        // 1.2·10⁵ pixels: 5·10⁻⁷ of error, the pattern's own chance included.
+        assert!((variance * fields[0].restored() - 1e-4).abs() < 1.5e-6, "{variance} {error}");
+        assert_eq!(pattern(&[fields[0].relative.clone()]), None);
+        // 2 and a hundredth of 220, on 1.2·10⁵ pixels.
+        assert!((fields[0].deviation / (4.0_f64 + 4.84).sqrt() - 1.0).abs() < 0.02, "{}", fields[0].deviation);
+        assert!(fields[0].shared.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].shared);
+    }
+
+    #[test]
+    fn neighbours_that_share_noise_do_and_things_on_the_slide_do_not_count() {
+        let (width, height) = (300, 300);
+        let own = noise(9, width * height + width + 1, 3.0);
+        let mut grey: Vec<f32> = (0..width * height).map(|i| 200.0 + (own[i] + own[i + width]) / 2.0_f32.sqrt()).collect();
+        for y in 100..160 {
+            grey[y * width + 100..y * width + 160].fill(120.0);
+        }
+        let empty = Empty::new(&grey, width, 200.0);
+        assert!((empty.deviation - 3.0).abs() < 0.05, "{}", empty.deviation);
+        assert!(empty.shared[0].abs() < 0.02 && (empty.shared[1] - 0.5).abs() < 0.02, "{:?}", empty.shared);
     }
 
     #[test]

@@ -66,18 +66,18 @@ macro_rules! parameters {
 }
 
 parameters! {
-    /// Light of the empty slide, a part of full scale.
-    Level: Measured, Linear 0.60..0.97 "", "background.level: mean";
+    /// Mean light of the empty slide, a part of full scale: what scatter takes, half its strength, is off.
+    Level: Measured, Linear 0.55..0.94 "", "background.level: mean light";
     /// Its standard deviation between fields.
-    LevelSpread: Measured, Linear 0.0..0.08 "", "background.level: sd";
+    LevelSpread: Measured, Linear 0.0..0.04 "", "background.level: sd";
     /// Fall of the light towards the left and right border.
     BowlAcross: Measured, Linear 0.0..0.12 "", "background.illumination.x2: mean";
     /// Towards the upper and lower border.
     BowlDown: Measured, Linear 0.0..0.12 "", "background.illumination.y2: mean";
     /// Standard deviation of all noise of the empty slide, levels of 8 bits.
     Noise: Measured, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
-    /// What of it is the same in every picture, a part of the light.
-    Pattern: Measured, Linear 0.0..0.02 "", "camera.prnu";
+    /// Part of its variance that is the same in every picture.
+    Pattern: Measured, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
     /// Noise shared with the next pixel of the row, in a fused picture.
     Across: Measured, Linear 0.0..0.45 "", "focus.fused_noise_across";
     /// With the next pixel of the column.

@@ -45,6 +45,9 @@ impl Default for Spreads {
 /// Levels of 8 bits.
 pub(crate) const LEVELS: f64 = 255.0;
 
+/// Part of its strength that scatter takes of the light on the mean.
+const TAKEN: f64 = 0.5;
+
 /// Variance of rounding to whole levels of 8 bits.
 const ROUNDING: f64 = 1.0 / 12.0;
 
@@ -77,7 +80,7 @@ impl Setting {
             let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
             w * h * p * p * 1e-6
         };
-        let level = centre(&base.background.level);
+        let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
         let (x2, y2) = match &base.background.illumination {
             Illumination::Bowl { x2, y2, .. } => (centre(x2), centre(y2)),
             Illumination::Border { .. } => (0.0, 0.0),
@@ -86,7 +89,8 @@ impl Setting {
         let camera = &base.camera;
         let per_dn = centre(&camera.full_well_e) / LEVELS;
         let (photons, read) = (grey / per_dn, centre(&camera.read_noise_e) / per_dn);
-        let pattern = centre(&camera.prnu);
+        let pattern = centre(&camera.prnu) * grey;
+        let noise = photons + read * read + pattern * pattern + ROUNDING;
         let counts: f64 = base.cells.values().map(|mix| centre(&mix.count)).sum();
         let superficial = base.cells.get("superficial").map_or(0.0, |mix| centre(&mix.count));
         let intermediate = base.cells.get("intermediate").map_or(0.0, |mix| centre(&mix.count));
@@ -102,11 +106,11 @@ impl Setting {
         let mut values = Values([0.0; PARAMETERS.len()]);
         for (parameter, value) in [
             (P::Level, level),
-            (P::LevelSpread, spread(&base.background.level) * level),
+            (P::LevelSpread, spread(&base.background.level) * centre(&base.background.level)),
             (P::BowlAcross, x2),
             (P::BowlDown, y2),
-            (P::Noise, (photons + read * read + pattern * pattern * grey * grey + ROUNDING).sqrt()),
-            (P::Pattern, pattern),
+            (P::Noise, noise.sqrt()),
+            (P::Pattern, pattern * pattern / noise),
             (P::Across, centre(&base.focus.fused_noise_across)),
             (P::Down, centre(&base.focus.fused_noise_down)),
             (P::Pixel, centre(&base.field.pixel_um)),
@@ -177,7 +181,8 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
 
     if either(P::Level, P::LevelSpread) {
-        r.background.level = cut(normal(or_base(P::Level), or_base(P::LevelSpread)), 0.01, 1.0);
+        let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
+        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 0.99);
     }
     if either(P::BowlAcross, P::BowlDown) {
         let off_centre = match &r.background.illumination {
@@ -201,7 +206,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         r.focus.fused_noise_down = number(get(P::Down));
     }
     if either(P::Blur, P::BlurSpread) {
-        *blur_mut(&mut r.optics) = log_normal(or_base(P::Blur), or_base(P::BlurSpread));
+        *blur_mut(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
     }
     if on(P::Depth) {
         r.slide.depth_um = number(get(P::Depth));
@@ -242,13 +247,12 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         (P::Smudges, &mut debris.smudges.count),
         (P::Dirt, &mut debris.dirt.drifts),
     ] {
-        let least = if on(parameter) { 0.0 } else { f64::NAN };
-        if least.is_nan() {
-            *count = times(count, area / base_area(&setting.base));
+        if !on(parameter) {
+            *count = counted(times(count, area / base_area(&setting.base)));
         } else {
             // What a preset has none of has no spread to keep.
             let log_sd = if spread(count) > 0.0 { spread(count).min(1.0) } else { 0.6 };
-            *count = log_normal(get(parameter) * area, log_sd);
+            *count = counted(log_normal(get(parameter) * area, log_sd));
         }
     }
     r
@@ -268,8 +272,8 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     const LEAST: f64 = 0.02;
     let grey = or_base(P::Level) * LEVELS;
     let all = or_base(P::Noise) * or_base(P::Noise);
-    let pattern = or_base(P::Pattern).min((0.8 * all).sqrt() / grey);
-    let rest = (all - pattern * pattern * grey * grey - ROUNDING).max(0.1 * all);
+    let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;
+    let rest = (all - pattern - ROUNDING).max(0.1 * all);
     let photons = or_base(P::Photons).clamp(LEAST, 1.0 - LEAST);
     let per_dn = grey / (photons * rest);
     let read = per_dn * ((1.0 - photons) * rest).sqrt();
@@ -281,7 +285,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     camera.read_noise_rms_e = 0.0.into();
     camera.dsnu_e = 0.0.into();
     camera.dark_current_e_per_s = 0.0.into();
-    camera.prnu = number(pattern);
+    camera.prnu = number(pattern.sqrt() / grey);
 }
 
 fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
@@ -289,42 +293,42 @@ fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
     if on(P::FieldCytoplasm) || on(P::FieldCytoplasmSpread) {
         stain.slide_cytoplasm = 1.0.into();
-        stain.field_cytoplasm = log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread));
+        stain.field_cytoplasm = cut(log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread)), 0.0, 20.0);
     }
     if on(P::FieldNucleus) || on(P::FieldNucleusSpread) {
         stain.slide_nucleus = 1.0.into();
-        stain.field_nucleus = log_normal(or_base(P::FieldNucleus), or_base(P::FieldNucleusSpread));
+        stain.field_nucleus = cut(log_normal(or_base(P::FieldNucleus), or_base(P::FieldNucleusSpread)), 0.0, 20.0);
     }
     if on(P::Texture) || on(P::TextureSpread) {
-        stain.field_texture = log_normal(or_base(P::Texture), or_base(P::TextureSpread));
+        stain.field_texture = cut(log_normal(or_base(P::Texture), or_base(P::TextureSpread)), 0.0, 20.0);
     }
 }
 
 fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
-    let counted = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
+    let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
     let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
     let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
     let scale = total / base_total.max(1e-9);
     let pair = ["superficial", "intermediate"].map(|class| r.cells.get(class).map_or(0.0, |mix| centre(&mix.count)));
     for (class, mix) in &mut r.cells {
-        if counted {
+        if found {
             let own = match class.as_str() {
                 "superficial" if on(P::Superficial) => (pair[0] + pair[1]) * share,
                 "intermediate" if on(P::Superficial) => (pair[0] + pair[1]) * (1.0 - share),
                 _ => centre(&mix.count),
             };
-            mix.count = log_normal((own * scale).max(0.01), or_base(P::CellsSpread));
+            mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSpread)));
         } else {
-            mix.count = log_normal((base.get(P::Cells) * area * centre(&mix.count) / base_total.max(1e-9)).max(0.01), spread(&mix.count));
+            mix.count = counted(times(&mix.count, base.get(P::Cells) * area / base_total.max(1e-9)));
         }
         if on(P::Size) {
             mix.size = number(or_base(P::Size));
         }
         if on(P::CellCytoplasm) {
-            mix.cytoplasm_stain = log_normal(centre(&mix.cytoplasm_stain), or_base(P::CellCytoplasm));
+            mix.cytoplasm_stain = cut(log_normal(centre(&mix.cytoplasm_stain), or_base(P::CellCytoplasm)), 0.0, 20.0);
         }
         if on(P::CellNucleus) {
-            mix.nucleus_stain = log_normal(centre(&mix.nucleus_stain), or_base(P::CellNucleus));
+            mix.nucleus_stain = cut(log_normal(centre(&mix.nucleus_stain), or_base(P::CellNucleus)), 0.0, 20.0);
         }
     }
 }
@@ -403,6 +407,17 @@ fn times(number: &Number, factor: f64) -> Number {
             min: if min.is_finite() { by(min) } else { *min },
             max: if max.is_finite() { by(max) } else { *max },
         },
+    }
+}
+
+/// What is written out of a count is whole.
+fn counted(number: Number) -> Number {
+    match number {
+        Number::Fixed(value) => Number::Fixed(libm::round(value)),
+        Number::Drawn { law: Law::Choice(values), min, max } => {
+            Number::Drawn { law: Law::Choice(values.into_iter().map(libm::round).collect()), min, max }
+        }
+        drawn => drawn,
     }
 }
 

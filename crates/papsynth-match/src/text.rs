@@ -104,6 +104,8 @@ impl Answer {
 
 /// Whether a field with `*` for a class is a path.
 fn is_at(field: &str, path: &str) -> bool {
+    // The paper's optics have another name for it.
+    let path = path.replace("sigma_xy_um", "extra_blur_um");
     let (a, b) = (field.split('.'), path.split('.'));
     a.clone().count() == b.clone().count() && a.zip(b).all(|(a, b)| a == "*" || a == b)
 }
