@@ -92,7 +92,9 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     let files = fields_of(folder, groups)?;
     if files.len() < LEAST {
         let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::input(Complaint::new(message).help("fields are never split between what is learnt from and what is tried")));
+        return Err(Failure::input(
+            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
+        ));
     }
     Ok(files)
 }

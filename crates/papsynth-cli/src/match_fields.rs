@@ -90,7 +90,10 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
         write_file(report, format!("{}\n", text.unwrap_or_default()).as_bytes())?;
     }
     write_file(&args.out, fit.to_toml().as_bytes())?;
-    exit::print(&format!("{}\n{}: use it with papsynth generate {0}\n", told(&fit), args.out.display()).replace("{0}", &args.out.display().to_string()))
+    exit::print(
+        &format!("{}\n{}: use it with papsynth generate {0}\n", told(&fit), args.out.display())
+            .replace("{0}", &args.out.display().to_string()),
+    )
 }
 
 fn refuse(error: &Error, real: &std::path::Path) -> Failure {
@@ -119,7 +122,8 @@ fn told(fit: &Fit) -> String {
         format!("{name:<24} {:>10} {interval:>21} {:>10}  {origin}\n", number(a.value), number(a.before))
     };
     text.extend(fit.answers.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
-    let lost: Vec<String> = fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
+    let lost: Vec<String> =
+        fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
     if !lost.is_empty() {
         text.push_str(&format!("not identified, left as they were: {}\n", lost.join(", ")));
     }
@@ -132,7 +136,10 @@ fn told(fit: &Fit) -> String {
     worst.sort_by(|a, b| b.apart.abs().total_cmp(&a.apart.abs()));
     text.push_str("farthest apart:\n");
     for s in worst.iter().take(TOLD) {
-        text.push_str(&format!("    {:<44} real {:>9.4}  before {:>9.4}  after {:>9.4}\n", s.name, s.real, s.before, s.after));
+        text.push_str(&format!(
+            "    {:<44} real {:>9.4}  before {:>9.4}  after {:>9.4}\n",
+            s.name, s.real, s.before, s.after
+        ));
     }
     text
 }
@@ -146,6 +153,7 @@ struct Progress {
 }
 
 impl Progress {
+    #[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no recipe")]
     fn new(quiet: bool) -> Self {
         let terminal = io::stderr().is_terminal();
         let target = if terminal && !quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
@@ -158,7 +166,9 @@ impl Progress {
     fn step(&self, step: Step) {
         let (what, done, of, more) = match step {
             Step::Simulated(done, of) => ("simulated recipes", done, of, String::new()),
-            Step::Searched(done, of, distance) => ("rounds of the search", done, of, format!(", distance {distance:.2}")),
+            Step::Searched(done, of, distance) => {
+                ("rounds of the search", done, of, format!(", distance {distance:.2}"))
+            }
         };
         self.bar.set_length(of as u64);
         self.bar.set_message(what);

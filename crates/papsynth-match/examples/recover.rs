@@ -17,8 +17,8 @@ use papsynth::recipe::Preset;
 use papsynth::{Engine, Inputs};
 use papsynth_judge::{NucleiFrom, Picture};
 use papsynth_match::{
-    Estimate, MakeEngine, PARAMETERS, Parameter, Regression, Setting, Source, Spreads, Step, Summary, Table, TableParams, Values, View, measure,
-    recipe, unseen,
+    Estimate, MakeEngine, PARAMETERS, Parameter, Regression, Setting, Source, Spreads, Step, Summary, Table,
+    TableParams, Values, View, measure, recipe, unseen,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,8 @@ struct Trial {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |i: usize, default: &str| std::env::args().nth(i).unwrap_or_else(|| default.to_owned());
-    let (recipes, trials, windows): (usize, usize, usize) = (argument(1, "300").parse()?, argument(2, "40").parse()?, argument(3, "8").parse()?);
+    let (recipes, trials, windows): (usize, usize, usize) =
+        (argument(1, "300").parse()?, argument(2, "40").parse()?, argument(3, "8").parse()?);
     let folder = PathBuf::from(argument(4, "target/recover"));
     std::fs::create_dir_all(&folder)?;
 
@@ -54,7 +55,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     // What is measured is known when the table is made: it stays as it is in the table, and differs in trials of its own.
     let mut known = setting.base_values();
-    for (parameter, value) in [(Parameter::Noise, 2.2), (Parameter::Pattern, 0.01), (Parameter::Across, 0.24), (Parameter::Down, 0.41)] {
+    for (parameter, value) in
+        [(Parameter::Noise, 2.2), (Parameter::Pattern, 0.01), (Parameter::Across, 0.24), (Parameter::Down, 0.41)]
+    {
         known.set(parameter, value);
     }
     let of = |source: Source| PARAMETERS.into_iter().filter(move |p| p.prior().source == source);
@@ -83,7 +86,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             values
         })
     })?;
-    let lit: Vec<Trial> = kept(&folder.join(format!("lights-{trials}-{windows}.json")), || bench.run("light", &drawn, Values::at))?;
+    let lit: Vec<Trial> =
+        kept(&folder.join(format!("lights-{trials}-{windows}.json")), || bench.run("light", &drawn, Values::at))?;
 
     let regression = Regression::new(&table.statistics, &table.places);
     let estimates: Vec<Vec<Estimate>> = tried.iter().map(|t| regression.estimate(&t.known_statistics())).collect();
@@ -183,7 +187,11 @@ impl Tally {
 
     fn tell(self) {
         let part = 100.0 * self.covered as f64 / self.pairs as f64;
-        println!("{} pairs claimed: {part:.1} % covered, median width {:.3} of the range", self.pairs, median(self.widths));
+        println!(
+            "{} pairs claimed: {part:.1} % covered, median width {:.3} of the range",
+            self.pairs,
+            median(self.widths)
+        );
         println!("never claimed: {}", self.never.join(", "));
     }
 }
@@ -194,7 +202,10 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Reads what was simulated before, or simulates it and keeps it.
-fn kept<T: Serialize + for<'de> Deserialize<'de>>(path: &Path, make: impl FnOnce() -> Result<T, Box<dyn Error>>) -> Result<T, Box<dyn Error>> {
+fn kept<T: Serialize + for<'de> Deserialize<'de>>(
+    path: &Path,
+    make: impl FnOnce() -> Result<T, Box<dyn Error>>,
+) -> Result<T, Box<dyn Error>> {
     if let Ok(text) = std::fs::read_to_string(path) {
         return Ok(serde_json::from_str(&text)?);
     }

@@ -18,7 +18,9 @@ pub enum Error {
     #[error("there is no field to match")]
     NoField,
     /// Pictures of different sizes.
-    #[error("field `{name}` is {width} x {height} pixels, the first is {of_first}; one microscope takes fields of one size")]
+    #[error(
+        "field `{name}` is {width} x {height} pixels, the first is {of_first}; one microscope takes fields of one size"
+    )]
     Size {
         /// Name of the picture.
         name: String,
@@ -30,7 +32,9 @@ pub enum Error {
         of_first: String,
     },
     /// A picture without light.
-    #[error("field `{name}` is black: its brightest pixels are at {level:.1} of 255, and an empty slide is expected to be brighter than {least:.0}")]
+    #[error(
+        "field `{name}` is black: its brightest pixels are at {level:.1} of 255, and an empty slide is expected to be brighter than {least:.0}"
+    )]
     Black {
         /// Name of the picture.
         name: String,
@@ -40,7 +44,9 @@ pub enum Error {
         least: f64,
     },
     /// There is nothing to learn stain and sizes from.
-    #[error("{found} nuclei were found in {fields} fields; at least {least} are needed. Is the size of a pixel right ({pixel_um} um)?")]
+    #[error(
+        "{found} nuclei were found in {fields} fields; at least {least} are needed. Is the size of a pixel right ({pixel_um} um)?"
+    )]
     Nuclei {
         /// How many there are.
         found: usize,

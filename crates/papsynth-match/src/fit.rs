@@ -198,7 +198,8 @@ impl Match {
         let measured = measure(fields, self.params.pixel.um())?;
         let view = View::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
         let pictures: Vec<Picture> = fields.iter().flat_map(|f| view.windows(f)).collect();
-        let windows: Vec<Result<(Window, Vec<String>), Error>> = pictures.par_iter().map(|p| Window::new(p, &view)).collect();
+        let windows: Vec<Result<(Window, Vec<String>), Error>> =
+            pictures.par_iter().map(|p| Window::new(p, &view)).collect();
         let windows: Vec<(Window, Vec<String>)> = windows.into_iter().collect::<Result<_, _>>()?;
         let nuclei = windows.iter().map(|w| w.0.nuclei()).sum();
         if nuclei < LEAST_NUCLEI {
@@ -210,14 +211,26 @@ impl Match {
 
         let (setting, known) = self.setting(&measured);
         let sought = simulated(&setting);
-        let of_table = TableParams { windows: self.params.table.windows.min(fields.len()), ..self.params.table.clone() };
+        let of_table =
+            TableParams { windows: self.params.table.windows.min(fields.len()), ..self.params.table.clone() };
         let table = Table::simulate(&setting, &known, &sought, &view, make, &of_table, tell)?;
         let regression = Regression::new(&table.statistics, &table.places);
         let estimates = regression.estimate(&real.values);
-        let search = Search { setting: &setting, known: &known, measured: &measured, table: &table, estimates, view: &view, make, windows: of_table.windows };
+        let search = Search {
+            setting: &setting,
+            known: &known,
+            measured: &measured,
+            table: &table,
+            estimates,
+            view: &view,
+            make,
+            windows: of_table.windows,
+        };
         let (places, distance, statistics) = search.run(&real, self.params.rounds, of_table.seed, tell)?;
         let answers = search.answers(&places);
-        let fitted = |parameter: Parameter| answers.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified);
+        let fitted = |parameter: Parameter| {
+            answers.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
+        };
         let values = spread_out(&known, &sought, &places);
         Ok(Fit {
             recipe: recipe(&setting, &values, fitted),
@@ -265,14 +278,21 @@ impl Search<'_> {
             let key = Key { seed, index: index as u64 };
             Window::new(&self.view.simulate(&engine, key).map_err(|e| Error::Engine(e.to_string()))?, self.view)
         };
-        let made: Vec<Result<(Window, Vec<String>), Error>> = (0..self.windows.max(2)).into_par_iter().map(one).collect();
+        let made: Vec<Result<(Window, Vec<String>), Error>> =
+            (0..self.windows.max(2)).into_par_iter().map(one).collect();
         let made: Vec<(Window, Vec<String>)> = made.into_iter().collect::<Result<_, _>>()?;
         let names = made[0].1.clone();
         Ok(Summary::new(&made.into_iter().map(|m| m.0).collect::<Vec<_>>(), &names))
     }
 
     /// Places of all sought parameters, how near they come, and every statistic.
-    fn run(&self, real: &Summary, rounds: usize, seed: u64, tell: &Tell<'_>) -> Result<(Vec<f64>, Distance, Vec<Statistic>), Error> {
+    fn run(
+        &self,
+        real: &Summary,
+        rounds: usize,
+        seed: u64,
+        tell: &Tell<'_>,
+    ) -> Result<(Vec<f64>, Distance, Vec<Statistic>), Error> {
         let forward = Forward::new(self.table);
         let base = self.setting.base_values();
         let fitted = |parameter: Parameter| self.identified(parameter);
@@ -315,7 +335,11 @@ impl Search<'_> {
         let estimated = self.simulate(&start, fitted, seed ^ LAST)?;
         let after = self.simulate(&best.0, fitted, seed ^ LAST)?;
         let off = apart(&after);
-        let told = Distance { before: distance(&apart(&before)), estimated: distance(&apart(&estimated)), after: distance(&off) };
+        let told = Distance {
+            before: distance(&apart(&before)),
+            estimated: distance(&apart(&estimated)),
+            after: distance(&off),
+        };
         let statistic = |i: usize| Statistic {
             name: real.names[i].clone(),
             real: real.values[i],

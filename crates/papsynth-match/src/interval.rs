@@ -48,7 +48,10 @@ mod tests {
         assert!((student(11) - 2.201).abs() < 0.003, "{}", student(11));
         // χ² with 7 degrees of freedom: 1.690 and 16.013.
         let [low, high] = of_deviation(8);
-        assert!((low - (7.0_f64 / 16.013).sqrt()).abs() < 0.01 && (high - (7.0_f64 / 1.690).sqrt()).abs() < 0.05, "{low} {high}");
+        assert!(
+            (low - (7.0_f64 / 16.013).sqrt()).abs() < 0.01 && (high - (7.0_f64 / 1.690).sqrt()).abs() < 0.05,
+            "{low} {high}"
+        );
         assert_eq!(of_deviation(1)[1], f64::INFINITY);
     }
 }

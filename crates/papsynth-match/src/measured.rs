@@ -86,7 +86,8 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
             let of_first = format!("{} x {}", size_px[0], size_px[1]);
             return Err(Error::Size { name: field.name.clone(), width: field.width, height: field.height(), of_first });
         }
-        let mut some: Vec<f64> = field.grey.iter().step_by(17).map(|g| LEVELS * f64::from(g / field.full_scale)).collect();
+        let mut some: Vec<f64> =
+            field.grey.iter().step_by(17).map(|g| LEVELS * f64::from(g / field.full_scale)).collect();
         let level = quantile(&mut some, 0.98);
         if level.is_nan() || level < DARK {
             return Err(Error::Black { name: field.name.clone(), level, least: DARK });
@@ -125,18 +126,25 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
         put(Parameter::Across, &shared[0], error);
         put(Parameter::Down, &shared[1], error);
     }
-    let noise: Vec<f64> = column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
+    let noise: Vec<f64> =
+        column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
     if !noise.is_empty() {
         let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR;
         let prior = Parameter::Noise.prior();
         let [value, low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
-        estimates.push((Parameter::Noise, Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) }));
+        estimates.push((
+            Parameter::Noise,
+            Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) },
+        ));
     }
     if levels.len() > 1 {
         let sd = deviation(&levels);
         let [low, high] = of_deviation(levels.len()).map(|factor| factor * sd);
         let most = Parameter::LevelSpread.prior().high;
-        estimates.push((Parameter::LevelSpread, Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) }));
+        estimates.push((
+            Parameter::LevelSpread,
+            Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) },
+        ));
     }
     let [sd_across, sd_down] = [deviation(&column(&|l| l.across)), deviation(&column(&|l| l.down))];
     let variances = mean(&column(&|l| l.empty.deviation * l.empty.deviation));

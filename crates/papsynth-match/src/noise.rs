@@ -27,7 +27,9 @@ pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
             let at = |x: usize, y: usize| f64::from(grey[(top + y) * width + left + x]);
             let sum: f64 = (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (x, y))).map(|(x, y)| at(x, y)).sum();
             let absorbance = -libm::log10((sum / (BLOCK * BLOCK) as f64 / empty).max(1e-3));
-            let Some(bin) = BINS.iter().position(|[from, to]| absorbance >= *from && absorbance < *to) else { continue };
+            let Some(bin) = BINS.iter().position(|[from, to]| absorbance >= *from && absorbance < *to) else {
+                continue;
+            };
             // A mask that planes and saddles vanish under (Immerkær, doi:10.1006/cviu.1996.0060).
             let mut energy = 0.0;
             for y in 1..BLOCK - 1 {
@@ -40,7 +42,10 @@ pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
             bins[bin].push(energy);
         }
     }
-    let levels = bins.map(|mut blocks| if blocks.len() < LEAST_BLOCKS { f64::NAN } else { quantile(&mut blocks, EVENEST).max(1e-3) });
+    let levels =
+        bins.map(
+            |mut blocks| if blocks.len() < LEAST_BLOCKS { f64::NAN } else { quantile(&mut blocks, EVENEST).max(1e-3) },
+        );
     std::array::from_fn(|i| libm::log(levels[i + 1] / levels[0]))
 }
 
@@ -55,8 +60,12 @@ pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> f64 {
     let light: Vec<f32> = grey.iter().map(|g| g / single(empty)).collect();
     let [fine, coarse] = UNEVEN_PX.map(|sigma| blur(&light, width, sigma));
     // Whatever lies there is darker than the slide: the paler half is the slide.
-    let mut rests: Vec<f64> =
-        fine.iter().zip(&coarse).filter(|(_, c)| **c > 1.0 - 2.0 * EVEN).map(|(f, c)| f64::from((f - c).abs())).collect();
+    let mut rests: Vec<f64> = fine
+        .iter()
+        .zip(&coarse)
+        .filter(|(_, c)| **c > 1.0 - 2.0 * EVEN)
+        .map(|(f, c)| f64::from((f - c).abs()))
+        .collect();
     if rests.len() < grey.len() / 50 { f64::NAN } else { libm::log(quantile(&mut rests, 0.5).max(1e-6)) }
 }
 
@@ -95,11 +104,16 @@ impl Empty {
         let wide = blur(grey, width, NOISE_PX);
         let things: Vec<f32> = blur(grey, width, THINGS_PX).iter().zip(&wide).map(|(a, b)| a - b).collect();
         let slide = single((1.0 - f64::from(NEAR)) * level);
-        let mut sizes: Vec<f64> = things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
+        let mut sizes: Vec<f64> =
+            things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
         // The median size of a normal is 0.674 of its deviation; what lies there makes it larger, by little.
         let most = single(USUAL * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
-        let rest: Vec<f32> =
-            grey.iter().zip(&wide).zip(&things).map(|((g, w), t)| if *w > slide && t.abs() < most { g - w } else { f32::NAN }).collect();
+        let rest: Vec<f32> = grey
+            .iter()
+            .zip(&wide)
+            .zip(&things)
+            .map(|((g, w), t)| if *w > slide && t.abs() < most { g - w } else { f32::NAN })
+            .collect();
         let relative = rest.iter().zip(&wide).map(|(r, w)| r / w).collect();
         let product = |step: usize| {
             let (mut sum, mut count) = (0.0, 0_usize);
@@ -191,7 +205,8 @@ mod tests {
     fn neighbours_that_share_noise_do_and_things_on_the_slide_do_not_count() {
         let (width, height) = (300, 300);
         let own = noise(9, width * height + width + 1, 3.0);
-        let mut grey: Vec<f32> = (0..width * height).map(|i| 200.0 + (own[i] + own[i + width]) / 2.0_f32.sqrt()).collect();
+        let mut grey: Vec<f32> =
+            (0..width * height).map(|i| 200.0 + (own[i] + own[i + width]) / 2.0_f32.sqrt()).collect();
         for y in 100..160 {
             grey[y * width + 100..y * width + 160].fill(120.0);
         }

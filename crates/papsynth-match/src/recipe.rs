@@ -1,8 +1,6 @@
 //! From values of parameters to a recipe, and back.
 
-use papsynth::recipe::{
-    CellMix, Illumination, Law, Layout, Number, Optics, Picture, Preset, Recipe,
-};
+use papsynth::recipe::{CellMix, Illumination, Law, Layout, Number, Optics, Picture, Preset, Recipe};
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
 
@@ -293,7 +291,8 @@ fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
     if on(P::FieldCytoplasm) || on(P::FieldCytoplasmSpread) {
         stain.slide_cytoplasm = 1.0.into();
-        stain.field_cytoplasm = cut(log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread)), 0.0, 20.0);
+        stain.field_cytoplasm =
+            cut(log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread)), 0.0, 20.0);
     }
     if on(P::FieldNucleus) || on(P::FieldNucleusSpread) {
         stain.slide_nucleus = 1.0.into();
@@ -367,7 +366,11 @@ fn log_normal(median: f64, log_sd: f64) -> Number {
 /// Uniform so far to both sides, but from 0 to 1.
 fn within(middle: f64, half: f64) -> Number {
     let half = half.min(middle.max(0.0)).min((1.0 - middle).max(0.0));
-    if half > 0.0 { Number::uniform(rounded(middle - half), rounded(middle + half)) } else { number(middle.clamp(0.0, 1.0)) }
+    if half > 0.0 {
+        Number::uniform(rounded(middle - half), rounded(middle + half))
+    } else {
+        number(middle.clamp(0.0, 1.0))
+    }
 }
 
 /// Nothing beyond what a recipe accepts, where the distribution reaches there.
@@ -378,11 +381,9 @@ fn cut(number: Number, low: f64, high: f64) -> Number {
     }
     match number {
         Number::Fixed(value) => Number::Fixed(value.clamp(low, high)),
-        Number::Drawn { law, min, max } => Number::Drawn {
-            law,
-            min: if least < low { low } else { min },
-            max: if most > high { high } else { max },
-        },
+        Number::Drawn { law, min, max } => {
+            Number::Drawn { law, min: if least < low { low } else { min }, max: if most > high { high } else { max } }
+        }
     }
 }
 

@@ -49,7 +49,9 @@ impl Forward {
                 let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
                 let ridge = kernel.best(&y);
                 let mut factors = vec![ridge.mean];
-                factors.extend((0..rows[0].len()).map(|f| ridge.weights.iter().zip(&rows).map(|(w, r)| w * r[f]).sum::<f64>()));
+                factors.extend(
+                    (0..rows[0].len()).map(|f| ridge.weights.iter().zip(&rows).map(|(w, r)| w * r[f]).sum::<f64>()),
+                );
                 (factors, ridge.error.sqrt().max(LEAST_ERROR))
             })
             .collect();
@@ -66,7 +68,11 @@ impl Forward {
     pub(crate) fn apart(&self, real: &[f64], simulated: &[f64]) -> Vec<f64> {
         let (a, b) = (self.scaler.scaled(real), self.scaler.scaled(simulated));
         let known = real.iter().zip(simulated).map(|(x, y)| x.is_finite() && y.is_finite());
-        known.zip(a.iter().zip(&b)).zip(&self.errors).map(|((known, (a, b)), e)| if known { (b - a) / e } else { f64::NAN }).collect()
+        known
+            .zip(a.iter().zip(&b))
+            .zip(&self.errors)
+            .map(|((known, (a, b)), e)| if known { (b - a) / e } else { f64::NAN })
+            .collect()
     }
 }
 
@@ -126,7 +132,11 @@ impl Told<'_> {
 
     fn hold(&self, places: &[f64]) -> impl Iterator<Item = f64> {
         // Half an interval is two standard errors.
-        self.moving.iter().map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9)).collect::<Vec<_>>().into_iter()
+        self.moving
+            .iter()
+            .map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
+            .collect::<Vec<_>>()
+            .into_iter()
     }
 }
 
@@ -137,7 +147,8 @@ impl CostFunction for Told<'_> {
     fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
         let (places, _) = self.inside(free);
         let features = features(&places);
-        let apart = self.aims.iter().map(|(s, aim)| robust((self.forward.at(*s, &features) - aim) / self.forward.errors[*s]));
+        let apart =
+            self.aims.iter().map(|(s, aim)| robust((self.forward.at(*s, &features) - aim) / self.forward.errors[*s]));
         Ok(apart.sum::<f64>() + HOLD * self.hold(&places).map(|z| z * z).sum::<f64>())
     }
 }

@@ -51,7 +51,9 @@ impl Scaler {
     pub(crate) fn new(rows: &[Vec<f64>]) -> Self {
         let columns = rows.first().map_or(0, Vec::len);
         let column = |c: usize| -> Vec<f64> { rows.iter().map(|r| r[c]).filter(|v| v.is_finite()).collect() };
-        let of = |f: fn(&[f64]) -> f64| (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect();
+        let of = |f: fn(&[f64]) -> f64| {
+            (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect()
+        };
         Self { means: of(mean), deviations: of(deviation) }
     }
 
@@ -95,7 +97,8 @@ impl Regression {
         let columns = places.first().map_or(0, Vec::len);
         let column = |c: usize| -> Vec<f64> { places.iter().map(|p| p[c]).collect() };
         let first: Vec<Ridge> = (0..columns).into_par_iter().map(|c| kernel.best(&column(c))).collect();
-        let summaries: Vec<Vec<f64>> = (0..n).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
+        let summaries: Vec<Vec<f64>> =
+            (0..n).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
         let second = (0..columns).into_par_iter().map(|c| Second::new(&summaries, c, &column(c))).collect();
         Self { scaler, rows, first, summaries, second }
     }
@@ -136,7 +139,8 @@ fn bent(a: &[f64], b: &[f64], own: usize, width: f64) -> f64 {
     let square = |(x, y): (&f64, &f64)| (x - y) * (x - y);
     let all = a.iter().zip(b).map(square).sum::<f64>() / a.len().max(1) as f64;
     let of_own = (a[own] - b[own]) * (a[own] - b[own]);
-    libm::exp(-0.5 * (OWN * of_own + (1.0 - OWN) * all) / (width * width)) + STRAIGHT * (dot(a, b) + OWN * a[own] * b[own])
+    libm::exp(-0.5 * (OWN * of_own + (1.0 - OWN) * all) / (width * width))
+        + STRAIGHT * (dot(a, b) + OWN * a[own] * b[own])
 }
 
 impl Second {
@@ -144,16 +148,20 @@ impl Second {
         let n = rows.len();
         let tried: Vec<(f64, Ridge)> = WIDTHS
             .into_iter()
-            .map(|width| (width, Kernel::new(DMatrix::from_fn(n, n, |i, j| bent(&rows[i], &rows[j], own, width))).best(y)))
+            .map(|width| {
+                (width, Kernel::new(DMatrix::from_fn(n, n, |i, j| bent(&rows[i], &rows[j], own, width))).best(y))
+            })
             .collect();
         let mut tried = tried.into_iter();
-        let (mut width, mut ridge) = tried.next().unwrap_or_else(|| (WIDTHS[0], Kernel::new(DMatrix::zeros(n, n)).best(y)));
+        let (mut width, mut ridge) =
+            tried.next().unwrap_or_else(|| (WIDTHS[0], Kernel::new(DMatrix::zeros(n, n)).best(y)));
         for (other, candidate) in tried {
             if candidate.error < ridge.error {
                 (width, ridge) = (other, candidate);
             }
         }
-        let mut misses: Vec<[f64; 2]> = ridge.unseen.iter().zip(y).map(|(u, v)| [u.clamp(0.0, 1.0), (u.clamp(0.0, 1.0) - v).abs()]).collect();
+        let mut misses: Vec<[f64; 2]> =
+            ridge.unseen.iter().zip(y).map(|(u, v)| [u.clamp(0.0, 1.0), (u.clamp(0.0, 1.0) - v).abs()]).collect();
         misses.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
         let mut second = Self { width, ridge, misses, reach: 1.0 };
         let mut ratios: Vec<f64> = second.misses.iter().map(|[at, miss]| miss / second.usual(*at)).collect();
@@ -198,7 +206,14 @@ mod tests {
             .iter()
             .map(|p| {
                 let e: Vec<f64> = (0..6).map(|_| 0.2 * (one() - 0.5)).collect();
-                vec![p[0] * p[0] + e[0], p[0] + p[1] + e[1], libm::exp(p[1]) + e[2], e[3], if e[4] > 0.08 { f64::NAN } else { p[0] }, e[5]]
+                vec![
+                    p[0] * p[0] + e[0],
+                    p[0] + p[1] + e[1],
+                    libm::exp(p[1]) + e[2],
+                    e[3],
+                    if e[4] > 0.08 { f64::NAN } else { p[0] },
+                    e[5],
+                ]
             })
             .collect();
         (statistics, places)

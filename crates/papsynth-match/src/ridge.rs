@@ -49,7 +49,12 @@ impl Kernel {
                 best = i;
             }
         }
-        tried.into_iter().nth(best).unwrap_or_else(|| Ridge { weights: DVector::zeros(y.len()), mean, unseen: y.to_vec(), error: f64::MAX })
+        tried.into_iter().nth(best).unwrap_or_else(|| Ridge {
+            weights: DVector::zeros(y.len()),
+            mean,
+            unseen: y.to_vec(),
+            error: f64::MAX,
+        })
     }
 }
 

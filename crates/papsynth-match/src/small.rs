@@ -90,7 +90,8 @@ fn is_long(band: &[f32], p: usize, width: usize) -> bool {
 /// A Gaussian, mirrored at the border.
 pub(crate) fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
     let reach = crate::number::whole(3.0 * sigma) + 1;
-    let mut kernel: Vec<f32> = (0..=reach).map(|i| single(libm::exp(-0.5 * (i * i) as f64 / (sigma * sigma)))).collect();
+    let mut kernel: Vec<f32> =
+        (0..=reach).map(|i| single(libm::exp(-0.5 * (i * i) as f64 / (sigma * sigma)))).collect();
     let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
     kernel.iter_mut().for_each(|k| *k /= sum);
     let height = image.len() / width;
@@ -138,7 +139,8 @@ mod tests {
         let out = blur(&image, width, 2.0);
         let sum: f32 = out.iter().sum();
         assert!((sum - 1.0).abs() < 1e-5, "{sum}");
-        let variance: f64 = out.iter().enumerate().map(|(i, v)| f64::from(*v) * ((i % width) as f64 - 20.0).powi(2)).sum();
+        let variance: f64 =
+            out.iter().enumerate().map(|(i, v)| f64::from(*v) * ((i % width) as f64 - 20.0).powi(2)).sum();
         assert!((variance - 4.0).abs() < 0.1, "{variance}");
         assert!(blur(&vec![3.0; 400], 20, 10.0).iter().all(|v| (v - 3.0).abs() < 1e-5));
     }

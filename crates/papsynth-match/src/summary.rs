@@ -182,7 +182,8 @@ impl Summary {
     /// # Errors
     /// If a picture is none.
     pub fn of(pictures: &[Picture], view: &View) -> Result<Self, Error> {
-        let windows: Vec<(Window, Vec<String>)> = pictures.iter().map(|p| Window::new(p, view)).collect::<Result<_, _>>()?;
+        let windows: Vec<(Window, Vec<String>)> =
+            pictures.iter().map(|p| Window::new(p, view)).collect::<Result<_, _>>()?;
         let names = windows.first().map(|w| w.1.clone()).unwrap_or_default();
         Ok(Self::new(&windows.into_iter().map(|w| w.0).collect::<Vec<_>>(), &names))
     }
@@ -231,7 +232,11 @@ fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
 
 /// Standard deviation of the means of tables, without what the spread within them makes of it.
 fn between(tables: &[&Table], name: &str, scale: As) -> f64 {
-    let groups: Vec<Vec<f64>> = tables.iter().map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<_>>()).filter(|v| v.len() >= 2).collect();
+    let groups: Vec<Vec<f64>> = tables
+        .iter()
+        .map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<_>>())
+        .filter(|v| v.len() >= 2)
+        .collect();
     if groups.len() < 3 {
         return f64::NAN;
     }

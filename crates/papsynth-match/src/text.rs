@@ -29,7 +29,8 @@ impl Fit {
              # Distance of simulated windows from the real ones, in standard errors: {:.2} before, {:.2} after.\n",
             distance.before, distance.after
         );
-        let lost: Vec<&str> = self.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
+        let lost: Vec<&str> =
+            self.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
         if !lost.is_empty() {
             out.push_str("# The fields do not tell these, which are as in the recipe to begin with:\n");
             lost.iter().for_each(|path| out.push_str(&format!("#   {path}\n")));
@@ -42,7 +43,8 @@ impl Fit {
     fn table(&self, out: &mut String, path: &str, value: &Value, default: &Value) {
         let Some(fields) = value.as_object() else { return };
         let other_kind = fields.get("kind") != default.get("kind");
-        let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_table(v));
+        let (tables, plain): (Vec<_>, Vec<_>) =
+            fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_table(v));
         let within = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
         let mut lines = String::new();
         for (name, value) in plain.iter().filter(|(name, _)| *name != "kind") {
@@ -72,7 +74,8 @@ impl Fit {
 
     /// What is known of the parameters behind a field, as comments.
     fn notes(&self, path: &str) -> String {
-        let told = self.answers.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
+        let told =
+            self.answers.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
         told.map(|a| format!("# {}\n", a.note())).collect()
     }
 }
@@ -82,7 +85,9 @@ impl Answer {
     fn fields(&self) -> impl Iterator<Item = String> + '_ {
         let (fields, _) = self.path.split_once(':').unwrap_or((self.path, ""));
         let section = fields.split('.').next().unwrap_or_default();
-        fields.split(", ").map(move |field| if field.contains('.') { field.to_owned() } else { format!("{section}.{field}") })
+        fields
+            .split(", ")
+            .map(move |field| if field.contains('.') { field.to_owned() } else { format!("{section}.{field}") })
     }
 
     /// What it says of them: "median".
@@ -152,7 +157,17 @@ mod tests {
                 let prior = parameter.prior();
                 let origin = if parameter.index() % 3 == 0 { Origin::NotIdentified } else { Origin::Simulated };
                 let (value, range) = (values.get(parameter), [prior.low, prior.high]);
-                Answer { parameter, path: prior.path, unit: prior.unit, origin, value, interval: range, before: value, range, width: 0.2 }
+                Answer {
+                    parameter,
+                    path: prior.path,
+                    unit: prior.unit,
+                    origin,
+                    value,
+                    interval: range,
+                    before: value,
+                    range,
+                    width: 0.2,
+                }
             });
             let answers: Vec<Answer> = answers.collect();
             let fitted = |p| answers.iter().any(|a: &Answer| a.parameter == p && a.origin == Origin::Simulated);

@@ -56,7 +56,8 @@ impl View {
     pub fn windows(&self, field: &Picture) -> Vec<Picture> {
         let size = [field.width, field.height()];
         let [across, down] = [0, 1].map(|i| (size[i] / self.window_px[i]).max(1));
-        let [left, top] = [(0, across), (1, down)].map(|(i, count)| (size[i] - (count * self.window_px[i]).min(size[i])) / 2);
+        let [left, top] =
+            [(0, across), (1, down)].map(|(i, count)| (size[i] - (count * self.window_px[i]).min(size[i])) / 2);
         let places = (0..down).flat_map(|y| (0..across).map(move |x| (x, y)));
         places.map(|(x, y)| self.cut(field, left + x * self.window_px[0], top + y * self.window_px[1])).collect()
     }
@@ -69,17 +70,20 @@ impl View {
             Known::Nothing => Known::Nothing,
             Known::Points(points) => {
                 let moved = points.iter().map(|[x, y]| [x - left as f64, y - top as f64]);
-                let inside = |[x, y]: &[f64; 2]| *x > -0.5 && *y > -0.5 && *x < wide as f64 - 0.5 && *y < high as f64 - 0.5;
+                let inside =
+                    |[x, y]: &[f64; 2]| *x > -0.5 && *y > -0.5 && *x < wide as f64 - 0.5 && *y < high as f64 - 0.5;
                 Known::Points(moved.filter(inside).collect())
             }
-            Known::Masks(labels) => {
-                Known::Masks(rows().flat_map(|y| labels[y * field.width + left..y * field.width + right].iter().copied()).collect())
-            }
+            Known::Masks(labels) => Known::Masks(
+                rows().flat_map(|y| labels[y * field.width + left..y * field.width + right].iter().copied()).collect(),
+            ),
         };
         Picture {
             name: field.name.clone(),
             group: field.group.clone(),
-            grey: rows().flat_map(|y| field.grey[y * field.width + left..y * field.width + right].iter().copied()).collect(),
+            grey: rows()
+                .flat_map(|y| field.grey[y * field.width + left..y * field.width + right].iter().copied())
+                .collect(),
             width: right - left,
             full_scale: field.full_scale,
             nuclei,
