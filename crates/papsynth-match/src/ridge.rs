@@ -92,24 +92,24 @@ mod tests {
 
     #[test]
     fn the_error_on_unseen_rows_is_that_of_leaving_them_out() {
-        let n = 25;
-        let x: Vec<f64> = (0..n).map(|i| f64::from(i * i % 7)).collect();
+        let n: usize = 25;
+        let x: Vec<f64> = (0..n).map(|i| (i * i % 7) as f64).collect();
         let y: Vec<f64> = x.iter().enumerate().map(|(i, v)| 2.0 * v + f64::from(u8::from(i % 3 == 0))).collect();
         let kernel = |a: f64, b: f64| a * b + libm::exp(-(a - b) * (a - b));
-        let all = DMatrix::from_fn(n as usize, n as usize, |i, j| kernel(x[i], x[j]) + if i == j { 1e-9 } else { 0.0 });
-        let scale = all.trace() / f64::from(n);
+        let all = DMatrix::from_fn(n, n, |i, j| kernel(x[i], x[j]) + if i == j { 1e-9 } else { 0.0 });
+        let scale = all.trace() / n as f64;
         let found = Kernel::new(all).best(&y);
         let mean = crate::number::mean(&y);
         // The slow way, with each penalty, a fold left out and the mean kept.
         let slow = |penalty: f64, out: usize| {
-            let rows: Vec<usize> = (0..n as usize).filter(|i| i % FOLDS != out % FOLDS).collect();
+            let rows: Vec<usize> = (0..n).filter(|i| i % FOLDS != out % FOLDS).collect();
             let own = |i: usize, j: usize| kernel(x[i], x[j]) + if i == j { 1e-9 + penalty * scale } else { 0.0 };
             let g = DMatrix::from_fn(rows.len(), rows.len(), |i, j| own(rows[i], rows[j]));
             let t = DVector::from_iterator(rows.len(), rows.iter().map(|i| y[*i] - mean));
             let w = g.lu().solve(&t).unwrap();
             mean + rows.iter().zip(w.iter()).map(|(i, w)| w * kernel(x[*i], x[out])).sum::<f64>()
         };
-        let right = |penalty: &f64| (0..n as usize).all(|i| (slow(*penalty, i) - found.unseen[i]).abs() < 1e-6);
+        let right = |penalty: &f64| (0..n).all(|i| (slow(*penalty, i) - found.unseen[i]).abs() < 1e-6);
         assert!(PENALTIES.iter().any(right));
     }
 }
