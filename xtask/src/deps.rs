@@ -24,13 +24,14 @@ enum Role {
     Engine,
     Dataset,
     Judge,
+    Match,
     Study,
     Program,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 15] = [
+const PLACES: [(&str, Role); 16] = [
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -44,6 +45,7 @@ const PLACES: [(&str, Role); 15] = [
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
     ("papsynth-study", Role::Study),
+    ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
     ("xtask", Role::Chores),
 ];
@@ -60,10 +62,12 @@ impl Role {
             Self::Technique | Self::Judge | Self::Chores => &[],
             Self::Engine => &[Self::Technique],
             Self::Dataset => &[Self::Engine],
+            // It simulates with the one and measures with the other.
+            Self::Match => &[Self::Engine, Self::Judge],
             // It shows files, whoever made them.
             Self::Study => &[Self::Dataset],
             // It measures microscopes and cameras, which are no business of the engine.
-            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Study],
+            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Match, Self::Study],
         }
     }
 }

@@ -42,6 +42,7 @@ pub(crate) enum Verb {
     Learn(Learn),
     Calibrate(Calibrate),
     Judge(Judge),
+    Match(Match),
     Inspect(Inspect),
     Study(Box<Study>),
     Schema(SchemaArgs),
@@ -360,6 +361,63 @@ pub(crate) struct Judge {
     pub(crate) threads: Option<u16>,
 }
 
+/// Find the recipe of fields like real ones.
+///
+/// Light and noise are measured; the rest is searched by simulation: recipes from all over a range of possibilities are drawn and
+/// imaged, regressions learn from them what statistics of fields say of parameters, and a search ends at the recipe
+/// whose fields come nearest. Every number comes with a 95 % interval; what the fields do not tell is named and left as it was.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth match slides --pixel-um 0.33 --out mine.toml
+  papsynth match slides --pixel-um 0.33 --group N --out mine.toml --report mine.json
+  papsynth match slides --find-pixel --quick --out mine.toml
+  papsynth generate mine.toml --out fields --frames 20
+
+REAL is a folder as `papsynth judge` takes them: images of one size, and beside them, if they are known, points or masks of
+nuclei. Five to ten fields will do; of one alone no spread between fields can be told.")]
+pub(crate) struct Match {
+    /// Folder of real fields
+    #[arg(value_name = "REAL")]
+    pub(crate) real: PathBuf,
+    /// Recipe to write; an older match of this name is replaced, no other file
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// The recipe to begin with
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
+    pub(crate) preset: Preset,
+    /// Size of a pixel, in micrometres [default: as recorded]
+    #[arg(long, value_name = "UM", value_parser = parse_pixel)]
+    pub(crate) pixel_um: Option<f64>,
+    /// Find the size of a pixel too, taking cells to be as large as the recipe to begin with says
+    #[arg(long)]
+    pub(crate) find_pixel: bool,
+    /// Look at fields of this group alone; repeatable
+    #[arg(long, value_name = "NAME")]
+    pub(crate) group: Vec<String>,
+    /// Windows of 640 x 480 pixels to simulate [default: 2800]
+    #[arg(long, value_name = "N", value_parser = parse_budget, conflicts_with = "quick")]
+    pub(crate) budget: Option<usize>,
+    /// Simulate a sixth as much: wider intervals, fewer parameters
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Write all that was found here too, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) report: Option<PathBuf>,
+    /// Seed of all that is drawn
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Threads to work with; the recipe is the same with any number [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// Do not tell how far the work is
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
 /// Show what is in a data set.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -530,6 +588,15 @@ fn parse_class(text: &str) -> Result<String, String> {
     match !text.is_empty() && text.chars().all(plain) {
         true => Ok(text.to_owned()),
         false => Err("expected letters, digits, `-` and `_`".to_owned()),
+    }
+}
+
+fn parse_budget(text: &str) -> Result<usize, String> {
+    /// Fewer windows teach nothing.
+    const ALLOWED: std::ops::RangeInclusive<usize> = 240..=1_000_000;
+    match text.parse() {
+        Ok(value) if ALLOWED.contains(&value) => Ok(value),
+        _ => Err(format!("expected {} to {} windows", ALLOWED.start(), ALLOWED.end())),
     }
 }
 

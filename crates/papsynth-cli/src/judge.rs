@@ -87,8 +87,20 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     Ok((side(real, args.pixel_um, of_real), side(synthetic, args.synthetic_pixel_um, of_synthetic)))
 }
 
-/// The fields in a folder; of these groups alone, if it has any of them.
+/// The fields in a folder, two or more.
 fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
+    let files = fields_of(folder, groups)?;
+    if files.len() < LEAST {
+        let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
+        return Err(Failure::input(
+            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
+        ));
+    }
+    Ok(files)
+}
+
+/// The fields in a folder; of these groups alone, if it has any of them.
+pub(crate) fn fields_of(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     let mut files = field_files(folder)?;
     let wanted = |file: &FieldFile| groups.contains(&file.group);
     if files.iter().any(wanted) {
@@ -98,12 +110,6 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
         return Err(Failure::input(
             Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter()))),
-        ));
-    }
-    if files.len() < LEAST {
-        let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::input(
-            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
         ));
     }
     Ok(files)
@@ -164,7 +170,7 @@ fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Fail
     fields.into_iter().collect()
 }
 
-fn picture(file: &FieldFile) -> Result<Picture, Failure> {
+pub(crate) fn picture(file: &FieldFile) -> Result<Picture, Failure> {
     let image = file.read(&Limits::default())?;
     Ok(Picture {
         name: file.name.clone(),

@@ -10,6 +10,7 @@ mod inspect;
 mod interrupt;
 mod judge;
 mod learn;
+mod match_fields;
 mod nearest;
 mod preview;
 mod recipe_file;
@@ -60,6 +61,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Learn(args) => learn::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Judge(args) => judge::run(&args),
+        Verb::Match(args) => match_fields::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {

@@ -10,7 +10,8 @@ use support::Bench;
 /// Small fields that are made quickly and still have nuclei, each of a slide of its own: slides differ by their stain.
 const FIELD: &str =
     "--set field.width_px=420 --set field.height_px=320 --set field.pixel_um=0.33 --set slide.fields=1 --quiet";
-const CELLS: &str = "--set cells.intermediate.count=5 --set cells.superficial.count=2";
+const CELLS: &str = "--set cells.intermediate.count=5 --set cells.superficial.count=2 \
+    --set cells.parabasal.count=0 --set cells.metaplastic.count=0";
 
 fn generate(bench: &Bench, out: &str, words: &str) {
     bench.good(&format!("generate --out {out} --frames 8 {FIELD} {words}"));

@@ -1,7 +1,7 @@
 //! A picture of every class of cell and every kind of debris with its name beneath:
 //! `picture_book cells|debris OUT.png [colour]`.
 
-#![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small program with small numbers")]
+#![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
 mod support;
 

@@ -1,5 +1,7 @@
 //! Small images at a place of the large one, and exact coverage of polygons.
 
+use std::borrow::Cow;
+
 use ab_glyph_rasterizer::{Rasterizer, point};
 
 /// A point in pixels: x right, y down, pixel centres at whole numbers.
@@ -88,8 +90,12 @@ impl Tile {
         }
     }
 
-    /// Raises every pixel to the share of its area that a simple polygon covers, if that is more.
+    /// Raises every pixel to the share of its area that a simple polygon covers, if that is more. What lies beyond the tile is
+    /// left out.
     pub(crate) fn cover(&mut self, polygon: &[Point]) {
+        let low = self.origin.map(|at| at as f64 - 0.5);
+        let high = [low[0] + self.width as f64, low[1] + self.height() as f64];
+        let polygon = &*clipped(polygon, low, high);
         let mut rasterizer = Rasterizer::new(self.width, self.height());
         // Pixel (0, 0) of the rasteriser is the unit square whose corner, not centre, is at zero.
         let shift = |p: Point| {
@@ -104,6 +110,39 @@ impl Tile {
         let values = &mut self.values;
         rasterizer.for_each_pixel(|index, share| values[index] = values[index].max(share.min(1.0)));
     }
+}
+
+/// The part of a polygon that lies in a rectangle, cut side by side (Sutherland and Hodgman, doi:10.1145/360767.360802).
+fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
+    let inside = |p: &Point| (0..2).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]));
+    if polygon.iter().all(inside) {
+        return Cow::Borrowed(polygon);
+    }
+    let mut left = polygon.to_vec();
+    for (axis, bound, sign) in [(0, low[0], 1.0), (0, high[0], -1.0), (1, low[1], 1.0), (1, high[1], -1.0)] {
+        let whole = core::mem::take(&mut left);
+        let beyond = |p: Point| sign * (p[axis] - bound);
+        for (index, &to) in whole.iter().enumerate() {
+            let from = whole[(index + whole.len() - 1) % whole.len()];
+            let (before, after) = (beyond(from), beyond(to));
+            if (before < 0.0) != (after < 0.0) {
+                let t = before / (before - after);
+                let mut cut = [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])];
+                cut[axis] = bound;
+                left.push(cut);
+            }
+            if after >= 0.0 {
+                left.push(to);
+            }
+        }
+    }
+    // Where two cuts meet in a corner, rounding may leave a point a hair outside.
+    for point in &mut left {
+        for axis in 0..2 {
+            point[axis] = point[axis].clamp(low[axis], high[axis]);
+        }
+    }
+    Cow::Owned(left)
 }
 
 /// Lays the rows of a tile over rows of an image that is `width` wide, as far as they meet. `image` starts at row `first`;
@@ -174,6 +213,27 @@ mod tests {
         });
         // A pixel covered in part counts at its centre: right to a hundredth, where a shifted grid would be off by a half.
         assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres at whole numbers");
+    }
+
+    #[test]
+    fn what_lies_beyond_a_tile_is_left_out() {
+        let polygon = disc([4.0, 6.0], 9.0);
+        let mut whole = Tile::around(&polygon, 2.0);
+        whole.cover(&polygon);
+        for (origin, width, height) in
+            [([0, 0], 7, 30), ([-20, 3], 60, 4), ([2, -9], 3, 40), ([10, 12], 9, 9), ([30, 0], 4, 4)]
+        {
+            let mut part = Tile { origin, width, values: vec![0.0; width * height] };
+            part.cover(&polygon);
+            let mut index = 0;
+            part.clone().for_each(|p, value| {
+                let [x, y] = [0, 1].map(|axis| usize::try_from(p[axis] as i64 - whole.origin[axis]).ok());
+                let expected = x.zip(y).filter(|(x, y)| *x < whole.width && *y < whole.height());
+                let expected = expected.map_or(0.0, |(x, y)| whole.values[y * whole.width + x]);
+                assert!((*value - expected).abs() < 1e-4, "{origin:?} {index}: {value} {expected}");
+                index += 1;
+            });
+        }
     }
 
     #[test]

@@ -1,0 +1,188 @@
+//! `papsynth match`: real fields in, the recipe of fields like them out.
+
+use std::io::{self, IsTerminal, Write};
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use papsynth::{Engine, Inputs};
+use papsynth_dataset::write_file;
+use papsynth_judge::Picture;
+use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
+use serde_json::json;
+
+use crate::args::{self, threads};
+use crate::exit::{self, Complaint, Failure};
+use crate::interrupt::Interrupt;
+use crate::judge::{fields_of, picture};
+use crate::setup::read_model;
+use crate::text_file::may_replace;
+
+/// How files begin that may be replaced.
+const RECIPE: &[u8] = b"# Matched to ";
+const REPORT: &[u8] = b"{\n  \"match_report\":";
+
+/// Windows that are simulated at first, of a quick run, and of each recipe at most.
+const BUDGET: usize = 2800;
+const QUICK: usize = 480;
+const WINDOWS: usize = 8;
+
+/// Fewest recipes of a table.
+const LEAST_RECIPES: usize = 30;
+
+/// Rounds of the search.
+const ROUNDS: usize = 8;
+const QUICK_ROUNDS: usize = 3;
+
+/// Pixels of a 20x objective, µm: where the search for their size begins.
+const USUAL_PIXEL_UM: f64 = 0.33;
+
+/// Statistics that are told of at the end: those that the recipe shows worst.
+const TOLD: usize = 8;
+
+/// Lines of progress where there is no terminal.
+const LINES: usize = 20;
+
+pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
+    may_replace(&args.out, RECIPE, "an older match")?;
+    if let Some(report) = &args.report {
+        may_replace(report, REPORT, "an older report of a match")?;
+    }
+    let interrupt = Interrupt::watch()?;
+    let model = read_model(args.model.as_deref())?;
+    let files = fields_of(&args.real, &args.group)?;
+    let recorded = files.iter().find_map(|f| f.pixel_um);
+    let pixel = match (args.find_pixel, args.pixel_um.or(recorded)) {
+        (true, um) => PixelSize::Sought(um.unwrap_or(USUAL_PIXEL_UM)),
+        (false, Some(um)) => PixelSize::Known(um),
+        (false, None) => {
+            let message = format!("{}: nothing says how large the pixels are", args.real.display());
+            let help = "give --pixel-um, the size of a pixel in micrometres, or --find-pixel";
+            return Err(Failure::input(Complaint::new(message).help(help)));
+        }
+    };
+    let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
+
+    let windows = WINDOWS.min(fields.len()).max(1);
+    let budget = args.budget.unwrap_or(if args.quick { QUICK } else { BUDGET });
+    let recipes = (budget / windows).max(LEAST_RECIPES);
+    let params = MatchParams {
+        pixel,
+        table: TableParams { recipes, windows, seed: args.seed },
+        rounds: if args.quick { QUICK_ROUNDS } else { ROUNDS },
+    };
+    let base = args.preset.recipe();
+    let matching = Match::new(&params, &base).map_err(|e| refuse(&e, &args.real))?;
+    let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(args.threads)).build();
+    let pool = pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))?;
+    let progress = Progress::new(args.quiet);
+    let tell = |step: Step| {
+        progress.step(step);
+        !interrupt.flag().load(Ordering::SeqCst)
+    };
+    let fit = pool.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
+    progress.clear();
+
+    if let Some(report) = &args.report {
+        let text = serde_json::to_string_pretty(&json!({ "match_report": 1, "fit": fit, "seed": args.seed }));
+        write_file(report, format!("{}\n", text.unwrap_or_default()).as_bytes())?;
+    }
+    write_file(&args.out, fit.to_toml().as_bytes())?;
+    exit::print(
+        &format!("{}\n{}: use it with papsynth generate {0}\n", told(&fit), args.out.display())
+            .replace("{0}", &args.out.display().to_string()),
+    )
+}
+
+fn refuse(error: &Error, real: &std::path::Path) -> Failure {
+    match error {
+        Error::Stopped => Failure::interrupted(Complaint::new("stopped; nothing was written")),
+        other => Failure::input(Complaint::new(format!("{}: {other}", real.display()))),
+    }
+}
+
+/// What was found, as a table.
+fn told(fit: &Fit) -> String {
+    let mut text = format!(
+        "{} fields, {} windows, {} nuclei; {} recipes simulated\n\n{:<24} {:>10} {:>21} {:>10}  from\n",
+        fit.fields, fit.windows, fit.nuclei, fit.simulated, "parameter", "value", "95 % interval", "before"
+    );
+    let number = |value: f64| format!("{value:.3}");
+    let line = |a: &Answer| {
+        let [low, high] = a.interval.map(number);
+        let interval = format!("{low} to {high}");
+        let origin = match a.origin {
+            Origin::Measured => "measured",
+            Origin::Simulated => "simulated",
+            Origin::NotIdentified => "not identified",
+        };
+        let name = if a.unit.is_empty() { a.parameter.name() } else { format!("{}, {}", a.parameter.name(), a.unit) };
+        format!("{name:<24} {:>10} {interval:>21} {:>10}  {origin}\n", number(a.value), number(a.before))
+    };
+    text.extend(fit.answers.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
+    let lost: Vec<String> =
+        fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
+    if !lost.is_empty() {
+        text.push_str(&format!("not identified, left as they were: {}\n", lost.join(", ")));
+    }
+    let d = fit.distance;
+    text.push_str(&format!(
+        "\ndistance from the real windows, in standard errors: {:.2} before, {:.2} as estimated, {:.2} after the search\n",
+        d.before, d.estimated, d.after
+    ));
+    let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.apart.is_finite()).collect();
+    worst.sort_by(|a, b| b.apart.abs().total_cmp(&a.apart.abs()));
+    text.push_str("farthest apart:\n");
+    for s in worst.iter().take(TOLD) {
+        text.push_str(&format!(
+            "    {:<44} real {:>9.4}  before {:>9.4}  after {:>9.4}\n",
+            s.name, s.real, s.before, s.after
+        ));
+    }
+    text
+}
+
+/// How far the work is: a bar on a terminal, a few lines elsewhere.
+struct Progress {
+    bar: ProgressBar,
+    lines: bool,
+    began: Instant,
+    last: Mutex<usize>,
+}
+
+impl Progress {
+    #[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no recipe")]
+    fn new(quiet: bool) -> Self {
+        let terminal = io::stderr().is_terminal();
+        let target = if terminal && !quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(1), target);
+        let look = ProgressStyle::with_template("{msg} [{bar:30}] {pos} of {len}, {elapsed} gone");
+        bar.set_style(look.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
+        Self { bar, lines: !terminal && !quiet, began: Instant::now(), last: Mutex::new(0) }
+    }
+
+    fn step(&self, step: Step) {
+        let (what, done, of, more) = match step {
+            Step::Simulated(done, of) => ("simulated recipes", done, of, String::new()),
+            Step::Searched(done, of, distance) => {
+                ("rounds of the search", done, of, format!(", distance {distance:.2}"))
+            }
+        };
+        self.bar.set_length(of as u64);
+        self.bar.set_message(what);
+        self.bar.set_position(done as u64);
+        let Ok(mut last) = self.last.lock() else { return };
+        let part = done * LINES / of.max(1);
+        if self.lines && part != *last {
+            *last = part;
+            let seconds = self.began.elapsed().as_secs();
+            let _ = writeln!(io::stderr().lock(), "{what}: {done} of {of}{more}, {seconds} s gone");
+        }
+    }
+
+    fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+}

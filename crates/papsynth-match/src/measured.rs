@@ -1,0 +1,209 @@
+//! What a statistic of real fields says by itself: light, noise, bits.
+
+use papsynth_judge::{Known, NucleiFrom, Picture};
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::interval::{of_deviation, of_mean};
+use crate::noise::{Empty, pattern};
+use crate::number::{deviation, mean, quantile};
+use crate::parameter::Parameter;
+use crate::recipe::{LEVELS, Spreads};
+use crate::regression::Estimate;
+use crate::view::View;
+
+/// A slide darker than this, of 255, is none.
+const DARK: f64 = 20.0;
+
+/// Neighbours that share more noise than this were fused.
+const FUSED: f64 = 0.06;
+
+/// Mean of x² over the grid that the judge takes the mean of a background on.
+const MEAN_SQUARE: f64 = 0.3667;
+
+/// What no statistic knows better than: dirt and unevenness of the slide add to noise, a part of it.
+const NOISE_ERROR: f64 = 0.02;
+
+/// To the part of noise that is a pattern, a part of it.
+const PATTERN_ERROR: f64 = 0.06;
+
+/// To a correlation.
+const CORRELATION_ERROR: f64 = 0.012;
+
+/// To a correlation where noise is faint, times the variance: rounding is shared with none.
+const ROUNDING_ERROR: f64 = 0.05;
+
+/// To the level, a part of full scale; and where all is covered, and what is taken for empty is not.
+const LEVEL_ERROR: f64 = 0.003;
+const COVERED_ERROR: f64 = 0.025;
+
+/// To a curvature.
+const BOWL_ERROR: f64 = 0.003;
+
+/// What real fields say of light and noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Columns and rows of a field.
+    pub size_px: [usize; 2],
+    /// Bits of a grey level.
+    pub bits: u32,
+    /// Whether neighbouring pixels share noise: the pictures were fused.
+    pub extended: bool,
+    /// How the nuclei of all fields are known.
+    pub nuclei_from: NucleiFrom,
+    /// Parameters with their 95 % intervals; not here is what could not be told.
+    pub estimates: Vec<(Parameter, Estimate)>,
+    /// Standard deviations between fields.
+    pub spreads: Spreads,
+}
+
+impl Measured {
+    /// The estimate of a parameter, if there is one.
+    #[must_use]
+    pub fn get(&self, parameter: Parameter) -> Option<Estimate> {
+        self.estimates.iter().find(|(p, _)| *p == parameter).map(|(_, e)| *e)
+    }
+}
+
+/// Light and noise of one field.
+struct Light {
+    level: f64,
+    across: f64,
+    down: f64,
+    coverage: f64,
+    empty: Empty,
+}
+
+/// Measures what a statistic determines by itself. `pixel_um` is the size of a pixel as far as it is known.
+///
+/// # Errors
+/// If there is no field, one is black, or they are of different sizes.
+pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
+    let first = fields.first().ok_or(Error::NoField)?;
+    let size_px = [first.width, first.height()];
+    for field in fields {
+        if [field.width, field.height()] != size_px {
+            let of_first = format!("{} x {}", size_px[0], size_px[1]);
+            return Err(Error::Size { name: field.name.clone(), width: field.width, height: field.height(), of_first });
+        }
+        let mut some: Vec<f64> =
+            field.grey.iter().step_by(17).map(|g| LEVELS * f64::from(g / field.full_scale)).collect();
+        let level = quantile(&mut some, 0.98);
+        if level.is_nan() || level < DARK {
+            return Err(Error::Black { name: field.name.clone(), level, least: DARK });
+        }
+    }
+    let of = |known: &Known| NucleiFrom::of(known);
+    let nuclei_from = fields.iter().map(|f| of(&f.nuclei)).min().unwrap_or_default();
+    let view = View::new(size_px, pixel_um, nuclei_from)?;
+    let scale = f64::from(first.full_scale);
+    let lights: Vec<Result<Light, Error>> = fields.par_iter().map(|field| light(field, &view)).collect();
+    let lights: Vec<Light> = lights.into_iter().collect::<Result<_, _>>()?;
+    let column = |f: &dyn Fn(&Light) -> f64| -> Vec<f64> { lights.iter().map(f).filter(|v| v.is_finite()).collect() };
+    let shared = [0, 1].map(|i| column(&|l| l.empty.shared[i]));
+    let extended = shared.iter().all(|s| !s.is_empty()) && shared.iter().map(|s| mean(s)).fold(0.0, f64::max) > FUSED;
+
+    let mut estimates = Vec::new();
+    let levels = column(&|l| l.level);
+    let mut put = |parameter: Parameter, values: &[f64], floor: f64| {
+        if !values.is_empty() {
+            let (middle, half) = (mean(values), of_mean(deviation(values), values.len()));
+            // One field says nothing of others: the interval is as wide as the range.
+            let half = if half.is_finite() { half + floor } else { f64::INFINITY };
+            let prior = parameter.prior();
+            let [low, high] = [middle - half, middle + half].map(|v| v.clamp(prior.low, prior.high));
+            estimates.push((parameter, Estimate { value: middle, low: low.min(middle), high: high.max(middle) }));
+        }
+    };
+    let covered = mean(&column(&|l| l.coverage));
+    let level_error = LEVEL_ERROR + COVERED_ERROR * covered * covered;
+    put(Parameter::Level, &levels, level_error);
+    put(Parameter::BowlAcross, &column(&|l| l.across.max(0.0)), BOWL_ERROR);
+    put(Parameter::BowlDown, &column(&|l| l.down.max(0.0)), BOWL_ERROR);
+    if extended {
+        let variance = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
+        let error = CORRELATION_ERROR + ROUNDING_ERROR * (scale / LEVELS).max(1.0) / variance;
+        put(Parameter::Across, &shared[0], error);
+        put(Parameter::Down, &shared[1], error);
+    }
+    let noise: Vec<f64> =
+        column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
+    if !noise.is_empty() {
+        let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR;
+        let prior = Parameter::Noise.prior();
+        let [value, low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
+        estimates.push((
+            Parameter::Noise,
+            Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) },
+        ));
+    }
+    if levels.len() > 1 {
+        let sd = deviation(&levels);
+        let [low, high] = of_deviation(levels.len()).map(|factor| factor * sd);
+        let most = Parameter::LevelSpread.prior().high;
+        estimates.push((
+            Parameter::LevelSpread,
+            Estimate { value: sd, low: (low - level_error).max(0.0), high: (high + level_error).min(most.max(sd)) },
+        ));
+    }
+    let [sd_across, sd_down] = [deviation(&column(&|l| l.across)), deviation(&column(&|l| l.down))];
+    let variances = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
+    let squares = mean(&column(&|l| l.level * l.level)) * scale * scale;
+    let restored = mean(&column(&|l| l.empty.restored()));
+    let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();
+    if let Some([variance, error]) = pattern(&relative).map(|found| found.map(|v| v * restored)) {
+        let per_noise = squares / variances;
+        let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
+        let [value, low, high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
+        estimates.push((Parameter::Pattern, Estimate { value, low, high }));
+    }
+    estimates.sort_by_key(|(parameter, _)| *parameter);
+    let or_default = |sd: f64, default: f64| if sd.is_finite() { sd } else { default };
+    let usual = Spreads::default();
+    let spreads = Spreads {
+        across: or_default(sd_across, usual.across),
+        down: or_default(sd_down, usual.down),
+        noise: or_default(deviation(&noise), usual.noise),
+    };
+    Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, spreads })
+}
+
+fn light(field: &Picture, view: &View) -> Result<Light, Error> {
+    let s = view.gauge.measure(field)?.statistics;
+    let (across, down) = (-s.background_x2, -s.background_y2);
+    let middle = s.background_dn / (1.0 - MEAN_SQUARE * (across + down));
+    let grey = s.background_dn * f64::from(field.full_scale) / LEVELS;
+    Ok(Light {
+        level: middle / LEVELS,
+        across,
+        down,
+        coverage: s.coverage,
+        empty: Empty::new(&field.grey, field.width, grey),
+    })
+}
+
+/// The fewest bits that hold all grey levels; 8 where pictures are fractions.
+fn bits(fields: &[Picture]) -> u32 {
+    let scale = fields.iter().map(|f| f.full_scale).fold(0.0_f32, f32::max);
+    (8..16).find(|bits| f64::from(scale) <= libm::exp2(f64::from(*bits))).unwrap_or(16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flat(level: f32, name: &str, width: usize) -> Picture {
+        let grey = (0..width * 96).map(|i| level + (i % 3) as f32).collect();
+        Picture { name: name.to_owned(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing }
+    }
+
+    #[test]
+    fn what_is_no_set_of_fields_is_refused() {
+        assert_eq!(measure(&[], 0.33), Err(Error::NoField));
+        assert!(matches!(measure(&[flat(2.0, "a", 128)], 0.33), Err(Error::Black { .. })));
+        let two = [flat(200.0, "a", 128), flat(200.0, "b", 96)];
+        let error = measure(&two, 0.33).unwrap_err().to_string();
+        assert!(error.contains("field `b` is 96 x 96") && error.contains("128 x 96"), "{error}");
+        assert!(measure(&two[..1], f64::NAN).is_err());
+    }
+}

@@ -1,0 +1,230 @@
+//! Noise beyond that of the empty slide: how it goes with light, what of it is the same in all fields, how uneven light is.
+
+use crate::number::{mean, quantile, single};
+use crate::small::blur;
+
+/// Side of the blocks that noise is compared in, pixels.
+const BLOCK: usize = 8;
+
+/// Absorbances that blocks are sorted by: empty slide first.
+const BINS: [[f64; 2]; 4] = [[-0.03, 0.02], [0.05, 0.12], [0.12, 0.25], [0.25, 0.6]];
+
+/// The most even part of the blocks of a bin shows noise, the rest structure.
+const EVENEST: f64 = 0.15;
+
+/// Fewest blocks of a bin.
+const LEAST_BLOCKS: usize = 12;
+
+/// Numbers of [`law`].
+pub(crate) const LAW: usize = BINS.len() - 1;
+
+/// Logarithm of the noise of ever darker places over that of the empty slide; NaN where there are none.
+pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
+    let mut bins: [Vec<f64>; BINS.len()] = Default::default();
+    let height = grey.len() / width;
+    for top in (0..height.saturating_sub(BLOCK - 1)).step_by(BLOCK) {
+        for left in (0..width.saturating_sub(BLOCK - 1)).step_by(BLOCK) {
+            let at = |x: usize, y: usize| f64::from(grey[(top + y) * width + left + x]);
+            let sum: f64 = (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (x, y))).map(|(x, y)| at(x, y)).sum();
+            let absorbance = -libm::log10((sum / (BLOCK * BLOCK) as f64 / empty).max(1e-3));
+            let Some(bin) = BINS.iter().position(|[from, to]| absorbance >= *from && absorbance < *to) else {
+                continue;
+            };
+            // A mask that planes and saddles vanish under (Immerkær, doi:10.1006/cviu.1996.0060).
+            let mut energy = 0.0;
+            for y in 1..BLOCK - 1 {
+                for x in 1..BLOCK - 1 {
+                    let line = |y: usize| at(x - 1, y) - 2.0 * at(x, y) + at(x + 1, y);
+                    let value = line(y - 1) - 2.0 * line(y) + line(y + 1);
+                    energy += value * value;
+                }
+            }
+            bins[bin].push(energy);
+        }
+    }
+    let levels =
+        bins.map(
+            |mut blocks| if blocks.len() < LEAST_BLOCKS { f64::NAN } else { quantile(&mut blocks, EVENEST).max(1e-3) },
+        );
+    std::array::from_fn(|i| libm::log(levels[i + 1] / levels[0]))
+}
+
+/// Widths of the Gaussians between which the light's unevenness is looked for, pixels.
+const UNEVEN_PX: [f64; 2] = [6.0, 24.0];
+
+/// Empty slide is within this absorbance after the wider of them.
+const EVEN: f32 = 0.012;
+
+/// Logarithm of the unevenness of empty slide between two scales; NaN where nothing is empty.
+pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> f64 {
+    let light: Vec<f32> = grey.iter().map(|g| g / single(empty)).collect();
+    let [fine, coarse] = UNEVEN_PX.map(|sigma| blur(&light, width, sigma));
+    // Whatever lies there is darker than the slide: the paler half is the slide.
+    let mut rests: Vec<f64> = fine
+        .iter()
+        .zip(&coarse)
+        .filter(|(_, c)| **c > 1.0 - 2.0 * EVEN)
+        .map(|(f, c)| f64::from((f - c).abs()))
+        .collect();
+    if rests.len() < grey.len() / 50 { f64::NAN } else { libm::log(quantile(&mut rests, 0.5).max(1e-6)) }
+}
+
+/// Width of the Gaussian whose remainder is noise, pixels.
+const NOISE_PX: f64 = 6.0;
+
+/// Of that whose difference from a wider one shows that something lies there.
+const THINGS_PX: f64 = 2.5;
+
+/// How many times its usual size that difference may have where nothing lies.
+const USUAL: f64 = 3.0;
+
+/// Empty slide is within this part of its light.
+const NEAR: f32 = 0.04;
+
+/// Fewest pixels of empty slide that noise is measured on.
+const LEAST_EMPTY: usize = 4000;
+
+/// Noise of the empty parts of a field.
+pub(crate) struct Empty {
+    /// Over the light there; NaN elsewhere.
+    pub(crate) relative: Vec<f32>,
+    /// Its standard deviation, in the levels of the picture; NaN where too little is empty.
+    pub(crate) deviation: f64,
+    /// What it shares with the next pixel of the row and of the column.
+    pub(crate) shared: [f64; 2],
+}
+
+/// What a Gaussian takes of the covariance of noise when it is taken off: this part of the sum over all distances. A
+/// remainder g − G∗g has the covariance γ − (2G − G∗G)∗γ, and noise is narrow beside G.
+const TAKEN: f64 = 3.0 / (4.0 * std::f64::consts::PI * NOISE_PX * NOISE_PX);
+
+impl Empty {
+    /// Of a picture whose empty slide is at a level.
+    pub(crate) fn new(grey: &[f32], width: usize, level: f64) -> Self {
+        let wide = blur(grey, width, NOISE_PX);
+        let things: Vec<f32> = blur(grey, width, THINGS_PX).iter().zip(&wide).map(|(a, b)| a - b).collect();
+        let slide = single((1.0 - f64::from(NEAR)) * level);
+        let mut sizes: Vec<f64> =
+            things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
+        // The median size of a normal is 0.674 of its deviation; what lies there makes it larger, by little.
+        let most = single(USUAL * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
+        let rest: Vec<f32> = grey
+            .iter()
+            .zip(&wide)
+            .zip(&things)
+            .map(|((g, w), t)| if *w > slide && t.abs() < most { g - w } else { f32::NAN })
+            .collect();
+        let relative = rest.iter().zip(&wide).map(|(r, w)| r / w).collect();
+        let product = |step: usize| {
+            let (mut sum, mut count) = (0.0, 0_usize);
+            for (a, b) in rest.iter().zip(&rest[step..]) {
+                let value = f64::from(a * b);
+                if value.is_finite() {
+                    sum += value;
+                    count += 1;
+                }
+            }
+            if count < LEAST_EMPTY { f64::NAN } else { sum / count as f64 }
+        };
+        let found = [0, 1, width].map(product);
+        let mut own = found;
+        /// Each round leaves a fiftieth of the error of the one before.
+        const ROUNDS: usize = 6;
+        for _ in 0..ROUNDS {
+            let all = own[0] * (1.0 + 2.0 * own[1] / own[0]) * (1.0 + 2.0 * own[2] / own[0]);
+            own = found.map(|f| f + TAKEN * all);
+        }
+        Self { relative, deviation: own[0].sqrt(), shared: [own[1] / own[0], own[2] / own[0]] }
+    }
+
+    /// By what to multiply variances of [`relative`](Self::relative): the Gaussian took a part of them.
+    pub(crate) fn restored(&self) -> f64 {
+        1.0 / (1.0 - TAKEN * (1.0 + 2.0 * self.shared[0]) * (1.0 + 2.0 * self.shared[1]))
+    }
+}
+
+/// Fewest pixels that two fields have empty in common.
+const LEAST_PIXELS: usize = 5000;
+
+/// What the noise of fields has in common: the mean over pairs of its relative variance, and the standard error; none where
+/// fewer than two fields are empty at the same places.
+pub(crate) fn pattern(fields: &[Vec<f32>]) -> Option<[f64; 2]> {
+    let mut products = Vec::new();
+    for (i, a) in fields.iter().enumerate() {
+        for b in &fields[i + 1..] {
+            let (mut sum, mut count) = (0.0, 0);
+            for (x, y) in a.iter().zip(b) {
+                let product = f64::from(x * y);
+                if product.is_finite() {
+                    sum += product;
+                    count += 1;
+                }
+            }
+            if count >= LEAST_PIXELS {
+                products.push(sum / count as f64);
+            }
+        }
+    }
+    let pairs = products.len();
+    // Pairs share fields: as many are independent as there are fields.
+    let sd = if pairs > 1 { crate::number::deviation(&products) } else { mean(&products).abs() };
+    (pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::{Rng, SeedableRng};
+
+    fn noise(seed: u64, count: usize, sd: f32) -> Vec<f32> {
+        let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut one = || (rng.next_u64() >> 40) as f32 / (1_u64 << 24) as f32 - 0.5;
+        (0..count).map(|_| sd * 12.0_f32.sqrt() * 0.5 * (one() + one() + one() + one())).collect()
+    }
+
+    #[test]
+    fn what_fields_share_is_found() {
+        let (width, height) = (400, 300);
+        let shared = noise(1, width * height, 0.01);
+        let field = |seed: u64| {
+            let own = noise(seed, width * height, 2.0);
+            let grey: Vec<f32> = shared.iter().zip(own).map(|(s, o)| 220.0 * (1.0 + s) + o).collect();
+            Empty::new(&grey, width, 220.0)
+        };
+        let fields = [field(2), field(3), field(4)];
+        let [variance, error] = pattern(&fields.each_ref().map(|f| f.relative.clone())).unwrap();
+        // 1.2·10⁵ pixels: 5·10⁻⁷ of error, the pattern's own chance included.
+        assert!((variance * fields[0].restored() - 1e-4).abs() < 1.5e-6, "{variance} {error}");
+        assert_eq!(pattern(&[fields[0].relative.clone()]), None);
+        // 2 and a hundredth of 220, on 1.2·10⁵ pixels.
+        assert!((fields[0].deviation / (4.0_f64 + 4.84).sqrt() - 1.0).abs() < 0.02, "{}", fields[0].deviation);
+        assert!(fields[0].shared.iter().all(|s| s.abs() < 0.02), "{:?}", fields[0].shared);
+    }
+
+    #[test]
+    fn neighbours_that_share_noise_do_and_things_on_the_slide_do_not_count() {
+        let (width, height) = (300, 300);
+        let own = noise(9, width * height + width + 1, 3.0);
+        let mut grey: Vec<f32> =
+            (0..width * height).map(|i| 200.0 + (own[i] + own[i + width]) / 2.0_f32.sqrt()).collect();
+        for y in 100..160 {
+            grey[y * width + 100..y * width + 160].fill(120.0);
+        }
+        let empty = Empty::new(&grey, width, 200.0);
+        assert!((empty.deviation - 3.0).abs() < 0.05, "{}", empty.deviation);
+        assert!(empty.shared[0].abs() < 0.02 && (empty.shared[1] - 0.5).abs() < 0.02, "{:?}", empty.shared);
+    }
+
+    #[test]
+    fn photons_are_told_from_reading() {
+        let (width, height) = (160, 160);
+        let own = noise(5, width * height, 1.0);
+        let light = |i: usize| if (i % width) < 80 { 220.0_f32 } else { 150.0 };
+        let of = |sd: &dyn Fn(f32) -> f32| {
+            let grey: Vec<f32> = own.iter().enumerate().map(|(i, n)| light(i) + n * sd(light(i))).collect();
+            law(&grey, width, 220.0)[1]
+        };
+        let (reading, photons) = (of(&|_| 2.0), of(&|l| (l / 55.0).sqrt()));
+        assert!(reading.abs() < 0.1 && (photons - libm::log(150.0 / 220.0)).abs() < 0.1, "{reading} {photons}");
+    }
+}

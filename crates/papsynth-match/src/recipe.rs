@@ -1,0 +1,501 @@
+//! From values of parameters to a recipe, and back.
+
+use papsynth::recipe::{CellMix, Illumination, Law, Layout, Number, Optics, Picture, Preset, Recipe};
+
+use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
+
+/// What a recipe is made for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// The recipe to begin with.
+    pub base: Recipe,
+    /// Columns and rows of a field.
+    pub size_px: [usize; 2],
+    /// Size of a pixel, µm; [`P::Pixel`] takes its place where it is sought.
+    pub pixel_um: f64,
+    /// Bits of a grey level.
+    pub bits: u32,
+    /// Whether neighbouring pixels share noise, as in pictures of extended focus.
+    pub extended: bool,
+    /// Whether the size of a pixel is sought.
+    pub seek_pixel: bool,
+    /// Standard deviations between fields that were measured beside their means.
+    pub spreads: Spreads,
+}
+
+/// Standard deviations between fields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spreads {
+    /// Of the bowl across.
+    pub across: f64,
+    /// Of the bowl down.
+    pub down: f64,
+    /// Of the logarithm of the noise.
+    pub noise: f64,
+}
+
+impl Default for Spreads {
+    fn default() -> Self {
+        Self { across: 0.008, down: 0.008, noise: 0.03 }
+    }
+}
+
+/// Levels of 8 bits.
+pub(crate) const LEVELS: f64 = 255.0;
+
+/// Part of its strength that scatter takes of the light on the mean.
+const TAKEN: f64 = 0.5;
+
+/// Variance of rounding to whole levels of 8 bits.
+const ROUNDING: f64 = 1.0 / 12.0;
+
+impl Setting {
+    /// Area of a field, mm².
+    #[must_use]
+    pub fn area_mm2(&self, pixel_um: f64) -> f64 {
+        self.size_px[0] as f64 * self.size_px[1] as f64 * pixel_um * pixel_um * 1e-6
+    }
+
+    /// Whether a parameter can be sought here: not the density of clusters where there are none, not the noise shared in a
+    /// picture that was not fused.
+    #[must_use]
+    pub fn seeks(&self, parameter: P) -> bool {
+        match parameter {
+            P::Across | P::Down => self.extended,
+            P::Pixel => self.seek_pixel,
+            P::Size => !self.seek_pixel,
+            P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters { .. }),
+            P::Superficial => ["superficial", "intermediate"].iter().all(|class| self.base.cells.contains_key(*class)),
+            _ => true,
+        }
+    }
+
+    /// What the recipe to begin with says of each parameter.
+    #[must_use]
+    pub fn base_values(&self) -> Values {
+        let base = &self.base;
+        let area = {
+            let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
+            w * h * p * p * 1e-6
+        };
+        let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
+        let (x2, y2) = match &base.background.illumination {
+            Illumination::Bowl { x2, y2, .. } => (centre(x2), centre(y2)),
+            Illumination::Border { .. } => (0.0, 0.0),
+        };
+        let grey = level * LEVELS;
+        let camera = &base.camera;
+        let per_dn = centre(&camera.full_well_e) / LEVELS;
+        let (photons, read) = (grey / per_dn, centre(&camera.read_noise_e) / per_dn);
+        let pattern = centre(&camera.prnu) * grey;
+        let noise = photons + read * read + pattern * pattern + ROUNDING;
+        let counts: f64 = base.cells.values().map(|mix| centre(&mix.count)).sum();
+        let superficial = base.cells.get("superficial").map_or(0.0, |mix| centre(&mix.count));
+        let intermediate = base.cells.get("intermediate").map_or(0.0, |mix| centre(&mix.count));
+        let both = |a: &Number, b: &Number| (spread(a) * spread(a) + spread(b) * spread(b)).sqrt();
+        let first = base.cells.values().next();
+        let of_cells = |f: fn(&CellMix) -> &Number| first.map_or(&Number::Fixed(1.0), f).clone();
+        let (radius, outside) = match &base.layout {
+            Layout::Clusters { radius_um, outside, .. } => (centre(radius_um), centre(outside)),
+            _ => (30.0, 1.0),
+        };
+        let blur = blur(&base.optics);
+        let debris = &base.debris;
+        let mut values = Values([0.0; PARAMETERS.len()]);
+        for (parameter, value) in [
+            (P::Level, level),
+            (P::LevelSpread, spread(&base.background.level) * centre(&base.background.level)),
+            (P::BowlAcross, x2),
+            (P::BowlDown, y2),
+            (P::Noise, noise.sqrt()),
+            (P::Pattern, pattern * pattern / noise),
+            (P::Across, centre(&base.focus.fused_noise_across)),
+            (P::Down, centre(&base.focus.fused_noise_down)),
+            (P::Pixel, centre(&base.field.pixel_um)),
+            (P::Photons, photons / (photons + read * read).max(1e-9)),
+            (P::Blur, centre(blur)),
+            (P::BlurSpread, spread(blur)),
+            (P::Depth, centre(&base.slide.depth_um)),
+            (P::FieldCytoplasm, centre(&base.stain.field_cytoplasm) * centre(&base.stain.slide_cytoplasm)),
+            (P::FieldCytoplasmSpread, both(&base.stain.field_cytoplasm, &base.stain.slide_cytoplasm)),
+            (P::FieldNucleus, centre(&base.stain.field_nucleus) * centre(&base.stain.slide_nucleus)),
+            (P::FieldNucleusSpread, both(&base.stain.field_nucleus, &base.stain.slide_nucleus)),
+            (P::Texture, centre(&base.stain.field_texture)),
+            (P::TextureSpread, spread(&base.stain.field_texture)),
+            (P::CellCytoplasm, spread(&of_cells(|mix| &mix.cytoplasm_stain))),
+            (P::CellNucleus, spread(&of_cells(|mix| &mix.nucleus_stain))),
+            (P::Dome, centre(&base.nucleus.dome)),
+            (P::Rim, centre(&base.nucleus.rim)),
+            (P::Structure, 1.0),
+            (P::Cells, counts / area),
+            (P::CellsSpread, first.map_or(0.3, |mix| spread(&mix.count))),
+            (P::Superficial, superficial / (superficial + intermediate).max(1e-9)),
+            (P::Size, centre(&of_cells(|mix| &mix.size))),
+            (P::ClusterRadius, radius),
+            (P::Outside, outside),
+            (P::Leukocytes, centre(&debris.leukocytes.clusters) / area),
+            (P::Bacilli, centre(&debris.bacilli.clusters) / area),
+            (P::Speckles, centre(&debris.speckles.count) / area),
+            (P::Smudges, centre(&debris.smudges.count) / area),
+            (P::Dirt, centre(&debris.dirt.drifts) / area),
+            (P::Scatter, centre(&base.background.scatter)),
+        ] {
+            values.set(parameter, value);
+        }
+        values
+    }
+
+    /// The recipe to begin with, for fields of this size.
+    #[must_use]
+    pub fn framed(&self, pixel_um: f64) -> Recipe {
+        let mut recipe = self.base.clone();
+        let field = &mut recipe.field;
+        field.width_px = (self.size_px[0] as f64).into();
+        field.height_px = (self.size_px[1] as f64).into();
+        field.pixel_um = number(pixel_um);
+        field.magnification = 0.0.into();
+        recipe.camera.bits = f64::from(self.bits).into();
+        if self.extended && recipe.focus.picture != Picture::Extended {
+            recipe.focus = Preset::ExtendedFocus.recipe().focus;
+        } else if !self.extended {
+            recipe.focus.picture = Picture::Planes;
+            recipe.focus.planes = 1.0.into();
+        }
+        recipe
+    }
+}
+
+/// The recipe of a setting with the values of those parameters that are `fitted`; the others stay as they are in the recipe to
+/// begin with.
+#[must_use]
+pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) -> Recipe {
+    let on = |parameter: P| setting.seeks(parameter) && fitted(parameter);
+    let get = |parameter: P| values.get(parameter);
+    let base = setting.base_values();
+    let pixel_um = if on(P::Pixel) { get(P::Pixel) } else { setting.pixel_um };
+    let mut r = setting.framed(pixel_um);
+    let area = setting.area_mm2(pixel_um);
+    let either = |a: P, b: P| on(a) || on(b);
+    let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
+
+    if either(P::Level, P::LevelSpread) {
+        let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
+        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 0.99);
+    }
+    if either(P::BowlAcross, P::BowlDown) {
+        let off_centre = match &r.background.illumination {
+            Illumination::Bowl { off_centre, .. } => off_centre.clone(),
+            Illumination::Border { .. } => 0.0.into(),
+        };
+        r.background.illumination = Illumination::Bowl {
+            x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
+            y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
+            off_centre,
+        };
+    }
+    if on(P::Scatter) {
+        r.background.scatter = about(get(P::Scatter), &setting.base.background.scatter);
+    }
+    camera(&mut r, setting, &on, &or_base);
+    if on(P::Across) {
+        r.focus.fused_noise_across = number(get(P::Across));
+    }
+    if on(P::Down) {
+        r.focus.fused_noise_down = number(get(P::Down));
+    }
+    if either(P::Blur, P::BlurSpread) {
+        *blur_mut(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
+    }
+    if on(P::Depth) {
+        r.slide.depth_um = number(get(P::Depth));
+    }
+    stain(&mut r, &on, &or_base);
+    if on(P::Dome) {
+        r.nucleus.dome = within(get(P::Dome), 0.2);
+    }
+    if on(P::Rim) {
+        r.nucleus.rim = Number::uniform(0.0, rounded(2.0 * get(P::Rim)));
+    }
+    if on(P::Structure) {
+        let factor = get(P::Structure);
+        let cytoplasm = &mut r.cytoplasm;
+        for (number, most) in [
+            (&mut cytoplasm.clouds, 2.0),
+            (&mut cytoplasm.flecks, 5.0),
+            (&mut cytoplasm.cytoskeleton, 2.0),
+            (&mut cytoplasm.grain, 2.0),
+        ] {
+            *number = cut(times(number, factor), 0.0, most);
+        }
+    }
+    cells(&mut r, area, &base, &on, &or_base);
+    if let Layout::Clusters { radius_um, outside, .. } = &mut r.layout {
+        if on(P::ClusterRadius) {
+            *radius_um = about(get(P::ClusterRadius), radius_um);
+        }
+        if on(P::Outside) {
+            *outside = number(get(P::Outside));
+        }
+    }
+    let debris = &mut r.debris;
+    for (parameter, count) in [
+        (P::Leukocytes, &mut debris.leukocytes.clusters),
+        (P::Bacilli, &mut debris.bacilli.clusters),
+        (P::Speckles, &mut debris.speckles.count),
+        (P::Smudges, &mut debris.smudges.count),
+        (P::Dirt, &mut debris.dirt.drifts),
+    ] {
+        if !on(parameter) {
+            *count = counted(times(count, area / base_area(&setting.base)));
+        } else {
+            // What a preset has none of has no spread to keep.
+            let log_sd = if spread(count) > 0.0 { spread(count).min(1.0) } else { 0.6 };
+            *count = counted(log_normal(get(parameter) * area, log_sd));
+        }
+    }
+    r
+}
+
+fn base_area(base: &Recipe) -> f64 {
+    let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
+    w * h * p * p * 1e-6
+}
+
+/// The noise of the empty slide, divided between photons, reading and a pattern.
+fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
+    if !(on(P::Noise) || on(P::Photons) || on(P::Pattern)) {
+        return;
+    }
+    /// Neither part is less than this of what is left of the noise.
+    const LEAST: f64 = 0.02;
+    let grey = or_base(P::Level) * LEVELS;
+    let all = or_base(P::Noise) * or_base(P::Noise);
+    let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;
+    let rest = (all - pattern - ROUNDING).max(0.1 * all);
+    let photons = or_base(P::Photons).clamp(LEAST, 1.0 - LEAST);
+    let per_dn = grey / (photons * rest);
+    let read = per_dn * ((1.0 - photons) * rest).sqrt();
+    let camera = &mut r.camera;
+    camera.full_well_e = number(per_dn * LEVELS);
+    // A spread of all noise is laid on the reading alone.
+    let spread = (setting.spreads.noise / (1.0 - photons)).min(0.5);
+    camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
+    camera.read_noise_rms_e = 0.0.into();
+    camera.dsnu_e = 0.0.into();
+    camera.dark_current_e_per_s = 0.0.into();
+    camera.prnu = number(pattern.sqrt() / grey);
+}
+
+fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
+    let stain = &mut r.stain;
+    // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
+    if on(P::FieldCytoplasm) || on(P::FieldCytoplasmSpread) {
+        stain.slide_cytoplasm = 1.0.into();
+        stain.field_cytoplasm =
+            cut(log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread)), 0.0, 20.0);
+    }
+    if on(P::FieldNucleus) || on(P::FieldNucleusSpread) {
+        stain.slide_nucleus = 1.0.into();
+        stain.field_nucleus = cut(log_normal(or_base(P::FieldNucleus), or_base(P::FieldNucleusSpread)), 0.0, 20.0);
+    }
+    if on(P::Texture) || on(P::TextureSpread) {
+        stain.field_texture = cut(log_normal(or_base(P::Texture), or_base(P::TextureSpread)), 0.0, 20.0);
+    }
+}
+
+fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
+    let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
+    let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
+    let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
+    let scale = total / base_total.max(1e-9);
+    let pair = ["superficial", "intermediate"].map(|class| r.cells.get(class).map_or(0.0, |mix| centre(&mix.count)));
+    for (class, mix) in &mut r.cells {
+        if found {
+            let own = match class.as_str() {
+                "superficial" if on(P::Superficial) => (pair[0] + pair[1]) * share,
+                "intermediate" if on(P::Superficial) => (pair[0] + pair[1]) * (1.0 - share),
+                _ => centre(&mix.count),
+            };
+            mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSpread)));
+        } else {
+            mix.count = counted(times(&mix.count, base.get(P::Cells) * area / base_total.max(1e-9)));
+        }
+        if on(P::Size) {
+            mix.size = number(or_base(P::Size));
+        }
+        if on(P::CellCytoplasm) {
+            mix.cytoplasm_stain = cut(log_normal(centre(&mix.cytoplasm_stain), or_base(P::CellCytoplasm)), 0.0, 20.0);
+        }
+        if on(P::CellNucleus) {
+            mix.nucleus_stain = cut(log_normal(centre(&mix.nucleus_stain), or_base(P::CellNucleus)), 0.0, 20.0);
+        }
+    }
+}
+
+fn blur(optics: &Optics) -> &Number {
+    match optics {
+        Optics::BrightField { extra_blur_um, .. } => extra_blur_um,
+        Optics::Gaussian { sigma_xy_um, .. } => sigma_xy_um,
+    }
+}
+
+fn blur_mut(optics: &mut Optics) -> &mut Number {
+    match optics {
+        Optics::BrightField { extra_blur_um, .. } => extra_blur_um,
+        Optics::Gaussian { sigma_xy_um, .. } => sigma_xy_um,
+    }
+}
+
+/// To as many digits as a recipe is read with.
+fn rounded(value: f64) -> f64 {
+    crate::number::rounded(value, 4)
+}
+
+fn number(value: f64) -> Number {
+    Number::Fixed(rounded(value))
+}
+
+fn normal(mean: f64, sd: f64) -> Number {
+    if rounded(sd) > 0.0 { Number::normal(rounded(mean), rounded(sd)) } else { number(mean) }
+}
+
+fn log_normal(median: f64, log_sd: f64) -> Number {
+    if rounded(log_sd) > 0.0 { Number::log_normal(rounded(median), rounded(log_sd)) } else { number(median) }
+}
+
+/// Uniform so far to both sides, but from 0 to 1.
+fn within(middle: f64, half: f64) -> Number {
+    let half = half.min(middle.max(0.0)).min((1.0 - middle).max(0.0));
+    if half > 0.0 {
+        Number::uniform(rounded(middle - half), rounded(middle + half))
+    } else {
+        number(middle.clamp(0.0, 1.0))
+    }
+}
+
+/// Nothing beyond what a recipe accepts, where the distribution reaches there.
+fn cut(number: Number, low: f64, high: f64) -> Number {
+    let [least, most] = number.bounds();
+    if least >= low && most <= high {
+        return number;
+    }
+    match number {
+        Number::Fixed(value) => Number::Fixed(value.clamp(low, high)),
+        Number::Drawn { law, min, max } => {
+            Number::Drawn { law, min: if least < low { low } else { min }, max: if most > high { high } else { max } }
+        }
+    }
+}
+
+/// A distribution like another, about another middle.
+fn about(middle: f64, like: &Number) -> Number {
+    let now = centre(like);
+    if now > 0.0 { times(like, middle / now) } else { number(middle) }
+}
+
+/// A distribution with everything in it multiplied.
+fn times(number: &Number, factor: f64) -> Number {
+    let by = |value: &f64| rounded(value * factor);
+    match number {
+        Number::Fixed(value) => Number::Fixed(by(value)),
+        Number::Drawn { law, min, max } => Number::Drawn {
+            law: match law {
+                Law::Uniform(a, b) => Law::Uniform(by(a), by(b)),
+                Law::Normal(a, b) => Law::Normal(by(a), by(b)),
+                Law::LogNormal(median, log_sd) => Law::LogNormal(by(median), *log_sd),
+                Law::Choice(values) => Law::Choice(values.iter().map(by).collect()),
+            },
+            min: if min.is_finite() { by(min) } else { *min },
+            max: if max.is_finite() { by(max) } else { *max },
+        },
+    }
+}
+
+/// What is written out of a count is whole.
+fn counted(number: Number) -> Number {
+    match number {
+        Number::Fixed(value) => Number::Fixed(libm::round(value)),
+        Number::Drawn { law: Law::Choice(values), min, max } => {
+            Number::Drawn { law: Law::Choice(values.into_iter().map(libm::round).collect()), min, max }
+        }
+        drawn => drawn,
+    }
+}
+
+/// The middle of a distribution: the median of a log-normal, the mean of others.
+pub(crate) fn centre(number: &Number) -> f64 {
+    match number {
+        Number::Fixed(value) => *value,
+        Number::Drawn { law, .. } => match law {
+            Law::Uniform(a, b) => 0.5 * (a + b),
+            Law::Normal(mean, _) => *mean,
+            Law::LogNormal(median, _) => *median,
+            Law::Choice(values) => values.iter().sum::<f64>() / values.len().max(1) as f64,
+        },
+    }
+}
+
+/// Standard deviation over the middle, or of the logarithm.
+pub(crate) fn spread(number: &Number) -> f64 {
+    let relative = |sd: f64| sd / centre(number).abs().max(1e-9);
+    match number {
+        Number::Fixed(_) => 0.0,
+        Number::Drawn { law, .. } => match law {
+            Law::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
+            Law::Normal(_, sd) => relative(*sd),
+            Law::LogNormal(_, log_sd) => *log_sd,
+            Law::Choice(values) => relative(crate::number::deviation(values)),
+        },
+    }
+}
+
+/// Those parameters that are found by simulation in a setting.
+pub(crate) fn simulated(setting: &Setting) -> Vec<P> {
+    PARAMETERS.into_iter().filter(|p| setting.seeks(*p) && p.prior().source == Source::Simulated).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting(extended: bool) -> Setting {
+        Setting {
+            base: Recipe::default(),
+            size_px: [640, 480],
+            pixel_um: 0.33,
+            bits: 8,
+            extended,
+            seek_pixel: false,
+            spreads: Spreads::default(),
+        }
+    }
+
+    #[test]
+    fn every_corner_of_the_ranges_is_a_recipe() {
+        for preset in Preset::ALL {
+            let setting = Setting { base: preset.recipe(), ..setting(true) };
+            for place in [0.0, 0.5, 1.0] {
+                let values = Values::at(&[place; PARAMETERS.len()]);
+                let problems = recipe(&setting, &values, |_| true).problems();
+                assert!(problems.is_empty(), "{preset:?} at {place}: {problems:?}");
+            }
+            for parameter in PARAMETERS {
+                let values = Values::at(&[0.9; PARAMETERS.len()]);
+                let problems = recipe(&setting, &values, |p| p == parameter).problems();
+                assert!(problems.is_empty(), "{preset:?}, {parameter:?}: {problems:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_recipe_gives_back_its_values() {
+        let setting = setting(true);
+        let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
+        let made = recipe(&setting, &values, |_| true);
+        let back = Setting { base: made, ..setting }.base_values();
+        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::CellsSpread)) {
+            let (a, b) = (values.get(parameter), back.get(parameter));
+            assert!((a - b).abs() < 0.03 * a.abs() + 0.01, "{parameter:?}: {a} {b}");
+        }
+    }
+}

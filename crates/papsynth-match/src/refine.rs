@@ -1,0 +1,224 @@
+//! From an estimate to the recipe whose simulated windows come nearest to the real ones.
+
+use argmin::core::{CostFunction, Executor, Gradient, State};
+use argmin::solver::linesearch::MoreThuenteLineSearch;
+use argmin::solver::quasinewton::LBFGS;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::regression::{Estimate, Scaler};
+use crate::ridge::Kernel;
+use crate::table::Table;
+
+/// Statistics further apart than so many standard errors count in proportion, not by the square: what a recipe cannot show
+/// must not bend all it can.
+const FAR: f64 = 3.0;
+
+/// Steps of the optimiser, and gradients that it remembers.
+const STEPS: u64 = 200;
+const MEMORY: usize = 7;
+
+/// How strongly the place is held near that of the regression.
+const HOLD: f64 = 1.0;
+
+/// What windows are like as a function of the places of parameters: a parabola through the table, and how far recipes lie from it.
+pub(crate) struct Forward {
+    scaler: Scaler,
+    /// Factors of 1, places and their squares, statistic by statistic.
+    factors: Vec<Vec<f64>>,
+    /// Standard error of each scaled statistic.
+    errors: Vec<f64>,
+}
+
+/// Least standard error of a statistic, in its standard deviations over the table: even what follows its parameters closely is not
+/// followed by a parabola.
+const LEAST_ERROR: f64 = 0.05;
+
+impl Forward {
+    pub(crate) fn new(table: &Table) -> Self {
+        let scaler = Scaler::new(&table.statistics);
+        let statistics: Vec<Vec<f64>> = table.statistics.iter().map(|r| scaler.scaled(r)).collect();
+        let rows: Vec<Vec<f64>> = table.places.iter().map(|p| features(p)).collect();
+        let n = rows.len();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let kernel = Kernel::new(DMatrix::from_fn(n, n, |i, j| dot(&rows[i], &rows[j])));
+        let columns = table.names.len();
+        let fitted: Vec<(Vec<f64>, f64)> = (0..columns)
+            .into_par_iter()
+            .map(|c| {
+                let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
+                let ridge = kernel.best(&y);
+                let mut factors = vec![ridge.mean];
+                factors.extend(
+                    (0..rows[0].len()).map(|f| ridge.weights.iter().zip(&rows).map(|(w, r)| w * r[f]).sum::<f64>()),
+                );
+                (factors, ridge.error.sqrt().max(LEAST_ERROR))
+            })
+            .collect();
+        let (factors, errors) = fitted.into_iter().unzip();
+        Self { scaler, factors, errors }
+    }
+
+    fn at(&self, statistic: usize, features: &[f64]) -> f64 {
+        let factors = &self.factors[statistic];
+        factors[0] + factors[1..].iter().zip(features).map(|(a, b)| a * b).sum::<f64>()
+    }
+
+    /// How many standard errors each statistic lies from that of the real fields; NaN where either is unknown.
+    pub(crate) fn apart(&self, real: &[f64], simulated: &[f64]) -> Vec<f64> {
+        let (a, b) = (self.scaler.scaled(real), self.scaler.scaled(simulated));
+        let known = real.iter().zip(simulated).map(|(x, y)| x.is_finite() && y.is_finite());
+        known
+            .zip(a.iter().zip(&b))
+            .zip(&self.errors)
+            .map(|((known, (a, b)), e)| if known { (b - a) / e } else { f64::NAN })
+            .collect()
+    }
+}
+
+/// Root of the mean square of distances, far ones in proportion.
+pub(crate) fn distance(apart: &[f64]) -> f64 {
+    let known: Vec<f64> = apart.iter().filter(|z| z.is_finite()).map(|z| robust(*z)).collect();
+    crate::number::mean(&known).sqrt()
+}
+
+fn robust(z: f64) -> f64 {
+    let a = z.abs();
+    if a < FAR { z * z } else { FAR * (2.0 * a - FAR) }
+}
+
+fn robust_slope(z: f64) -> f64 {
+    if z.abs() < FAR { 2.0 * z } else { 2.0 * FAR * z.signum() }
+}
+
+/// Places about the middle of their ranges and their squares.
+fn features(places: &[f64]) -> Vec<f64> {
+    let about = |p: &f64| 2.0 * p - 1.0;
+    places.iter().map(about).chain(places.iter().map(|p| about(p) * about(p) - 1.0 / 3.0)).collect()
+}
+
+/// What is minimised: the distance that the parabolas tell, with what they were wrong by at the last simulation taken off.
+struct Told<'a> {
+    forward: &'a Forward,
+    /// Statistics that count, and where they should be by the parabolas.
+    aims: Vec<(usize, f64)>,
+    /// All places; those that do not move keep theirs.
+    places: Vec<f64>,
+    /// Those that move, with the ends of their intervals and where the regression saw them.
+    moving: Vec<(usize, Estimate)>,
+}
+
+impl Told<'_> {
+    /// Places within the intervals, from numbers without bounds; with the slopes.
+    fn inside(&self, free: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut places = self.places.clone();
+        let mut slopes = Vec::with_capacity(free.len());
+        for ((i, e), x) in self.moving.iter().zip(free) {
+            let t = libm::tanh(*x);
+            places[*i] = e.low + 0.5 * (1.0 + t) * (e.high - e.low);
+            slopes.push(0.5 * (1.0 - t * t) * (e.high - e.low));
+        }
+        (places, slopes)
+    }
+
+    fn outside(&self, places: &[f64]) -> Vec<f64> {
+        /// Not further than this towards the ends: there the slope is gone.
+        const MOST: f64 = 0.98;
+        let one = |(i, e): &(usize, Estimate)| {
+            libm::atanh((2.0 * (places[*i] - e.low) / (e.high - e.low).max(1e-9) - 1.0).clamp(-MOST, MOST))
+        };
+        self.moving.iter().map(one).collect()
+    }
+
+    fn hold(&self, places: &[f64]) -> impl Iterator<Item = f64> {
+        // Half an interval is two standard errors.
+        self.moving
+            .iter()
+            .map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
+            .collect::<Vec<_>>()
+            .into_iter()
+    }
+}
+
+impl CostFunction for Told<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        let (places, _) = self.inside(free);
+        let features = features(&places);
+        let apart =
+            self.aims.iter().map(|(s, aim)| robust((self.forward.at(*s, &features) - aim) / self.forward.errors[*s]));
+        Ok(apart.sum::<f64>() + HOLD * self.hold(&places).map(|z| z * z).sum::<f64>())
+    }
+}
+
+impl Gradient for Told<'_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, free: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
+        let (places, slopes) = self.inside(free);
+        let all = features(&places);
+        let count = places.len();
+        let mut of_places = vec![0.0; count];
+        for (s, aim) in &self.aims {
+            let error = self.forward.errors[*s];
+            let slope = robust_slope((self.forward.at(*s, &all) - aim) / error) / error;
+            let factors = &self.forward.factors[*s];
+            for (i, sum) in of_places.iter_mut().enumerate() {
+                *sum += slope * 2.0 * (factors[1 + i] + 2.0 * all[i] * factors[1 + count + i]);
+            }
+        }
+        let hold: Vec<f64> = self.hold(&places).collect();
+        let one = |(k, ((i, e), slope)): (usize, (&(usize, Estimate), &f64))| {
+            slope * (of_places[*i] + HOLD * 2.0 * hold[k] * 4.0 / (e.high - e.low).max(1e-9))
+        };
+        Ok(self.moving.iter().zip(&slopes).enumerate().map(one).collect())
+    }
+}
+
+/// The next place to try from one whose windows were simulated.
+pub(crate) fn propose(
+    forward: &Forward,
+    real: &[f64],
+    simulated: &[f64],
+    places: &[f64],
+    moving: &[(usize, Estimate)],
+) -> Vec<f64> {
+    let (wanted, found) = (forward.scaler.scaled(real), forward.scaler.scaled(simulated));
+    let here = features(places);
+    let known = |s: &usize| real[*s].is_finite() && simulated[*s].is_finite();
+    let aims = (0..real.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
+    let told = Told { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
+    let start = told.outside(places);
+    if start.is_empty() {
+        return places.to_vec();
+    }
+    let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
+    let best = Executor::new(&told, solver)
+        .configure(|state| state.param(start.clone()).max_iters(STEPS))
+        .timer(false)
+        .run()
+        .ok()
+        .and_then(|result| result.state().get_best_param().cloned());
+    told.inside(&best.unwrap_or(start)).0
+}
+
+impl CostFunction for &Told<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        (**self).cost(free)
+    }
+}
+
+impl Gradient for &Told<'_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, free: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
+        (**self).gradient(free)
+    }
+}

@@ -1,0 +1,246 @@
+//! What windows are like, in numbers that regressions learn from.
+
+use papsynth_judge::{Field, Picture, Statistics, Table};
+
+use crate::error::Error;
+use crate::number::{deviation, mean, quantile};
+use crate::view::View;
+use crate::{noise, small};
+
+/// How a number enters.
+#[derive(Clone, Copy)]
+enum As {
+    Itself,
+    /// The logarithm of it and so much.
+    Log(f64),
+}
+
+impl As {
+    fn of(self, value: f64) -> f64 {
+        match self {
+            Self::Itself => value,
+            Self::Log(more) => libm::log((value + more).max(1e-9)),
+        }
+    }
+}
+
+/// Features of nuclei that are looked at.
+const NUCLEI: [(&str, As); 25] = [
+    ("nucleus area, um2", As::Log(0.0)),
+    ("core absorbance", As::Itself),
+    ("core above surroundings", As::Itself),
+    ("absorbance beside", As::Itself),
+    ("spread beside", As::Log(0.005)),
+    ("core sd", As::Log(0.002)),
+    ("core sd without trend", As::Log(0.002)),
+    ("core sd over contrast", As::Log(0.01)),
+    ("core slope", As::Log(0.002)),
+    ("core slope over sd", As::Itself),
+    ("rim to centre, bin 1 of 5", As::Itself),
+    ("rim to centre, bin 2 of 5", As::Itself),
+    ("rim to centre, bin 3 of 5", As::Itself),
+    ("rim to centre, bin 5 of 5", As::Itself),
+    ("rim sigma, px", As::Log(0.0)),
+    ("darkest depth over core", As::Itself),
+    ("rim slope over contrast", As::Itself),
+    ("core correlation at 1 px", As::Itself),
+    ("core correlation at 2 px", As::Itself),
+    ("core correlation at 4 px", As::Itself),
+    ("core power at 1 px", As::Log(0.001)),
+    ("core power at 4 px", As::Log(0.001)),
+    ("log moment 2", As::Itself),
+    ("core skewness", As::Itself),
+    ("nucleus eccentricity", As::Itself),
+];
+
+/// Those of them whose means are compared between fields: where the field differs, all its nuclei do.
+const BETWEEN: [&str; 4] = ["core absorbance", "core sd without trend", "rim sigma, px", "absorbance beside"];
+
+/// Features of free cells.
+const CELLS: [(&str, As); 13] = [
+    ("cell area, um2", As::Log(0.0)),
+    ("cytoplasm absorbance", As::Log(0.005)),
+    ("cytoplasm sd over median", As::Log(0.02)),
+    ("cytoplasm quantile 0.9 over median", As::Itself),
+    ("cytoplasm power at 1 px over median", As::Log(0.002)),
+    ("cytoplasm power at 2 px over median", As::Log(0.002)),
+    ("cytoplasm power at 4 px over median", As::Log(0.002)),
+    ("cytoplasm power at 8 px over median", As::Log(0.002)),
+    ("cytoplasm slope over median", As::Log(0.002)),
+    ("dark spots in cytoplasm, um-2", As::Itself),
+    ("sigma of the cell's rim, px, quantile 0.25", As::Log(0.2)),
+    ("nucleus over cell area", As::Log(0.001)),
+    ("cell circularity", As::Itself),
+];
+
+/// Parts of a window darker than these.
+const TAILS: [f64; 8] = [0.05, 0.09, 0.15, 0.21, 0.31, 0.41, 0.61, 0.81];
+
+/// Fewest nuclei, or cells, that have a middle.
+const LEAST: usize = 4;
+
+/// What is measured in a window.
+#[derive(Debug, Clone)]
+pub(crate) struct Window {
+    /// Numbers of the window as a whole, by the order of [`names_of_windows`].
+    whole: Vec<f64>,
+    nuclei: Table,
+    cells: Table,
+}
+
+/// Numbers of the statistics of a window.
+fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
+    let ripley = s.ripley.map(|k| As::Log(0.1).of(k));
+    vec![
+        ("log noise", As::Log(0.0).of(s.noise_dn)),
+        ("noise correlation across", s.noise_across),
+        ("noise correlation down", s.noise_down),
+        ("noise correlation diagonally", s.noise_diagonal),
+        ("log coverage", As::Log(0.01).of(s.coverage)),
+        ("log absorbance of what is covered", As::Log(0.005).of(s.covered_a)),
+        ("log range of it", As::Log(0.0).of(s.covered_range)),
+        ("log part of it in layers", As::Log(0.02).of(s.layered)),
+        ("slope of the spectrum", s.spectrum_slope),
+        ("log edge sigma p10", As::Log(0.1).of(s.edge_sigma_p10)),
+        ("log edge sigma p50", As::Log(0.1).of(s.edge_sigma_p50)),
+        ("log nuclei", As::Log(20.0).of(s.nuclei_mm2)),
+        ("Clark-Evans", s.clark_evans),
+        ("log K at 16.5 um", ripley[0]),
+        ("log K at 33 um", ripley[1]),
+        ("log K at 66 um", ripley[2]),
+        ("circularity of cells", s.circularity),
+        ("profile, bin 1", s.profile[0]),
+        ("profile, bin 2", s.profile[1]),
+        ("profile, bin 9", s.profile[8]),
+    ]
+}
+
+/// Those of [`names_of_windows`] whose deviation between windows is looked at too.
+const SPREAD: [&str; 13] = [
+    "log noise",
+    "log coverage",
+    "log absorbance of what is covered",
+    "log range of it",
+    "log edge sigma p10",
+    "log edge sigma p50",
+    "log nuclei",
+    "log power, ring 4",
+    "log power, ring 9",
+    "log power, ring 11",
+    "part above 0.15",
+    "part above 0.41",
+    "log part of it in layers",
+];
+
+fn names_of_windows(s: &Statistics) -> Vec<String> {
+    let mut names: Vec<String> = scalars(s).iter().map(|(name, _)| (*name).to_owned()).collect();
+    names.extend((0..s.spectrum.len()).map(|i| format!("log power, ring {i}")));
+    names.extend(TAILS.map(|a| format!("part above {a}")));
+    names.extend((1..=noise::LAW).map(|i| format!("noise in the dark, bin {i}")));
+    names.push("unevenness of the light".to_owned());
+    names.extend(small::names());
+    names
+}
+
+impl Window {
+    pub(crate) fn new(picture: &Picture, view: &View) -> Result<(Self, Vec<String>), Error> {
+        let Field { statistics: s, nuclei, cells, .. } = view.gauge.measure(picture)?;
+        let empty = s.background_dn * f64::from(picture.full_scale) / crate::recipe::LEVELS;
+        let mut whole: Vec<f64> = scalars(&s).iter().map(|(_, value)| *value).collect();
+        whole.extend(s.spectrum);
+        whole.extend(TAILS.map(|a| As::Log(0.002).of(tail(&s.histogram, a))));
+        whole.extend(noise::law(&picture.grey, picture.width, empty));
+        whole.push(noise::unevenness(&picture.grey, picture.width, empty));
+        whole.extend(small::counts(&picture.grey, picture.width, crate::number::single(empty)));
+        let names = names_of_windows(&s);
+        Ok((Self { whole, nuclei, cells }, names))
+    }
+
+    pub(crate) fn nuclei(&self) -> usize {
+        self.nuclei.len()
+    }
+}
+
+/// Part of the histogram above an absorbance.
+fn tail(histogram: &[f64], above: f64) -> f64 {
+    let from = crate::number::whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
+    histogram.iter().skip(from).sum()
+}
+
+/// What several windows of one microscope are like: named numbers, NaN where there is none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// What they are.
+    pub names: Vec<String>,
+    /// The numbers.
+    pub values: Vec<f64>,
+}
+
+impl Summary {
+    /// Of windows of fields.
+    ///
+    /// # Errors
+    /// If a picture is none.
+    pub fn of(pictures: &[Picture], view: &View) -> Result<Self, Error> {
+        let windows: Vec<(Window, Vec<String>)> =
+            pictures.iter().map(|p| Window::new(p, view)).collect::<Result<_, _>>()?;
+        let names = windows.first().map(|w| w.1.clone()).unwrap_or_default();
+        Ok(Self::new(&windows.into_iter().map(|w| w.0).collect::<Vec<_>>(), &names))
+    }
+
+    pub(crate) fn new(windows: &[Window], names_of_windows: &[String]) -> Self {
+        let (mut names, mut values) = (Vec::new(), Vec::new());
+        let mut put = |name: String, value: f64| {
+            names.push(name);
+            values.push(value);
+        };
+        for (i, name) in names_of_windows.iter().enumerate() {
+            let known: Vec<f64> = windows.iter().map(|w| w.whole[i]).filter(|v| v.is_finite()).collect();
+            put(name.clone(), mean(&known));
+            if SPREAD.contains(&name.as_str()) {
+                put(format!("{name}, sd"), As::Log(0.01).of(deviation(&known)));
+            }
+        }
+        let nuclei: Vec<&Table> = windows.iter().map(|w| &w.nuclei).collect();
+        for (name, scale) in NUCLEI {
+            let [middle, spread] = pooled(&nuclei, name, scale);
+            put(format!("nuclei: {name}"), middle);
+            put(format!("nuclei: {name}, spread"), As::Log(0.003).of(spread));
+            if BETWEEN.contains(&name) {
+                put(format!("nuclei: {name}, between windows"), As::Log(0.005).of(between(&nuclei, name, scale)));
+            }
+        }
+        let cells: Vec<&Table> = windows.iter().map(|w| &w.cells).collect();
+        for (name, scale) in CELLS {
+            let [middle, spread] = pooled(&cells, name, scale);
+            put(format!("cells: {name}"), middle);
+            put(format!("cells: {name}, spread"), As::Log(0.003).of(spread));
+        }
+        Self { names, values }
+    }
+}
+
+/// Middle and spread (three quarters of the distance between quartiles) of a feature over all tables.
+fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
+    let mut values: Vec<f64> = tables.iter().flat_map(|t| t.column(name)).map(|v| scale.of(v)).collect();
+    if values.len() < LEAST {
+        return [f64::NAN; 2];
+    }
+    let [low, middle, high] = [0.25, 0.5, 0.75].map(|q| quantile(&mut values, q));
+    [middle, 0.741 * (high - low)]
+}
+
+/// Standard deviation of the means of tables, without what the spread within them makes of it.
+fn between(tables: &[&Table], name: &str, scale: As) -> f64 {
+    let groups: Vec<Vec<f64>> = tables
+        .iter()
+        .map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<_>>())
+        .filter(|v| v.len() >= 2)
+        .collect();
+    if groups.len() < 3 {
+        return f64::NAN;
+    }
+    let means: Vec<f64> = groups.iter().map(|g| mean(g)).collect();
+    let within: Vec<f64> = groups.iter().map(|g| deviation(g) * deviation(g) / g.len() as f64).collect();
+    (deviation(&means) * deviation(&means) - mean(&within)).max(0.0).sqrt()
+}

@@ -1,0 +1,193 @@
+//! A recipe as TOML: what differs from the default, and what is known of each number.
+
+use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe};
+use serde_json::{Map, Value};
+
+use crate::fit::{Answer, Fit, Origin};
+use crate::number::rounded;
+
+/// Digits that values are told with.
+const DIGITS: i32 = 3;
+
+impl Fit {
+    /// The recipe as TOML, with the value of each parameter, its interval and where it comes from. Read over the default recipe it is
+    /// [`recipe`](Self::recipe).
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let json = |recipe: &Recipe| serde_json::to_value(recipe).unwrap_or_default();
+        let mut out = self.heading();
+        out.push_str(&format!("version = {RECIPE_VERSION}\n"));
+        let (recipe, default) = (json(&self.recipe), json(&Recipe::default()));
+        self.table(&mut out, "", &recipe, &default);
+        out
+    }
+
+    fn heading(&self) -> String {
+        let Self { fields, windows, nuclei, distance, .. } = self;
+        let mut out = format!(
+            "# Matched to {fields} fields: {windows} windows with {nuclei} nuclei. Numbers in brackets are 95 % intervals.\n\
+             # Distance of simulated windows from the real ones, in standard errors: {:.2} before, {:.2} after.\n",
+            distance.before, distance.after
+        );
+        let lost: Vec<&str> =
+            self.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
+        if !lost.is_empty() {
+            out.push_str("# The fields do not tell these, which are as in the recipe to begin with:\n");
+            lost.iter().for_each(|path| out.push_str(&format!("#   {path}\n")));
+        }
+        out.push('\n');
+        out
+    }
+
+    /// The fields of a table that differ from the default or were found, plain ones first.
+    fn table(&self, out: &mut String, path: &str, value: &Value, default: &Value) {
+        let Some(fields) = value.as_object() else { return };
+        let other_kind = fields.get("kind") != default.get("kind");
+        let (tables, plain): (Vec<_>, Vec<_>) =
+            fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_table(v));
+        let within = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+        let mut lines = String::new();
+        for (name, value) in plain.iter().filter(|(name, _)| *name != "kind") {
+            let notes = self.notes(&within(name));
+            if !notes.is_empty() || other_kind || default.get(name) != Some(value) {
+                lines.push_str(&notes);
+                lines.push_str(&format!("{name} = {}\n", inline(value)));
+            }
+        }
+        if !lines.is_empty() || other_kind {
+            if !path.is_empty() {
+                out.push_str(&format!("\n[{path}]\n"));
+            }
+            if let Some(kind) = fields.get("kind") {
+                out.push_str(&format!("kind = {kind}\n"));
+            }
+            out.push_str(&lines);
+        }
+        for (name, value) in tables {
+            let inner = within(name);
+            // A class of cells that is named at all is read over the default of all classes.
+            let of_class = serde_json::to_value(CellMix::default()).unwrap_or_default();
+            let default = if path == "cells" { &of_class } else { default.get(name).unwrap_or(&Value::Null) };
+            self.table(out, &inner, value, default);
+        }
+    }
+
+    /// What is known of the parameters behind a field, as comments.
+    fn notes(&self, path: &str) -> String {
+        let told =
+            self.answers.iter().filter(|a| a.origin != Origin::NotIdentified && a.fields().any(|f| is_at(&f, path)));
+        told.map(|a| format!("# {}\n", a.note())).collect()
+    }
+}
+
+impl Answer {
+    /// The fields of a recipe that it stands in, classes of cells as `*`.
+    fn fields(&self) -> impl Iterator<Item = String> + '_ {
+        let (fields, _) = self.path.split_once(':').unwrap_or((self.path, ""));
+        let section = fields.split('.').next().unwrap_or_default();
+        fields
+            .split(", ")
+            .map(move |field| if field.contains('.') { field.to_owned() } else { format!("{section}.{field}") })
+    }
+
+    /// What it says of them: "median".
+    fn what(&self) -> &str {
+        self.path.split_once(": ").map_or("value", |(_, what)| what)
+    }
+
+    fn note(&self) -> String {
+        let origin = match self.origin {
+            Origin::Measured => "measured",
+            Origin::Simulated => "simulated",
+            Origin::NotIdentified => "not identified",
+        };
+        let [value, low, high] = [self.value, self.interval[0], self.interval[1]].map(|v| rounded(v, DIGITS));
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        format!("{origin}: {} {value}{unit} ({low} to {high})", self.what())
+    }
+}
+
+/// Whether a field with `*` for a class is a path.
+fn is_at(field: &str, path: &str) -> bool {
+    // The paper's optics have another name for it.
+    let path = path.replace("sigma_xy_um", "extra_blur_um");
+    let (a, b) = (field.split('.'), path.split('.'));
+    a.clone().count() == b.clone().count() && a.zip(b).all(|(a, b)| a == "*" || a == b)
+}
+
+/// Distributions are tables in JSON but are written on one line.
+fn is_table(value: &Value) -> bool {
+    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
+    value.as_object().is_some_and(|map: &Map<String, Value>| !LAWS.iter().any(|law| map.contains_key(*law)))
+}
+
+fn inline(value: &Value) -> String {
+    match value {
+        Value::Object(map) => {
+            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect();
+            format!("{{ {} }}", inner.join(", "))
+        }
+        Value::Array(items) => format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::Distance;
+    use crate::parameter::{PARAMETERS, Values};
+    use crate::recipe::{Setting, Spreads, recipe};
+    use papsynth::recipe::Preset;
+
+    #[test]
+    fn what_is_written_is_read_as_the_recipe() {
+        for preset in Preset::ALL {
+            let setting = Setting {
+                base: preset.recipe(),
+                size_px: [1280, 960],
+                pixel_um: 0.33,
+                bits: 8,
+                extended: true,
+                seek_pixel: false,
+                spreads: Spreads::default(),
+            };
+            let values = Values::at(&[0.4; PARAMETERS.len()]);
+            let answers = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(|parameter| {
+                let prior = parameter.prior();
+                let origin = if parameter.index() % 3 == 0 { Origin::NotIdentified } else { Origin::Simulated };
+                let (value, range) = (values.get(parameter), [prior.low, prior.high]);
+                Answer {
+                    parameter,
+                    path: prior.path,
+                    unit: prior.unit,
+                    origin,
+                    value,
+                    interval: range,
+                    before: value,
+                    range,
+                    width: 0.2,
+                }
+            });
+            let answers: Vec<Answer> = answers.collect();
+            let fitted = |p| answers.iter().any(|a: &Answer| a.parameter == p && a.origin == Origin::Simulated);
+            let fit = Fit {
+                recipe: recipe(&setting, &values, fitted),
+                answers: answers.clone(),
+                distance: Distance { before: 3.0, estimated: 2.0, after: 1.5 },
+                statistics: Vec::new(),
+                fields: 8,
+                windows: 32,
+                nuclei: 200,
+                simulated: 300,
+                extended: true,
+            };
+            let text = fit.to_toml();
+            let read: Recipe = toml::from_str(&text).unwrap_or_else(|e| panic!("{preset:?}: {e}\n{text}"));
+            assert_eq!(read, fit.recipe, "{preset:?}\n{text}");
+            for answer in fit.answers.iter().filter(|a| a.origin == Origin::Simulated) {
+                assert!(text.contains(&answer.note()), "{preset:?}: {}\n{text}", answer.note());
+            }
+        }
+    }
+}
