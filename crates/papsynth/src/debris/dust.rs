@@ -38,10 +38,10 @@ pub struct Grain {
 impl Default for Dust {
     fn default() -> Self {
         Self {
-            count: Number::log_normal(0.25, 0.9),
+            count: Number::log_normal(0.12, 0.9),
             diameter_um: Number::log_normal(14.0, 0.5),
             height_um: Number::choice([20.0, 35.0, 60.0, 170.0]),
-            absorbance: Number::uniform(0.2, 1.0),
+            absorbance: Number::uniform(0.1, 0.7),
         }
     }
 }

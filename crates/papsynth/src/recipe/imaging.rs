@@ -200,7 +200,7 @@ mod defaults {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Background {
-    /// Light of the empty slide as a fraction of the camera's largest grey level, 0.01 to 1 (b of Eq. 8).
+    /// Light of the empty slide as a fraction of the camera's largest grey level, 0.01 to 1.2 (b of Eq. 8).
     pub level: Number,
     /// How evenly the lamp lights the field.
     pub illumination: Illumination,

@@ -188,6 +188,9 @@ fn box_mean(values: &mut [f32], radius: usize, before: &mut Vec<f32>) {
 /// How far from the nucleus the sheet is lifted by it, relative to its radius.
 const LIFTED: f64 = 2.4;
 
+/// How much thicker it is there, relative to the density of the endoplasm.
+const LIFT: f32 = 2.2;
+
 /// Steps from none to all of what changes towards the middle of a cell.
 const STEPS: usize = 6;
 
@@ -233,7 +236,7 @@ pub(super) fn add_endoplasm(
         .values
         .iter_mut()
         .zip(&lifted.values)
-        .for_each(|(value, share)| *value *= 1.0 + 0.9 * share * body.detail.endoplasm as f32);
+        .for_each(|(value, share)| *value *= 1.0 + LIFT * share * body.detail.endoplasm as f32);
     let grain = Look::fine(pixel_um, rng);
     let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
     let width = absorbance.width;

@@ -48,7 +48,7 @@ pub(super) fn check(recipe: &Recipe, check: &mut Check) {
     check.numbers(
         "background",
         &[
-            ("level", &background.level, 0.01, 1.0),
+            ("level", &background.level, 0.01, 1.2),
             ("scatter", &background.scatter, 0.0, 0.5),
             ("scatter_um", &background.scatter_um, 1.0, 10_000.0),
         ],

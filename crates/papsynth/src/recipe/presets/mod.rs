@@ -196,14 +196,16 @@ fn extended_focus() -> Recipe {
         ..recipe.focus
     };
     if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
-        *extra_blur_um = Number::log_normal(0.27, 0.4);
+        *extra_blur_um = Number::log_normal(0.38, 0.3);
     }
     // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
     recipe.camera.prnu = 0.007.into();
     recipe.camera.full_well_e = 120_000.0.into();
     recipe.camera.glare_removed = Number::uniform(0.12, 0.22);
     recipe.camera.read_noise_e = Number::uniform(350.0, 620.0);
-    recipe.stain.field_texture = Number::log_normal(0.22, 0.3);
+    recipe.stain.field_texture = Number::log_normal(0.23, 0.3);
+    recipe.stain.field_cytoplasm = Number::log_normal(1.1, 0.25);
+    recipe.background.level = Number::normal(0.93, 0.05).at_least(0.75).at_most(0.99);
     recipe
 }
 
