@@ -246,6 +246,10 @@ mod tests {
         let mut bad = Vec::new();
         for value in [f64::NAN, f64::INFINITY, -1.0, 1e300] {
             for (field, set) in same {
+                // A black level that was taken off is below 0.
+                if field == "offset_dn" && value == -1.0 {
+                    continue;
+                }
                 let mut params = good.clone();
                 set(&mut params, value);
                 bad.push((field, params));
@@ -267,6 +271,7 @@ mod tests {
             ("read_noise.rms_e", same[13].1, 0.99),
             ("read_noise.rms_e", same[13].1, 20.1),
             ("offset_dn", same[10].1, 255.0),
+            ("offset_dn", same[10].1, -2551.0),
             ("prnu", same[6].1, 1.1),
         ] {
             let mut params = good.clone();
