@@ -35,11 +35,13 @@ const FARTHEST: f64 = 4.0;
 /// Added to misses before their logarithm is taken: none is the better for being right by chance.
 const LEAST_MISS: f64 = 0.02;
 
-/// Brings statistics to one scale; what is unknown counts as the mean.
+/// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them: what no
+/// recipe shows must not be held for more of what some do.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaler {
     means: Vec<f64>,
     deviations: Vec<f64>,
+    ranges: Vec<[f64; 2]>,
 }
 
 impl Scaler {
@@ -49,14 +51,22 @@ impl Scaler {
         let of = |f: fn(&[f64]) -> f64| {
             (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect()
         };
-        Self { means: of(mean), deviations: of(deviation) }
+        let range = |c: usize| {
+            column(c).iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+        };
+        Self { means: of(mean), deviations: of(deviation), ranges: (0..columns).map(range).collect() }
     }
 
     pub(crate) fn scaled(&self, row: &[f64]) -> Vec<f64> {
-        let one = |((value, mean), sd): ((&f64, &f64), &f64)| {
-            if value.is_finite() && *sd > 0.0 { ((value - mean) / sd).clamp(-FARTHEST, FARTHEST) } else { 0.0 }
+        let one = |(c, value): (usize, &f64)| {
+            let (sd, [low, high]) = (self.deviations[c], self.ranges[c]);
+            if value.is_finite() && sd > 0.0 {
+                ((value.clamp(low, high) - self.means[c]) / sd).clamp(-FARTHEST, FARTHEST)
+            } else {
+                0.0
+            }
         };
-        row.iter().zip(&self.means).zip(&self.deviations).map(one).collect()
+        row.iter().enumerate().map(one).collect()
     }
 }
 
