@@ -150,8 +150,7 @@ impl Told {
         let columns = places.first().map_or(0, Vec::len);
         let column = |c: usize| -> Vec<f64> { kept.iter().map(|i| places[*i][c]).collect() };
         let rows: Vec<Vec<f64>> = of_kept.iter().map(|r| scaler.scaled(r)).collect();
-        let features = Features::new(&rows);
-        let first: Vec<Ridge> = (0..columns).map(|c| features.best(&column(c))).collect();
+        let first: Vec<Ridge> = (0..columns).map(|c| weighed(&rows, &column(c))).collect();
         let summaries: Vec<Vec<f64>> =
             (0..kept.len()).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
         let second = |c: usize| {
@@ -176,6 +175,25 @@ impl Told {
 /// to.
 fn of_one_scale(place: f64) -> f64 {
     ((place - 0.5) * 12.0_f64.sqrt()).clamp(-FARTHEST, FARTHEST)
+}
+
+/// The ridge in which each statistic counts as much as it goes with the parameter by itself: of two hundred, most have no say in it.
+fn weighed(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
+    let middle = mean(y);
+    let weight = |s: usize| {
+        let [mut with, mut own, mut all] = [0.0; 3];
+        for (row, value) in rows.iter().zip(y) {
+            with += row[s] * (value - middle);
+            own += row[s] * row[s];
+            all += (value - middle) * (value - middle);
+        }
+        if own * all > 0.0 { with.abs() / (own * all).sqrt() } else { 0.0 }
+    };
+    let weights: Vec<f64> = (0..rows.first().map_or(0, Vec::len)).map(weight).collect();
+    let of_weight: Vec<Vec<f64>> = rows.iter().map(|r| r.iter().zip(&weights).map(|(x, w)| x * w).collect()).collect();
+    let mut ridge = Features::new(&of_weight).best(y);
+    ridge.factors.iter_mut().zip(&weights).for_each(|(f, w)| *f *= w);
+    ridge
 }
 
 /// Features of the second regression: the parameter's own summary and its powers, all others, and each with the own one.
