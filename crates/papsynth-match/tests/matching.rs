@@ -91,7 +91,7 @@ fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
 
 #[test]
 fn the_size_of_a_pixel_is_sought_where_it_is_asked_for() {
-    let fields = fields(2, NucleiFrom::Points);
+    let fields = fields(6, NucleiFrom::Points);
     let fit = on_threads(2, &fields, &small(PixelSize::Sought(0.4), 0));
     let has = |parameter: Parameter| fit.answers.iter().any(|a| a.parameter == parameter);
     assert!(has(Parameter::Pixel) && !has(Parameter::Size));
@@ -136,7 +136,9 @@ fn what_is_asked_for_in_vain_is_told() {
         assert!(matches!(Match::new(&params, &base), Err(Error::Parameter { .. })), "{params:?}");
     }
     let fields = fields(2, NucleiFrom::Search);
-    for table in [TableParams { recipes: 29, ..TableParams::default() }, TableParams { windows: 0, ..Default::default() }] {
+    for table in
+        [TableParams { recipes: 29, ..TableParams::default() }, TableParams { windows: 0, ..Default::default() }]
+    {
         let matching = Match::new(&MatchParams { pixel: PixelSize::Known(PIXEL_UM), table, rounds: 0 }, &base).unwrap();
         assert!(matches!(matching.run(&fields, &engine, &|_| true), Err(Error::Parameter { .. })));
     }
@@ -162,8 +164,7 @@ fn recipes_that_were_not_seen_are_recovered() {
     let table = plan.simulate(&|_| true).unwrap();
     assert!(table.places[0] == first.0 && format!("{:?}", table.statistics[0]) == format!("{:?}", first.1.values));
     let regression = Regression::new(&table.statistics, &table.places);
-    let explained =
-        |parameter: Parameter| regression.explained()[sought.iter().position(|p| *p == parameter).unwrap()];
+    let explained = |parameter: Parameter| regression.explained()[sought.iter().position(|p| *p == parameter).unwrap()];
     for parameter in [Parameter::Cells, Parameter::Blur] {
         assert!(explained(parameter) > 0.4, "{parameter:?}: {}", explained(parameter));
     }
@@ -184,9 +185,8 @@ fn recipes_that_were_not_seen_are_recovered() {
             let summary = Summary::of(&cut, &view).unwrap();
             assert_eq!(summary.names, table.names);
             let estimates = regression.estimate(&summary.values);
-            let inside = |(p, e): (&Parameter, &papsynth_match::Estimate)| {
-                (e.low..=e.high).contains(&drawn[row][p.index()])
-            };
+            let inside =
+                |(p, e): (&Parameter, &papsynth_match::Estimate)| (e.low..=e.high).contains(&drawn[row][p.index()]);
             let of_table = sought.iter().zip(&estimates).filter(|pair| inside(*pair)).count();
             let lit = measure(&run(row, &Values::at(&drawn[row])), PIXEL_UM).unwrap();
             let holds = |(p, e): &&(Parameter, papsynth_match::Estimate)| {
