@@ -84,14 +84,14 @@ impl Regression {
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
         let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
         // The last fold is none: it leaves nothing out.
-        let fits: Vec<(Told, Vec<(usize, Vec<f64>, Vec<f64>)>)> = (0..=FOLDS)
+        let fits: Vec<(Told, Vec<Unseen>)> = (0..=FOLDS)
             .into_par_iter()
             .map(|fold| {
                 let (out, kept): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| i % FOLDS == fold);
                 let told = Told::new(statistics, places, &kept);
-                let tell = |i: usize| {
-                    let summary = told.summary(&statistics[i]);
-                    (i, told.values(&summary), summary)
+                let tell = |row: usize| {
+                    let summary = told.summary(&statistics[row]);
+                    Unseen { row, values: told.values(&summary), summary }
                 };
                 let unseen = out.into_iter().map(tell).collect();
                 (told, unseen)
@@ -101,8 +101,8 @@ impl Regression {
         let mut summaries = vec![Vec::new(); n];
         let mut told = None;
         for (fit, unseen) in fits {
-            for (i, value, summary) in unseen {
-                (values[i], summaries[i]) = (value, summary);
+            for one in unseen {
+                (values[one.row], summaries[one.row]) = (one.values, one.summary);
             }
             told = Some(fit);
         }
@@ -133,6 +133,13 @@ impl Regression {
     pub fn explained(&self) -> &[f64] {
         &self.explained
     }
+}
+
+/// What a row was told by the others.
+struct Unseen {
+    row: usize,
+    values: Vec<f64>,
+    summary: Vec<f64>,
 }
 
 /// What rows of statistics tell: values without intervals.
