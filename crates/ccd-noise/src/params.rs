@@ -114,8 +114,8 @@ pub struct CameraParams {
     /// 255 / 17 600, ours: the converter clips just before the pixel is full. The paper's program
     /// has 1 / 70.
     pub gain_dn_per_e: f64,
-    /// Grey level of a dark pixel without dark current, 0 to below the highest grey level 2ᵇ - 1. Default 0, the
-    /// paper's.
+    /// Grey level of a dark pixel without dark current, from -10 times to below the highest grey level 2ᵇ - 1; a negative one
+    /// is a black level that was taken off. Default 0, the paper's.
     pub offset_dn: f64,
     /// Bits of the converter, 8 to 16. Default 8, the paper's.
     pub bit_depth: u32,
@@ -198,8 +198,9 @@ impl CameraParams {
         let bits = self.bit_depth;
         require("bit_depth", f64::from(bits), (8..=16).contains(&bits), "from 8 to 16")?;
         let offset = self.offset_dn;
-        let level = offset >= 0.0 && offset < f64::from(self.max_dn());
-        require("offset_dn", offset, level, "from 0 to below the highest grey level, 2^bit_depth - 1")?;
+        let highest = f64::from(self.max_dn());
+        let level = offset >= -10.0 * highest && offset < highest;
+        require("offset_dn", offset, level, "from -10 times to below the highest grey level, 2^bit_depth - 1")?;
         if let PhotonNoise::NormalAbove { mean_e } = self.photon_noise {
             require("photon_noise.mean_e", mean_e, mean_e >= 0.0, "0 or more")?;
         }
@@ -279,7 +280,10 @@ mod tests {
             assert!(error.starts_with(&format!("{field} is ")), "{error}");
         }
         let error = CameraParams { offset_dn: 255.0, ..good.clone() }.check().unwrap_err().to_string();
-        assert_eq!(error, "offset_dn is 255; it must be from 0 to below the highest grey level, 2^bit_depth - 1");
+        assert_eq!(
+            error,
+            "offset_dn is 255; it must be from -10 times to below the highest grey level, 2^bit_depth - 1"
+        );
         CameraParams { offset_dn: 254.9, ..good }.check().unwrap();
     }
 

@@ -34,6 +34,8 @@ struct Channel {
     camera: Camera,
     /// Electrons of light 1: white balance leaves fewer to the colours of which lamp and sensor have little.
     full_scale_e: f64,
+    /// Part of these that is glare, whatever lies in the light's way.
+    glare: f64,
 }
 
 /// What is on its way from electrons to grey levels, channel by channel.
@@ -113,8 +115,9 @@ impl Detector {
 
     /// Light as a fraction of full scale becomes mean electrons.
     pub(crate) fn electrons(&self, channel: usize, light: &mut [f32]) {
-        let scale = self.channels[channel].full_scale_e as f32;
-        light.iter_mut().for_each(|v| *v *= scale);
+        let Channel { full_scale_e, glare, .. } = self.channels[channel];
+        let (scale, glare) = ((full_scale_e * (1.0 - glare)) as f32, (full_scale_e * glare) as f32);
+        light.iter_mut().for_each(|v| *v = *v * scale + glare);
     }
 
     /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
@@ -226,6 +229,7 @@ impl Channel {
     fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, String> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
+        let (range_dn, glare) = (largest - offset_dn, camera.glare_removed);
         let params = CameraParams {
             exposure_s: camera.exposure_s,
             dark_current_e_per_s: camera.dark_current_e_per_s,
@@ -244,8 +248,9 @@ impl Channel {
                 0.0 => ReadNoise::Same { e: camera.read_noise_e },
                 rms_e => ReadNoise::PerPixel { median_e: camera.read_noise_e, rms_e },
             },
-            gain_dn_per_e: (largest - offset_dn) / (camera.full_well_e * share),
-            offset_dn,
+            // What is left of the range without the glare fills it again.
+            gain_dn_per_e: range_dn / (1.0 - glare) / (camera.full_well_e * share),
+            offset_dn: offset_dn - range_dn * glare / (1.0 - glare),
             bit_depth: bits,
             photon_noise: match camera.photon_noise {
                 PhotonNoise::Exact => ccd_noise::PhotonNoise::Exact,
@@ -261,8 +266,8 @@ impl Channel {
             (_, Binning::Digital) => params.binned(ccd_noise::Binning::Digital { side }),
         };
         let camera = binned.and_then(|params| Camera::new(&params)).map_err(|e| format!("camera: {e}"))?;
-        let full_scale_e = (largest - offset_dn) * camera.electrons_per_dn();
-        Ok(Self { camera, full_scale_e })
+        let full_scale_e = range_dn / (1.0 - glare) * camera.electrons_per_dn();
+        Ok(Self { camera, full_scale_e, glare })
     }
 }
 

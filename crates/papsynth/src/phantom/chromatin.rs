@@ -217,7 +217,7 @@ pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
 }
 
 /// Shifts and scales to mean 0 and variance 1 over the pixels of a mask, zero elsewhere.
-fn standardise(pixels: &mut [f32], mask: &[f32]) {
+pub(super) fn standardise(pixels: &mut [f32], mask: &[f32]) {
     let inside = || pixels.iter().zip(mask).filter(|(_, m)| **m >= 0.5).map(|(p, _)| f64::from(*p));
     let count = inside().count().max(1) as f64;
     let mean = inside().sum::<f64>() / count;

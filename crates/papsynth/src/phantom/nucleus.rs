@@ -1,5 +1,8 @@
 //! The nucleus of a cell: outline, chromatin, rim.
 
+use optics_psf::{Border, Gaussian, Method};
+
+use super::chromatin::standardise;
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area};
 use super::wobble::{placed, wobbled_circle};
@@ -24,6 +27,9 @@ const WRINKLES: core::ops::RangeInclusive<u32> = 3..=7;
 /// Amplitude of the strongest wrinkles, relative to the radius.
 const WRINKLE: f64 = 0.075;
 
+/// Part of the softened edge that may be cut off.
+const EDGE_LOST: f64 = 1e-3;
+
 /// Makes the nucleus of a cell whose middle lies at `cell_centre`.
 pub(super) fn make(
     studio: &Studio,
@@ -46,7 +52,8 @@ pub(super) fn make(
     let centre = [cell_centre[0] + dx, cell_centre[1] + dy];
     let outline: Vec<Point> = outline.iter().map(|p| placed(*p, nucleus.rotation_deg.to_radians(), centre)).collect();
 
-    let mut coverage = Tile::around(&outline, 2.0);
+    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_LOST).map_err(|e| e.to_string())?;
+    let mut coverage = Tile::around(&outline, 2.0 + edge.radius() as f64);
     coverage.cover(&outline);
     let mut inner = coverage.blank();
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
@@ -57,7 +64,7 @@ pub(super) fn make(
     inner.cover(&inside);
 
     let mut rng = scene.key.stream("cell", object.number, "nucleus.texture");
-    let texture = match studio.recipe.nucleus.chromatin {
+    let mut texture = match studio.recipe.nucleus.chromatin {
         Chromatin::Quilt => {
             let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
             class.donors.quilt(&coverage, pixel_um, donors, &class.quilt, &mut rng)?
@@ -65,6 +72,10 @@ pub(super) fn make(
         Chromatin::Field => class.donors.field(&coverage, pixel_um, &mut rng),
     };
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
+    if nucleus.clumping > 0.0 && !imaged {
+        let own = &mut scene.key.stream("cell", object.number, "nucleus.clumps");
+        clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own)?;
+    }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
     // An imaged donor shows the rim of its own nucleus.
     let rim_strength = if imaged { 0.0 } else { nucleus.rim as f32 };
@@ -76,6 +87,9 @@ pub(super) fn make(
         dome(&mut thickness, &outline, nucleus);
     }
     let mut absorbance = coverage.clone();
+    if edge.radius() > 0 && !imaged {
+        absorbance.values = edge.blur(&coverage.values, coverage.width, Border::Zero);
+    }
     for (i, value) in absorbance.values.iter_mut().enumerate() {
         let rim = (coverage.values[i] - inner.values[i]).max(0.0) * rim_strength;
         let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
@@ -94,6 +108,25 @@ pub(super) fn make(
         dyes: nucleus.dyes,
         phase_rad: 0.0,
     })
+}
+
+/// Makes a part of a texture's variance coarse.
+fn clump(
+    texture: &mut [f32],
+    coverage: &Tile,
+    share: f64,
+    pixel_um: f64,
+    rng: &mut crate::key::Stream,
+) -> Result<(), String> {
+    /// Standard deviation of what white noise is smoothed by, µm.
+    const CLUMP_UM: f64 = 0.7;
+    let smooth = Gaussian::new(CLUMP_UM / pixel_um).map_err(|e| e.to_string())?;
+    let white: Vec<f32> = coverage.values.iter().map(|_| random::normal(rng) as f32).collect();
+    let mut coarse = smooth.blur(&white, coverage.width, Border::Reflect);
+    standardise(&mut coarse, &coverage.values);
+    let [fine, rough] = [1.0 - share, share].map(|part| part.sqrt() as f32);
+    texture.iter_mut().zip(&coarse).for_each(|(value, coarse)| *value = fine * *value + rough * coarse);
+    Ok(())
 }
 
 /// Thickness of a nucleus relative to its mean: a plate of even thickness and an ellipsoid mixed, thicker towards one side.

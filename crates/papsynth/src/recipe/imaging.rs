@@ -45,6 +45,9 @@ pub struct Focus {
     pub fused_noise_across: Number,
     /// The same with the next pixel of the column, 0 to 0.5.
     pub fused_noise_down: Number,
+    /// How much more it shares with the next pixel down to the right than with that down to the left (half of the
+    /// difference), -0.1 to 0.1: pictures that were turned or shifted by parts of a pixel have some.
+    pub fused_noise_skew: Number,
 }
 
 /// What becomes of the planes of a focus stack.
@@ -67,6 +70,7 @@ impl Default for Focus {
             picture: Picture::Planes,
             fused_noise_across: 0.2.into(),
             fused_noise_down: 0.4.into(),
+            fused_noise_skew: 0.0.into(),
         }
     }
 }
@@ -215,7 +219,7 @@ impl Default for Background {
                 y2: defaults::y2(),
                 off_centre: defaults::off_centre(),
             },
-            scatter: Number::uniform(0.004, 0.012),
+            scatter: Number::uniform(0.015, 0.045),
             scatter_um: 60.0.into(),
         }
     }
@@ -437,6 +441,9 @@ pub struct Camera {
     pub read_noise_rms_e: Number,
     /// Grey level of a dark pixel, 0 to 4096.
     pub offset_dn: Number,
+    /// Glare that was taken off the picture as its black level, as a share of the light of the empty slide, 0 to 0.8: what
+    /// is dark keeps the noise of the glare.
+    pub glare_removed: Number,
     /// How photons are counted.
     pub photon_noise: PhotonNoise,
     /// Photo response non-uniformity: spread of the pixels' responses as a share of their mean, 0 to 0.5.
@@ -478,6 +485,7 @@ impl Default for Camera {
             read_noise_e: 138.0.into(),
             read_noise_rms_e: 0.0.into(),
             offset_dn: 0.0.into(),
+            glare_removed: 0.0.into(),
             photon_noise: PhotonNoise::Exact,
             prnu: 0.007.into(),
             dsnu_e: 2.0.into(),
@@ -578,6 +586,7 @@ impl Camera {
             read_noise_e: number(read_noise_e),
             read_noise_rms_e: number(read_noise_rms_e),
             offset_dn: number(params.offset_dn),
+            glare_removed: 0.0.into(),
             photon_noise: match params.photon_noise {
                 ccd_noise::PhotonNoise::Exact => PhotonNoise::Exact,
                 ccd_noise::PhotonNoise::NormalAbove { .. } => PhotonNoise::Normal,

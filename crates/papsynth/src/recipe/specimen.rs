@@ -297,6 +297,9 @@ pub struct Cytoplasm {
     pub fray_um: Number,
     /// Distance over which the sheet thins out towards its rim, µm, 0 to 10.
     pub rim_um: Number,
+    /// How much thicker the sheet is towards one side (standard deviation of the slope, relative to its thickness and the
+    /// cell's radius), 0 to 1.
+    pub wedge: Number,
     /// How late light comes through a flat sheet, radians of phase, -3 to 3: thicker parts and folds in proportion. It shows
     /// as bright and dark rims that change places when the focus passes.
     pub phase_rad: Number,
@@ -315,7 +318,7 @@ impl Default for Cytoplasm {
             wrinkles: Number::log_normal(7.0, 0.6),
             wrinkle: Number::log_normal(0.5, 0.45),
             wrinkle_um: Number::uniform(0.18, 0.42),
-            endoplasm: Number::log_normal(0.16, 0.5),
+            endoplasm: Number::log_normal(0.09, 0.6),
             clouds: Number::uniform(0.06, 0.22),
             clouds_um: Number::uniform(2.5, 9.0),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
@@ -325,7 +328,8 @@ impl Default for Cytoplasm {
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
             fray_um: Number::log_normal(0.45, 0.55),
-            rim_um: Number::log_normal(2.0, 0.4),
+            rim_um: Number::log_normal(3.0, 0.3),
+            wedge: 0.18.into(),
             phase_rad: Number::uniform(0.05, 0.15),
         }
     }
@@ -409,6 +413,11 @@ pub struct Nucleus {
     /// How much thicker a nucleus is towards one side (standard deviation of the slope, relative to its thickness and
     /// radius), 0 to 1.
     pub wedge: Number,
+    /// Part of the variance of chromatin that is coarse, a micrometre and a half wide, 0 to 1: what lies above and below the grains in
+    /// focus.
+    pub clumping: Number,
+    /// How softly a nucleus ends: standard deviation of the fall of its thickness about its outline, µm, 0 to 3.
+    pub edge_um: Number,
 }
 
 impl Default for Nucleus {
@@ -429,6 +438,8 @@ impl Default for Nucleus {
             rim: Number::uniform(0.0, 0.2),
             dome: Number::uniform(0.3, 0.85),
             wedge: 0.2.into(),
+            clumping: Number::uniform(0.0, 0.4),
+            edge_um: Number::uniform(0.3, 0.65),
         }
     }
 }

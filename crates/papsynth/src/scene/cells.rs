@@ -137,6 +137,8 @@ fn draw_body(
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
         dome: recipe.nucleus.dome.draw(&mut own("nucleus.dome")),
+        edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
+        clumping: recipe.nucleus.clumping.draw(&mut own("nucleus.clumping")),
         wedge: {
             let mut rng = own("nucleus.wedge");
             let wedge = recipe.nucleus.wedge.draw(&mut rng);
@@ -184,6 +186,9 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
     let excess = cytoplasm.excess.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
+    let mut wedge_rng = own("cytoplasm.wedge");
+    let slope = cytoplasm.wedge.draw(&mut wedge_rng);
+    let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
     let own = |name: &str, number: &Number| number.draw(&mut own(name));
     let pliable = |name: &str, number: &Number| pliability * own(name, number);
     CellDetail {
@@ -204,6 +209,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         granules: if granular { granules } else { 0.0 },
         fray_um: cytoplasm.fray_um.draw(rng),
         rim_um: own("cytoplasm.rim_um", &cytoplasm.rim_um),
+        wedge,
     }
 }
 

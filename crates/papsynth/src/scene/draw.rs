@@ -114,6 +114,7 @@ fn fusion(recipe: &Recipe, field: &FieldNumbers) -> Option<Fusion> {
             field.draw("focus.fused_noise_across", &focus.fused_noise_across),
             field.draw("focus.fused_noise_down", &focus.fused_noise_down),
         ],
+        noise_skew: field.draw("focus.fused_noise_skew", &focus.fused_noise_skew),
     })
 }
 
@@ -184,6 +185,7 @@ fn camera(recipe: &Recipe, field: &FieldNumbers) -> SceneCamera {
         read_noise_e: draw("read_noise_e", &camera.read_noise_e),
         read_noise_rms_e: draw("read_noise_rms_e", &camera.read_noise_rms_e),
         offset_dn: draw("offset_dn", &camera.offset_dn),
+        glare_removed: draw("glare_removed", &camera.glare_removed),
         photon_noise: camera.photon_noise,
         prnu: draw("prnu", &camera.prnu),
         dsnu_e: draw("dsnu_e", &camera.dsnu_e),

@@ -68,6 +68,8 @@ pub struct Fusion {
     pub planes: usize,
     /// Correlation of the noise of a pixel with that of the next in its row and in its column.
     pub noise_correlation: [f64; 2],
+    /// How much more it correlates with that of the next pixel down to the right than of that down to the left, halved.
+    pub noise_skew: f64,
 }
 
 impl Fusion {
@@ -312,6 +314,8 @@ pub struct SceneCamera {
     pub read_noise_rms_e: f64,
     /// Grey level of a dark pixel.
     pub offset_dn: f64,
+    /// Glare that was taken off, as a share of the light of the empty slide.
+    pub glare_removed: f64,
     /// How photons are counted.
     pub photon_noise: PhotonNoise,
     /// Spread of the pixels' responses.
@@ -430,6 +434,8 @@ pub struct CellDetail {
     pub fray_um: f64,
     /// Distance over which it thins out towards its rim, µm.
     pub rim_um: f64,
+    /// By how much it is thicker to the right and below, relative to its thickness, a radius away.
+    pub wedge: [f64; 2],
 }
 
 /// The cleared space round the nucleus of a koilocyte.
@@ -487,6 +493,10 @@ pub struct NucleusBody {
     pub rim: f64,
     /// Share of its thickness that is domed: 0 of a plate, 1 of an ellipsoid.
     pub dome: f64,
+    /// Standard deviation of the fall of its thickness about its outline, µm.
+    pub edge_um: f64,
+    /// Part of the variance of its chromatin that is coarse.
+    pub clumping: f64,
     /// How much thicker it is at its rim than in its middle, to the right and below.
     pub wedge: [f64; 2],
     /// Small, dark, without structure.

@@ -134,6 +134,19 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     }
 }
 
+/// Makes a sheet thicker towards one side, so much of its thickness a radius from its middle.
+pub(super) fn slant(absorbance: &mut Tile, centre: Point, radius_px: f64, wedge: [f64; 2]) {
+    /// Thinnest that a slant makes the far side, relative to the middle, and thickest the near one.
+    const BOUNDS: [f64; 2] = [0.35, 1.8];
+    if wedge == [0.0; 2] {
+        return;
+    }
+    absorbance.for_each(|p, value| {
+        let slope = (wedge[0] * (p[0] - centre[0]) + wedge[1] * (p[1] - centre[1])) / radius_px;
+        *value *= (1.0 + slope).clamp(BOUNDS[0], BOUNDS[1]) as f32;
+    });
+}
+
 /// A sheet thins out towards its rim: thickness falls to nothing over about this distance, px.
 pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, reach_px: f64) {
     let radius = random::count(reach_px);

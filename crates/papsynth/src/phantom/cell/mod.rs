@@ -177,6 +177,7 @@ fn finish(
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
+    detail::slant(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.wedge);
     detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, &body.detail, pixel_um, &mut own("wrinkles"));

@@ -36,6 +36,7 @@ pub(super) fn check(recipe: &Recipe, check: &mut Check) {
             ("centre_um", &focus.centre_um, -100.0, 100.0),
             ("fused_noise_across", &focus.fused_noise_across, 0.0, 0.5),
             ("fused_noise_down", &focus.fused_noise_down, 0.0, 0.5),
+            ("fused_noise_skew", &focus.fused_noise_skew, -0.1, 0.1),
         ],
     );
     let exact = matches!(recipe.optics, Optics::BrightField { imaging: Imaging::Abbe, .. });
@@ -86,6 +87,7 @@ fn detector(camera: &Camera, check: &mut Check) {
             ("read_noise_e", &camera.read_noise_e, 0.0, 1e5),
             ("read_noise_rms_e", &camera.read_noise_rms_e, 0.0, 1e5),
             ("offset_dn", &camera.offset_dn, 0.0, 4096.0),
+            ("glare_removed", &camera.glare_removed, 0.0, 0.8),
             ("prnu", &camera.prnu, 0.0, 0.5),
             ("dsnu_e", &camera.dsnu_e, 0.0, 1e5),
             ("exposure_s", &camera.exposure_s, 0.0, 1e6),

@@ -152,6 +152,7 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("flecks_threshold", &cytoplasm.flecks_threshold, 0.0, 0.999),
             ("cytoskeleton", &cytoplasm.cytoskeleton, 0.0, 2.0),
             ("grain", &cytoplasm.grain, 0.0, 2.0),
+            ("wedge", &cytoplasm.wedge, 0.0, 1.0),
             ("granular", &cytoplasm.granular, 0.0, 1.0),
             ("granules", &cytoplasm.granules, 0.0, 1000.0),
             ("fray_um", &cytoplasm.fray_um, 0.0, 5.0),
@@ -183,6 +184,8 @@ fn cells(recipe: &Recipe, check: &mut Check) {
             ("wrinkled", &nucleus.wrinkled, 0.0, 1.0),
             ("rim", &nucleus.rim, 0.0, 2.0),
             ("dome", &nucleus.dome, 0.0, 1.0),
+            ("edge_um", &nucleus.edge_um, 0.0, 3.0),
+            ("clumping", &nucleus.clumping, 0.0, 1.0),
             ("wedge", &nucleus.wedge, 0.0, 1.0),
         ],
     );

@@ -190,16 +190,20 @@ fn extended_focus() -> Recipe {
         planes: 11.0.into(),
         step_um: 1.0.into(),
         picture: Picture::Extended,
-        fused_noise_across: Number::uniform(0.24, 0.34),
-        fused_noise_down: Number::uniform(0.40, 0.48),
+        fused_noise_across: Number::uniform(0.22, 0.28),
+        fused_noise_down: Number::uniform(0.40, 0.44),
+        fused_noise_skew: 0.02.into(),
         ..recipe.focus
     };
     if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
-        *extra_blur_um = Number::uniform(0.30, 0.54);
+        *extra_blur_um = Number::log_normal(0.27, 0.4);
     }
-    recipe.camera.full_well_e = 40_000.0.into();
-    recipe.camera.read_noise_e = Number::uniform(90.0, 300.0);
-    recipe.stain.field_texture = Number::log_normal(0.35, 0.3);
+    // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
+    recipe.camera.prnu = 0.007.into();
+    recipe.camera.full_well_e = 120_000.0.into();
+    recipe.camera.glare_removed = Number::uniform(0.12, 0.22);
+    recipe.camera.read_noise_e = Number::uniform(350.0, 620.0);
+    recipe.stain.field_texture = Number::log_normal(0.22, 0.3);
     recipe
 }
 

@@ -37,6 +37,7 @@ pub(super) fn recipe() -> Recipe {
         granules: 0.0.into(),
         fray_um: 0.0.into(),
         rim_um: 0.0.into(),
+        wedge: 0.0.into(),
         phase_rad: 0.0.into(),
     };
     recipe.nucleus = Nucleus {
@@ -50,6 +51,8 @@ pub(super) fn recipe() -> Recipe {
         wrinkled: 0.0.into(),
         rim: 0.0.into(),
         dome: 0.0.into(),
+        clumping: 0.0.into(),
+        edge_um: 0.0.into(),
         wedge: 0.0.into(),
         ..Nucleus::default()
     };
