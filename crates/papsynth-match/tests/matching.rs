@@ -91,7 +91,7 @@ fn a_recipe_is_found_and_is_the_same_with_any_number_of_threads() {
 
 #[test]
 fn the_size_of_a_pixel_is_sought_where_it_is_asked_for() {
-    let fields = fields(6, NucleiFrom::Points);
+    let fields = fields(6, NucleiFrom::Masks);
     let fit = on_threads(2, &fields, &small(PixelSize::Sought(0.4), 0));
     let has = |parameter: Parameter| fit.answers.iter().any(|a| a.parameter == parameter);
     assert!(has(Parameter::Pixel) && !has(Parameter::Size));
