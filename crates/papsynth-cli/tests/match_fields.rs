@@ -15,7 +15,9 @@ const FIELD: &str = "--set field.width_px=240 --set field.height_px=180 --set fi
 #[test]
 fn the_recipe_that_is_found_makes_fields() {
     let bench = Bench::new("match-finds");
-    bench.good(&format!("generate --out real --frames 2 --seed 3 --set background.level=0.8 {FIELD}"));
+    bench.good(&format!(
+        "generate --out real --frames 2 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
+    ));
     let outcome = bench.good("match real --out mine.toml --report mine.json --budget 60 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("2 fields, 2 windows, "), "{}", outcome.out);
     assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
