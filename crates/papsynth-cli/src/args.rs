@@ -395,7 +395,7 @@ pub(crate) struct Match {
     /// Look at fields of this group alone; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Windows of 640 x 480 pixels to simulate [default: 2800]
+    /// Windows of 640 x 480 pixels to simulate, which takes most of the time [default: 2000]
     #[arg(long, value_name = "N", value_parser = parse_budget, conflicts_with = "quick")]
     pub(crate) budget: Option<usize>,
     /// Simulate a sixth as much: wider intervals, fewer parameters
@@ -593,7 +593,7 @@ fn parse_class(text: &str) -> Result<String, String> {
 
 fn parse_budget(text: &str) -> Result<usize, String> {
     /// Fewer windows teach nothing.
-    const ALLOWED: std::ops::RangeInclusive<usize> = 240..=1_000_000;
+    const ALLOWED: std::ops::RangeInclusive<usize> = 60..=1_000_000;
     match text.parse() {
         Ok(value) if ALLOWED.contains(&value) => Ok(value),
         _ => Err(format!("expected {} to {} windows", ALLOWED.start(), ALLOWED.end())),

@@ -24,8 +24,8 @@ const RECIPE: &[u8] = b"# Matched to ";
 const REPORT: &[u8] = b"{\n  \"match_report\":";
 
 /// Windows that are simulated at first, of a quick run, and of each recipe at most.
-const BUDGET: usize = 2800;
-const QUICK: usize = 480;
+const BUDGET: usize = 2000;
+const QUICK: usize = 336;
 const WINDOWS: usize = 8;
 
 /// Fewest recipes of a table.
@@ -90,10 +90,8 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
         write_file(report, format!("{}\n", text.unwrap_or_default()).as_bytes())?;
     }
     write_file(&args.out, fit.to_toml().as_bytes())?;
-    exit::print(
-        &format!("{}\n{}: use it with papsynth generate {0}\n", told(&fit), args.out.display())
-            .replace("{0}", &args.out.display().to_string()),
-    )
+    let out = args.out.display();
+    exit::print(&format!("{}\n{out}: use it with papsynth generate {out}\n", told(&fit)))
 }
 
 fn refuse(error: &Error, real: &std::path::Path) -> Failure {

@@ -1,39 +1,63 @@
 //! Recovers the parameters of recipes it has not seen, and counts how often the stated intervals hold them.
 //!
-//! `cargo run --release -p papsynth-match --example recover -- [RECIPES] [TRIALS] [WINDOWS] [FOLDER]`
+//! `cargo run --release -p papsynth-match --example recover -- [RECIPES] [TRIALS] [WINDOWS] [FOLDER] [SEED]`
 //!
 //! The table of simulated recipes is shared by all trials: they are of one size, one preset and fused alike. What was
-//! simulated is kept in FOLDER and used again.
+//! simulated is kept in FOLDER, line by line, and used again: what was broken off goes on.
 
 #![expect(clippy::print_stdout, reason = "it is a program")]
 
 use std::error::Error;
+use std::fs::{File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::Preset;
+use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use papsynth_judge::{NucleiFrom, Picture};
 use papsynth_match::{
-    Estimate, MakeEngine, PARAMETERS, Parameter, Regression, Setting, Source, Spreads, Step, Summary, Table,
-    TableParams, Values, View, measure, recipe, unseen,
+    Estimate, MakeEngine, PARAMETERS, Parameter, Plan, Regression, Setting, Source, Spreads, Summary, TableParams,
+    Values, View, WIDEST, measure, recipe, unseen,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 const PIXEL_UM: f64 = 0.33;
 
-/// What is wider is not claimed.
-const WIDEST: f64 = papsynth_match::WIDEST;
+/// Of the recipes of the trials. Nothing was chosen by looking at these.
+const SEED: u64 = 20_261_122;
 
-/// What was seen of an unseen recipe.
+/// Of the table.
+const TABLE_SEED: u64 = 1;
+
+/// A recipe that was simulated, or why it was not.
 #[derive(Serialize, Deserialize)]
-struct Trial {
+struct Row {
+    row: usize,
+    made: Result<Made, String>,
+}
+
+/// What was seen of a recipe.
+#[derive(Serialize, Deserialize)]
+struct Made {
     places: Vec<f64>,
     statistics: Vec<Option<f64>>,
     measured: Vec<(Parameter, Estimate)>,
+}
+
+impl Made {
+    fn new(places: &[f64], summary: Summary, measured: Vec<(Parameter, Estimate)>) -> Self {
+        // JSON has no NaN.
+        let statistics = summary.values.into_iter().map(|v| v.is_finite().then_some(v)).collect();
+        Self { places: places.to_vec(), statistics, measured }
+    }
+
+    fn statistics(&self) -> Vec<f64> {
+        self.statistics.iter().map(|v| v.unwrap_or(f64::NAN)).collect()
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -41,6 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (recipes, trials, windows): (usize, usize, usize) =
         (argument(1, "300").parse()?, argument(2, "40").parse()?, argument(3, "8").parse()?);
     let folder = PathBuf::from(argument(4, "target/recover"));
+    let seed: u64 = argument(5, &SEED.to_string()).parse()?;
     std::fs::create_dir_all(&folder)?;
 
     let view = View::new([640, 480], PIXEL_UM, NucleiFrom::Search)?;
@@ -60,56 +85,49 @@ fn main() -> Result<(), Box<dyn Error>> {
     {
         known.set(parameter, value);
     }
-    let of = |source: Source| PARAMETERS.into_iter().filter(move |p| p.prior().source == source);
-    let sought: Vec<Parameter> = of(Source::Simulated).filter(|p| setting.seeks(*p)).collect();
     let model = Model::builtin();
-    let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
+    let make = |recipe: &Recipe| Engine::new(recipe, &model, &Inputs::default());
 
-    let table: Table = kept(&folder.join(format!("table-{recipes}-{windows}.json")), || {
-        let params = TableParams { recipes, windows, seed: 1 };
-        let tell = |step: Step| {
-            if let Step::Simulated(done, of) = step
-                && done % 10 == 0
-            {
-                println!("table: {done} of {of}");
-            }
-            true
-        };
-        Ok(Table::simulate(&setting, &known, &sought, &view, &make, &params, &tell)?)
+    let params = TableParams { recipes, windows, seed: TABLE_SEED };
+    let plan = Plan::new(&setting, &known, &view, &make, &params)?;
+    let table = kept(&folder.join(format!("table-{recipes}-{windows}.jsonl")), recipes, |row| {
+        let (places, summary) = plan.row(row).map_err(|e| e.to_string())?;
+        Ok(Made::new(&places, summary, Vec::new()))
     })?;
-    let bench = Bench { view: &view, setting: &setting, make: &make, windows };
-    let drawn = unseen(trials, 99);
-    let tried: Vec<Trial> = kept(&folder.join(format!("trials-{trials}-{windows}.json")), || {
-        bench.run("trial", &drawn, |places| {
-            let mut values = known.clone();
-            sought.iter().for_each(|p| values.set(*p, p.prior().value(places[p.index()])));
-            values
-        })
-    })?;
-    let lit: Vec<Trial> =
-        kept(&folder.join(format!("lights-{trials}-{windows}.json")), || bench.run("light", &drawn, Values::at))?;
+    let (rows, places): (Vec<Vec<f64>>, Vec<Vec<f64>>) =
+        table.iter().map(|made| (made.statistics(), made.places.clone())).unzip();
+    let regression = Regression::new(&rows, &places);
+    println!("part of the variance that unseen recipes of the table were told:");
+    for (parameter, part) in plan.sought().iter().zip(regression.explained()) {
+        println!("    {:<24} {part:.3}", parameter.name());
+    }
 
-    let regression = Regression::new(&table.statistics, &table.places);
-    let estimates: Vec<Vec<Estimate>> = tried.iter().map(|t| regression.estimate(&t.known_statistics())).collect();
+    let bench = Bench { view: &view, setting: &setting, make: &make, windows, seed };
+    let drawn = unseen(trials, seed);
+    let file = |what: &str| folder.join(format!("{what}-{seed}-{windows}.jsonl"));
+    let tried = kept(&file("trials"), trials, |row| {
+        let mut values = known.clone();
+        plan.sought().iter().for_each(|p| values.set(*p, p.prior().value(drawn[row][p.index()])));
+        bench.run(row, &drawn[row], &values)
+    })?;
+    let lit = kept(&file("lights"), trials, |row| bench.run(row, &drawn[row], &Values::at(&drawn[row])))?;
+
+    let estimates: Vec<Vec<Estimate>> = tried.iter().map(|t| regression.estimate(&t.statistics())).collect();
     let mut tally = Tally::default();
-    println!("{:<26} {:>10} {:>10} {:>8} {:>7}", "parameter", "claimed", "explained", "covered", "width");
-    for parameter in of(Source::Measured) {
-        let found = |t: &Trial| t.measured.iter().find(|(p, _)| *p == parameter).map(|(_, e)| in_range(parameter, e));
+    println!("| parameter | explained | claimed | covered | median width |\n|---|---|---|---|---|");
+    for parameter in PARAMETERS.into_iter().filter(|p| p.prior().source == Source::Measured) {
+        let found = |t: &Made| t.measured.iter().find(|(p, _)| *p == parameter).map(|(_, e)| in_range(parameter, e));
         let pairs = lit.iter().filter_map(|t| found(t).map(|e| (t.places[parameter.index()], e)));
-        tally.add(parameter, None, &pairs.collect::<Vec<_>>());
+        tally.add(parameter, None, &pairs.collect::<Vec<_>>(), trials);
     }
-    for (i, parameter) in table.sought.iter().enumerate() {
+    tally.tell("measured");
+    for (i, parameter) in plan.sought().iter().enumerate() {
         let pairs = tried.iter().zip(&estimates).map(|(t, e)| (t.places[parameter.index()], e[i]));
-        tally.add(*parameter, Some(regression.explained()[i]), &pairs.collect::<Vec<_>>());
+        tally.add(*parameter, Some(regression.explained()[i]), &pairs.collect::<Vec<_>>(), trials);
     }
-    tally.tell();
+    tally.tell("all");
+    tally.draw(&folder.join("recovered.png"))?;
     Ok(())
-}
-
-impl Trial {
-    fn known_statistics(&self) -> Vec<f64> {
-        self.statistics.iter().map(|v| v.unwrap_or(f64::NAN)).collect()
-    }
 }
 
 /// Where trials are made.
@@ -118,30 +136,19 @@ struct Bench<'a> {
     setting: &'a Setting,
     make: &'a MakeEngine<'a>,
     windows: usize,
+    seed: u64,
 }
 
 impl Bench<'_> {
-    fn run(
-        &self,
-        what: &str,
-        drawn: &[[f64; PARAMETERS.len()]],
-        values: impl Fn(&[f64; PARAMETERS.len()]) -> Values + Sync,
-    ) -> Result<Vec<Trial>, Box<dyn Error>> {
-        let done = AtomicUsize::new(0);
-        let one = |(i, places): (usize, &[f64; PARAMETERS.len()])| -> Result<Trial, String> {
-            let engine = (self.make)(&recipe(self.setting, &values(places), |_| true)).map_err(|e| e.to_string())?;
-            let key = |k: usize| Key { seed: 77, index: (i * self.windows + k) as u64 };
-            let field = |k: usize| self.view.simulate_field(&engine, key(k)).map_err(|e| e.to_string());
-            let fields: Vec<Picture> = (0..self.windows).map(field).collect::<Result<_, String>>()?;
-            let measured = measure(&fields, PIXEL_UM).map_err(|e| e.to_string())?.estimates;
-            let cut: Vec<Picture> = fields.iter().flat_map(|f| self.view.windows(f)).collect();
-            let summary = Summary::of(&cut, self.view).map_err(|e| e.to_string())?;
-            println!("{what}: {} of {}", done.fetch_add(1, Ordering::Relaxed) + 1, drawn.len());
-            let statistics = summary.values.into_iter().map(|v| v.is_finite().then_some(v)).collect();
-            Ok(Trial { places: places.to_vec(), statistics, measured })
-        };
-        let made: Vec<Result<Trial, String>> = drawn.par_iter().enumerate().map(one).collect();
-        Ok(made.into_iter().filter_map(|t| t.map_err(|e| println!("left out: {e}")).ok()).collect())
+    fn run(&self, row: usize, places: &[f64], values: &Values) -> Result<Made, String> {
+        let engine = (self.make)(&recipe(self.setting, values, |_| true)).map_err(|e| e.to_string())?;
+        let key = |k: usize| Key { seed: self.seed, index: (row * self.windows + k) as u64 };
+        let field = |k: usize| self.view.simulate_field(&engine, key(k)).map_err(|e| e.to_string());
+        let fields: Vec<Picture> = (0..self.windows).map(field).collect::<Result<_, String>>()?;
+        let measured = measure(&fields, PIXEL_UM).map_err(|e| e.to_string())?.estimates;
+        let cut: Vec<Picture> = fields.iter().flat_map(|f| self.view.windows(f)).collect();
+        let summary = Summary::of(&cut, self.view).map_err(|e| e.to_string())?;
+        Ok(Made::new(places, summary, measured))
     }
 }
 
@@ -154,45 +161,82 @@ fn in_range(parameter: Parameter, e: &Estimate) -> Estimate {
 /// What is claimed, and how much of it is true.
 #[derive(Default)]
 struct Tally {
-    pairs: usize,
-    covered: usize,
-    widths: Vec<f64>,
+    claimed: Vec<(f64, Estimate)>,
     never: Vec<String>,
+    panels: Vec<Vec<(f64, Estimate)>>,
+}
+
+fn holds((t, e): &(f64, Estimate)) -> bool {
+    *t >= e.low - 1e-9 && *t <= e.high + 1e-9
 }
 
 impl Tally {
     /// True places and estimates of a parameter.
-    fn add(&mut self, parameter: Parameter, explained: Option<f64>, found: &[(f64, Estimate)]) {
-        let holds = |(t, e): &&(f64, Estimate)| *t >= e.low - 1e-9 && *t <= e.high + 1e-9;
+    fn add(&mut self, parameter: Parameter, explained: Option<f64>, found: &[(f64, Estimate)], trials: usize) {
         let claimed: Vec<(f64, Estimate)> = found.iter().filter(|(_, e)| e.high - e.low <= WIDEST).copied().collect();
-        let inside = claimed.iter().filter(holds).count();
-        let all = found.iter().filter(holds).count();
-        let width = median(found.iter().map(|(_, e)| e.high - e.low).collect());
-        let explained = explained.map_or(String::from("measured"), |e| format!("{e:.3}"));
-        let share = |a: usize, b: usize| format!("{a}/{b}");
+        let inside = claimed.iter().filter(|p| holds(p)).count();
+        let explained = explained.map_or(String::from("measured"), |e| format!("{:.0} %", 100.0 * e));
         println!(
-            "{:<26} {:>10} {explained:>10} {:>8} {width:>7.3}   all {}",
+            "| {} | {explained} | {}/{trials} | {inside} | {:.2} |",
             parameter.name(),
-            share(claimed.len(), found.len()),
-            share(inside, claimed.len()),
-            share(all, found.len())
+            claimed.len(),
+            median(claimed.iter().map(|(_, e)| e.high - e.low).collect())
         );
         if claimed.is_empty() {
             self.never.push(parameter.name());
+        } else {
+            self.panels.push(claimed.clone());
         }
-        self.pairs += claimed.len();
-        self.covered += inside;
-        self.widths.extend(claimed.iter().map(|(_, e)| e.high - e.low));
+        self.claimed.extend(claimed);
     }
 
-    fn tell(self) {
-        let part = 100.0 * self.covered as f64 / self.pairs as f64;
+    fn tell(&self, what: &str) {
+        let covered = self.claimed.iter().filter(|p| holds(p)).count();
+        let widths = self.claimed.iter().map(|(_, e)| e.high - e.low).collect();
         println!(
-            "{} pairs claimed: {part:.1} % covered, median width {:.3} of the range",
-            self.pairs,
-            median(self.widths)
+            "{what}: {} pairs claimed, {covered} ({:.1} %) covered, median width {:.3} of the range; never claimed: {}",
+            self.claimed.len(),
+            100.0 * covered as f64 / self.claimed.len() as f64,
+            median(widths),
+            self.never.join(", ")
         );
-        println!("never claimed: {}", self.never.join(", "));
+    }
+
+    /// A panel a parameter that was claimed: the truth to the right, what was found upwards, intervals as lines.
+    fn draw(&self, path: &Path) -> Result<(), Box<dyn Error>> {
+        const PANEL: usize = 110;
+        const SIDE: usize = 96;
+        const ACROSS: usize = 7;
+        let down = self.panels.len().div_ceil(ACROSS).max(1);
+        let (wide, high) = (ACROSS * PANEL, down * PANEL);
+        let mut grey = vec![255_u8; wide * high];
+        for (i, panel) in self.panels.iter().enumerate() {
+            let [left, top] = [i % ACROSS, i / ACROSS].map(|k| k * PANEL + (PANEL - SIDE) / 2);
+            let mut put = |x: f64, y: f64, ink: u8| {
+                let at = |v: f64| (0..SIDE).rev().find(|k| *k as f64 <= v * (SIDE - 1) as f64).unwrap_or(0);
+                let pixel = &mut grey[(top + SIDE - 1 - at(y)) * wide + left + at(x)];
+                *pixel = ink.min(*pixel);
+            };
+            for k in 0..SIDE {
+                let t = k as f64 / (SIDE - 1) as f64;
+                put(t, t, 170);
+                [(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)].into_iter().for_each(|(x, y)| put(x, y, 120));
+            }
+            for (truth, e) in panel {
+                for k in 0..SIDE {
+                    put(*truth, e.low + (e.high - e.low) * k as f64 / (SIDE - 1) as f64, 110);
+                }
+                for (dx, dy) in [(0.0, 0.0), (0.012, 0.0), (-0.012, 0.0), (0.0, 0.012), (0.0, -0.012)] {
+                    put(truth + dx, e.value + dy, 0);
+                }
+            }
+        }
+        let mut encoder = png::Encoder::new(File::create(path)?, u32::try_from(wide)?, u32::try_from(high)?);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_compression(png::Compression::High);
+        encoder.write_header()?.write_image_data(&grey)?;
+        println!("{}", path.display());
+        Ok(())
     }
 }
 
@@ -201,15 +245,40 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Reads what was simulated before, or simulates it and keeps it.
-fn kept<T: Serialize + for<'de> Deserialize<'de>>(
+/// Rows that were made before are read, the others made and added to the file as they are done.
+fn kept(
     path: &Path,
-    make: impl FnOnce() -> Result<T, Box<dyn Error>>,
-) -> Result<T, Box<dyn Error>> {
-    if let Ok(text) = std::fs::read_to_string(path) {
-        return Ok(serde_json::from_str(&text)?);
+    count: usize,
+    make: impl Fn(usize) -> Result<Made, String> + Sync,
+) -> Result<Vec<Made>, Box<dyn Error>> {
+    let mut rows: Vec<Option<Row>> = (0..count).map(|_| None).collect();
+    if path.exists() {
+        for line in BufReader::new(File::open(path)?).lines() {
+            // A line that was broken off is made again.
+            if let Ok(row) = serde_json::from_str::<Row>(&line?)
+                && row.row < count
+            {
+                let at = row.row;
+                rows[at] = Some(row);
+            }
+        }
     }
-    let made = make()?;
-    std::fs::write(path, serde_json::to_string(&made)?)?;
+    let file = Mutex::new(OpenOptions::new().create(true).append(true).open(path)?);
+    let missing: Vec<usize> = (0..count).filter(|i| rows[*i].is_none()).collect();
+    let one = |row: &usize| -> Result<Row, String> {
+        let row = Row { row: *row, made: make(*row) };
+        let line = serde_json::to_string(&row).map_err(|e| e.to_string())?;
+        let mut file = file.lock().map_err(|e| e.to_string())?;
+        writeln!(file, "\n{line}").map_err(|e| e.to_string())?;
+        Ok(row)
+    };
+    let made: Vec<Row> = missing.par_iter().map(one).collect::<Result<_, _>>()?;
+    let mut left_out = 0;
+    let all = rows.into_iter().flatten().chain(made);
+    let mut all: Vec<Row> = all.collect();
+    all.sort_by_key(|row| row.row);
+    let made = all.into_iter().filter_map(|row| row.made.map_err(|e| (left_out += 1, println!("left out: {e}"))).ok());
+    let made = made.collect();
+    println!("{}: {count} rows, {left_out} left out", path.display());
     Ok(made)
 }

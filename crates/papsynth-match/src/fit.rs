@@ -9,11 +9,11 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::measured::{Measured, measure};
 use crate::parameter::{PARAMETERS, Parameter, Source, Values};
-use crate::recipe::{Setting, recipe, simulated};
+use crate::recipe::{Setting, recipe};
 use crate::refine::{Forward, distance, propose};
-use crate::regression::{Estimate, Regression};
+use crate::regression::{Estimate, Regression, WIDEST};
 use crate::summary::{Summary, Window};
-use crate::table::{Step, Table, TableParams, Tell, spread_out};
+use crate::table::{Plan, Step, Table, TableParams, Tell, spread_out};
 use crate::view::{MakeEngine, View};
 
 /// Whether the size of a pixel is known.
@@ -144,9 +144,6 @@ pub struct Match {
     base: Recipe,
 }
 
-/// An interval wider than this part of its range says too little: the parameter counts as not identified.
-pub const WIDEST: f64 = 0.5;
-
 /// Fewest nuclei that stain and sizes are learnt from.
 const LEAST_NUCLEI: usize = 8;
 
@@ -210,10 +207,9 @@ impl Match {
         let real = Summary::new(&windows.into_iter().map(|w| w.0).collect::<Vec<_>>(), &names);
 
         let (setting, known) = self.setting(&measured);
-        let sought = simulated(&setting);
         let of_table =
             TableParams { windows: self.params.table.windows.min(fields.len()), ..self.params.table.clone() };
-        let table = Table::simulate(&setting, &known, &sought, &view, make, &of_table, tell)?;
+        let table = Plan::new(&setting, &known, &view, make, &of_table)?.simulate(tell)?;
         let regression = Regression::new(&table.statistics, &table.places);
         let estimates = regression.estimate(&real.values);
         let search = Search {
@@ -231,7 +227,7 @@ impl Match {
         let fitted = |parameter: Parameter| {
             answers.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
         };
-        let values = spread_out(&known, &sought, &places);
+        let values = spread_out(&known, &table.sought, &places);
         Ok(Fit {
             recipe: recipe(&setting, &values, fitted),
             answers,

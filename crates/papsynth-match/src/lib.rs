@@ -18,11 +18,11 @@ mod text;
 mod view;
 
 pub use error::Error;
-pub use fit::{Answer, Distance, Fit, Match, MatchParams, Origin, PixelSize, Statistic, WIDEST};
+pub use fit::{Answer, Distance, Fit, Match, MatchParams, Origin, PixelSize, Statistic};
 pub use measured::{Measured, measure};
 pub use parameter::{PARAMETERS, Parameter, Prior, Scale, Source, Values};
 pub use recipe::{Setting, Spreads, recipe};
-pub use regression::{Estimate, Regression};
+pub use regression::{Estimate, Regression, WIDEST};
 pub use summary::Summary;
-pub use table::{Step, Table, TableParams, unseen};
+pub use table::{Plan, Step, Table, TableParams, unseen};
 pub use view::{MakeEngine, View};

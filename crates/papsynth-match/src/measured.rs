@@ -30,8 +30,12 @@ const PATTERN_ERROR: f64 = 0.06;
 /// To a correlation.
 const CORRELATION_ERROR: f64 = 0.012;
 
-/// To a correlation where noise is faint, times the variance: rounding is shared with none.
-const ROUNDING_ERROR: f64 = 0.05;
+/// Variance that rounding and what lies on the slide add to noise, squares of levels of 8 bits: faint noise is told by less, and of
+/// what it shares nothing.
+const ADDED: f64 = 0.06;
+
+/// To a correlation, over that of the added part of the variance: rounding shares nothing, and dirt shares all.
+const ADDED_SHARE: f64 = 2.0;
 
 /// To the level, a part of full scale; and where all is covered, and what is taken for empty is not.
 const LEVEL_ERROR: f64 = 0.003;
@@ -120,18 +124,25 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     put(Parameter::Level, &levels, level_error);
     put(Parameter::BowlAcross, &column(&|l| l.across.max(0.0)), BOWL_ERROR);
     put(Parameter::BowlDown, &column(&|l| l.down.max(0.0)), BOWL_ERROR);
+    let variances = column(&|l| l.empty.deviation * l.empty.deviation);
+    let added = ADDED * (scale / LEVELS) * (scale / LEVELS) / mean(&variances);
+    // What lies on a slide adds to its noise and changes what is shared: by how much is seen in how fields differ.
+    let reach = |values: &[f64]| {
+        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+    };
     if extended {
-        let variance = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
-        let error = CORRELATION_ERROR + ROUNDING_ERROR * (scale / LEVELS).max(1.0) / variance;
-        put(Parameter::Across, &shared[0], error);
-        put(Parameter::Down, &shared[1], error);
+        for (parameter, values) in [(Parameter::Across, &shared[0]), (Parameter::Down, &shared[1])] {
+            let [low, high] = reach(values);
+            put(parameter, values, CORRELATION_ERROR + ADDED_SHARE * added + 0.25 * (high - low));
+        }
     }
     let noise: Vec<f64> =
         column(&|l| l.empty.deviation * LEVELS / scale).into_iter().map(|n| libm::log(n.max(1e-3))).collect();
     if !noise.is_empty() {
-        let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR;
+        let half = of_mean(deviation(&noise), noise.len()) + NOISE_ERROR + added;
         let prior = Parameter::Noise.prior();
-        let [value, low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
+        let [value, mut low, high] = [0.0, -half, half].map(|d| libm::exp(mean(&noise) + d));
+        low = low.min(libm::exp(reach(&noise)[0] - NOISE_ERROR));
         estimates.push((
             Parameter::Noise,
             Estimate { value, low: low.max(prior.low).min(value), high: high.min(prior.high).max(value) },
@@ -147,14 +158,15 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
         ));
     }
     let [sd_across, sd_down] = [deviation(&column(&|l| l.across)), deviation(&column(&|l| l.down))];
-    let variances = mean(&column(&|l| l.empty.deviation * l.empty.deviation));
     let squares = mean(&column(&|l| l.level * l.level)) * scale * scale;
     let restored = mean(&column(&|l| l.empty.restored()));
     let relative: Vec<Vec<f32>> = lights.into_iter().map(|l| l.empty.relative).collect();
     if let Some([variance, error]) = pattern(&relative).map(|found| found.map(|v| v * restored)) {
-        let per_noise = squares / variances;
+        let per_noise = squares / mean(&variances);
         let half = (2.0 * error + PATTERN_ERROR * variance.abs()) * per_noise;
-        let [value, low, high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
+        let [value, low, mut high] = [0.0, -half, half].map(|d| (variance * per_noise + d).clamp(0.0, 1.0));
+        // Of the noise of the cleanest field it is a larger part.
+        high = (high * (mean(&variances) / reach(&variances)[0] + added)).clamp(value, 1.0);
         estimates.push((Parameter::Pattern, Estimate { value, low, high }));
     }
     estimates.sort_by_key(|(parameter, _)| *parameter);

@@ -55,8 +55,14 @@ const UNEVEN_PX: [f64; 2] = [6.0, 24.0];
 /// Empty slide is within this absorbance after the wider of them.
 const EVEN: f32 = 0.012;
 
-/// Logarithm of the unevenness of empty slide between two scales; NaN where nothing is empty.
-pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> f64 {
+/// Side of the blocks between which it is looked for coarsely, pixels; what of a block is paler than so many of its pixels is slide,
+/// if it is within this part of the light.
+const BLOCK_PX: usize = 32;
+const PALE: f64 = 0.75;
+const SLIDE: f64 = 0.04;
+
+/// Logarithm of the unevenness of empty slide between two scales, and about a quadratic surface; NaN where nothing is empty.
+pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> [f64; 2] {
     let light: Vec<f32> = grey.iter().map(|g| g / single(empty)).collect();
     let [fine, coarse] = UNEVEN_PX.map(|sigma| blur(&light, width, sigma));
     // Whatever lies there is darker than the slide: the paler half is the slide.
@@ -66,7 +72,38 @@ pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> f64 {
         .filter(|(_, c)| **c > 1.0 - 2.0 * EVEN)
         .map(|(f, c)| f64::from((f - c).abs()))
         .collect();
-    if rests.len() < grey.len() / 50 { f64::NAN } else { libm::log(quantile(&mut rests, 0.5).max(1e-6)) }
+    let finely = if rests.len() < grey.len() / 50 { f64::NAN } else { quantile(&mut rests, 0.5) };
+    [finely, coarsely(&fine, width)].map(|v| if v.is_nan() { v } else { libm::log(v.max(1e-6)) })
+}
+
+/// Three quarters of the distance between quartiles of pale places about their quadratic surface.
+fn coarsely(light: &[f32], width: usize) -> f64 {
+    let height = light.len() / width;
+    let mut places = Vec::new();
+    for top in (0..height).step_by(BLOCK_PX) {
+        for left in (0..width).step_by(BLOCK_PX) {
+            let rows = top..(top + BLOCK_PX).min(height);
+            let row = |y: usize| &light[y * width + left..y * width + (left + BLOCK_PX).min(width)];
+            // Every fourth pixel: the light is blurred.
+            let mut block: Vec<f64> =
+                rows.step_by(4).flat_map(|y| row(y).iter().step_by(4).map(|v| f64::from(*v))).collect();
+            let pale = quantile(&mut block, PALE);
+            if (pale - 1.0).abs() < SLIDE {
+                let [x, y] = [left as f64 / width as f64 - 0.5, top as f64 / height as f64 - 0.5];
+                places.push(([1.0, x, y, x * x, x * y, y * y], pale - 1.0));
+            }
+        }
+    }
+    /// Fewer blocks say nothing beyond their surface.
+    const LEAST_PLACES: usize = 24;
+    if places.len() < LEAST_PLACES {
+        return f64::NAN;
+    }
+    let rows = nalgebra::DMatrix::from_fn(places.len(), 6, |i, j| places[i].0[j]);
+    let values = nalgebra::DVector::from_iterator(places.len(), places.iter().map(|p| p.1));
+    let Some(surface) = rows.tr_mul(&rows).cholesky().map(|c| c.solve(&rows.tr_mul(&values))) else { return f64::NAN };
+    let mut rests: Vec<f64> = (values - rows * surface).iter().copied().collect();
+    0.741 * (quantile(&mut rests, 0.75) - quantile(&mut rests, 0.25))
 }
 
 /// Width of the Gaussian whose remainder is noise, pixels.

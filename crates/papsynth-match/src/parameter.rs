@@ -67,7 +67,7 @@ macro_rules! parameters {
 
 parameters! {
     /// Mean light of the empty slide, a part of full scale: what scatter takes, half its strength, is off.
-    Level: Measured, Linear 0.55..0.94 "", "background.level: mean light";
+    Level: Measured, Linear 0.55..0.97 "", "background.level: mean light";
     /// Its standard deviation between fields.
     LevelSpread: Measured, Linear 0.0..0.04 "", "background.level: sd";
     /// Fall of the light towards the left and right border.
@@ -115,7 +115,7 @@ parameters! {
     /// Strength of all structure of the cytoplasm, over that of the recipe to begin with.
     Structure: Simulated, Logarithmic 0.2..3.0 "", "cytoplasm.clouds, flecks, cytoskeleton, grain: factor";
     /// Cells, median over fields.
-    Cells: Simulated, Logarithmic 30.0..900.0 "/mm2", "cells.*.count: median";
+    Cells: Simulated, Logarithmic 40.0..700.0 "/mm2", "cells.*.count: median";
     /// Standard deviation of the logarithm of their number between fields.
     CellsSpread: Simulated, Linear 0.05..0.9 "", "cells.*.count: log sd";
     /// Share of superficial among superficial and intermediate cells.

@@ -3,11 +3,10 @@
 use argmin::core::{CostFunction, Executor, Gradient, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::regression::{Estimate, Scaler};
-use crate::ridge::Kernel;
+use crate::ridge::Features;
 use crate::table::Table;
 
 /// Statistics further apart than so many standard errors count in proportion, not by the square: what a recipe cannot show
@@ -39,19 +38,14 @@ impl Forward {
         let scaler = Scaler::new(&table.statistics);
         let statistics: Vec<Vec<f64>> = table.statistics.iter().map(|r| scaler.scaled(r)).collect();
         let rows: Vec<Vec<f64>> = table.places.iter().map(|p| features(p)).collect();
-        let n = rows.len();
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let kernel = Kernel::new(DMatrix::from_fn(n, n, |i, j| dot(&rows[i], &rows[j])));
+        let features = Features::new(&rows);
         let columns = table.names.len();
         let fitted: Vec<(Vec<f64>, f64)> = (0..columns)
             .into_par_iter()
             .map(|c| {
                 let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
-                let ridge = kernel.best(&y);
-                let mut factors = vec![ridge.mean];
-                factors.extend(
-                    (0..rows[0].len()).map(|f| ridge.weights.iter().zip(&rows).map(|(w, r)| w * r[f]).sum::<f64>()),
-                );
+                let ridge = features.best(&y);
+                let factors = std::iter::once(ridge.mean).chain(ridge.factors).collect();
                 (factors, ridge.error.sqrt().max(LEAST_ERROR))
             })
             .collect();

@@ -2,14 +2,15 @@
 //!
 //! Semi-automatic approximate Bayesian computation (Fearnhead and Prangle, doi:10.1111/j.1467-9868.2011.01010.x): a first
 //! regression makes of all statistics one summary a parameter; a second one, that bends, goes from these to the parameter.
-//! Intervals are those of cross-conformal prediction (doi:10.1007/s10472-013-9368-4), wider where unseen rows were missed by more.
+//! Intervals are those of cross-conformal prediction (doi:10.1007/s10472-013-9368-4), wider where unseen rows were missed by more
+//! (normalised as by Papadopoulos and Haralambous, doi:10.1016/j.neunet.2011.05.008). Rows are unseen by everything that tells
+//! them: scales, both regressions and the choice of their penalties.
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::number::{deviation, mean};
-use crate::ridge::{Kernel, Ridge};
+use crate::ridge::{FOLDS, Features, Ridge};
 
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -22,172 +23,241 @@ pub struct Estimate {
     pub high: f64,
 }
 
+/// An interval wider than this part of its range says too little: the parameter counts as not identified.
+pub const WIDEST: f64 = 0.5;
+
 /// Part of the intervals that hold the truth.
 const CONFIDENCE: f64 = 0.95;
 
 /// Statistics further from the mean of the table than so many standard deviations count as being there.
 const FARTHEST: f64 = 4.0;
 
-/// Widths of the second kernel that are tried, in standard deviations of a summary.
-const WIDTHS: [f64; 3] = [1.0, 2.0, 4.0];
+/// Added to misses before their logarithm is taken: none is the better for being right by chance.
+const LEAST_MISS: f64 = 0.02;
 
-/// Part of a distance in the second kernel that is that of the parameter's own summary.
-const OWN: f64 = 0.5;
-
-/// How much of the second kernel is straight.
-const STRAIGHT: f64 = 1.0;
-
-/// Part of the rows about a prediction whose misses say how wide its interval is.
-const NEIGHBOURS: f64 = 0.2;
-
-/// Brings statistics to one scale; what is unknown counts as the mean.
+/// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them: what no
+/// recipe shows must not be held for more of what some do.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaler {
     means: Vec<f64>,
     deviations: Vec<f64>,
+    ranges: Vec<[f64; 2]>,
 }
 
 impl Scaler {
-    pub(crate) fn new(rows: &[Vec<f64>]) -> Self {
-        let columns = rows.first().map_or(0, Vec::len);
-        let column = |c: usize| -> Vec<f64> { rows.iter().map(|r| r[c]).filter(|v| v.is_finite()).collect() };
+    pub(crate) fn new<R: AsRef<[f64]>>(rows: &[R]) -> Self {
+        let columns = rows.first().map_or(0, |r| r.as_ref().len());
+        let column = |c: usize| -> Vec<f64> { rows.iter().map(|r| r.as_ref()[c]).filter(|v| v.is_finite()).collect() };
         let of = |f: fn(&[f64]) -> f64| {
             (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect()
         };
-        Self { means: of(mean), deviations: of(deviation) }
+        let range = |c: usize| {
+            column(c).iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+        };
+        Self { means: of(mean), deviations: of(deviation), ranges: (0..columns).map(range).collect() }
     }
 
     pub(crate) fn scaled(&self, row: &[f64]) -> Vec<f64> {
-        let one = |((value, mean), sd): ((&f64, &f64), &f64)| {
-            if value.is_finite() && *sd > 0.0 { ((value - mean) / sd).clamp(-FARTHEST, FARTHEST) } else { 0.0 }
+        let one = |(c, value): (usize, &f64)| {
+            let (sd, [low, high]) = (self.deviations[c], self.ranges[c]);
+            if value.is_finite() && sd > 0.0 {
+                ((value.clamp(low, high) - self.means[c]) / sd).clamp(-FARTHEST, FARTHEST)
+            } else {
+                0.0
+            }
         };
-        row.iter().zip(&self.means).zip(&self.deviations).map(one).collect()
+        row.iter().enumerate().map(one).collect()
     }
 }
 
 /// Learns parameters, as places in their ranges, from statistics.
 #[derive(Debug, Clone)]
 pub struct Regression {
-    scaler: Scaler,
-    rows: Vec<Vec<f64>>,
-    first: Vec<Ridge>,
-    summaries: Vec<Vec<f64>>,
-    second: Vec<Second>,
-}
-
-/// The second regression of one parameter.
-#[derive(Debug, Clone)]
-struct Second {
-    width: f64,
-    ridge: Ridge,
-    /// Prediction of each unseen row and by how much it missed, in the order of the predictions.
-    misses: Vec<[f64; 2]>,
-    /// The interval reaches so many times the neighbours' mean miss.
-    reach: f64,
+    told: Told,
+    reach: Vec<Reach>,
+    explained: Vec<f64>,
 }
 
 impl Regression {
     /// Learns from rows of statistics and rows of places.
     #[must_use]
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
-        let scaler = Scaler::new(statistics);
-        let rows: Vec<Vec<f64>> = statistics.iter().map(|r| scaler.scaled(r)).collect();
-        let n = rows.len();
-        let kernel = Kernel::new(DMatrix::from_fn(n, n, |i, j| dot(&rows[i], &rows[j])));
-        let columns = places.first().map_or(0, Vec::len);
-        let column = |c: usize| -> Vec<f64> { places.iter().map(|p| p[c]).collect() };
-        let first: Vec<Ridge> = (0..columns).into_par_iter().map(|c| kernel.best(&column(c))).collect();
-        let summaries: Vec<Vec<f64>> =
-            (0..n).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
-        let second = (0..columns).into_par_iter().map(|c| Second::new(&summaries, c, &column(c))).collect();
-        Self { scaler, rows, first, summaries, second }
+        let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
+        // The last fold is none: it leaves nothing out.
+        let fits: Vec<(Told, Vec<Unseen>)> = (0..=FOLDS)
+            .into_par_iter()
+            .map(|fold| {
+                let (out, kept): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| i % FOLDS == fold);
+                let told = Told::new(statistics, places, &kept);
+                let tell = |row: usize| {
+                    let summary = told.summary(&statistics[row]);
+                    Unseen { row, values: told.values(&summary), summary }
+                };
+                let unseen = out.into_iter().map(tell).collect();
+                (told, unseen)
+            })
+            .collect();
+        let mut values = vec![Vec::new(); n];
+        let mut summaries = vec![Vec::new(); n];
+        let mut told = None;
+        for (fit, unseen) in fits {
+            for one in unseen {
+                (values[one.row], summaries[one.row]) = (one.values, one.summary);
+            }
+            told = Some(fit);
+        }
+        let told = told.unwrap_or_else(|| Told::new(statistics, places, &[]));
+        let missed = |c: usize| -> Vec<f64> { values.iter().zip(places).map(|(v, p)| (v[c] - p[c]).abs()).collect() };
+        let explained = (0..columns)
+            // Places are spread evenly over 0 to 1.
+            .map(|c| 1.0 - 12.0 * missed(c).iter().map(|m| m * m).sum::<f64>() / n.max(1) as f64)
+            .collect();
+        let reach = (0..columns)
+            .into_par_iter()
+            .map(|c| Reach::new(&summaries, c, &values.iter().map(|v| v[c]).collect::<Vec<_>>(), &missed(c)))
+            .collect();
+        Self { told, reach, explained }
     }
 
     /// The places of statistics, with their intervals, within 0 to 1.
     #[must_use]
     pub fn estimate(&self, statistics: &[f64]) -> Vec<Estimate> {
-        let summary = self.summary(statistics);
-        self.second.iter().enumerate().map(|(c, s)| s.estimate(&self.summaries, c, &summary)).collect()
-    }
-
-    fn summary(&self, statistics: &[f64]) -> Vec<f64> {
-        let row = self.scaler.scaled(statistics);
-        let kernel = DVector::from_iterator(self.rows.len(), self.rows.iter().map(|r| dot(r, &row)));
-        self.first.iter().map(|r| of_one_scale(r.predict(&kernel))).collect()
+        let summary = self.told.summary(statistics);
+        let values = self.told.values(&summary);
+        let with = |(c, (value, reach)): (usize, (f64, &Reach))| reach.about(value, reach.usual(&bent(&summary, c)));
+        values.into_iter().zip(&self.reach).enumerate().map(with).collect()
     }
 
     /// Part of each parameter's variance over the table that unseen rows were told.
     #[must_use]
-    pub fn explained(&self) -> Vec<f64> {
-        // Places are spread evenly over 0 to 1.
-        self.second.iter().map(|s| 1.0 - 12.0 * s.ridge.error).collect()
+    pub fn explained(&self) -> &[f64] {
+        &self.explained
+    }
+}
+
+/// What a row was told by the others.
+struct Unseen {
+    row: usize,
+    values: Vec<f64>,
+    summary: Vec<f64>,
+}
+
+/// What rows of statistics tell: values without intervals.
+#[derive(Debug, Clone)]
+struct Told {
+    scaler: Scaler,
+    first: Vec<Ridge>,
+    second: Vec<Ridge>,
+}
+
+impl Told {
+    fn new(statistics: &[Vec<f64>], places: &[Vec<f64>], kept: &[usize]) -> Self {
+        let of_kept: Vec<&[f64]> = kept.iter().map(|i| statistics[*i].as_slice()).collect();
+        let scaler = Scaler::new(&of_kept);
+        let columns = places.first().map_or(0, Vec::len);
+        let column = |c: usize| -> Vec<f64> { kept.iter().map(|i| places[*i][c]).collect() };
+        let rows: Vec<Vec<f64>> = of_kept.iter().map(|r| scaler.scaled(r)).collect();
+        let first: Vec<Ridge> = (0..columns).map(|c| weighed(&rows, &column(c))).collect();
+        let summaries: Vec<Vec<f64>> =
+            (0..kept.len()).map(|i| first.iter().map(|r| of_one_scale(r.unseen[i])).collect()).collect();
+        let second = |c: usize| {
+            let rows: Vec<Vec<f64>> = summaries.iter().map(|s| bent(s, c)).collect();
+            Features::new(&rows).best(&column(c))
+        };
+        let second = (0..columns).map(second).collect();
+        Self { scaler, first, second }
+    }
+
+    fn summary(&self, statistics: &[f64]) -> Vec<f64> {
+        let row = self.scaler.scaled(statistics);
+        self.first.iter().map(|r| of_one_scale(r.predict(&row))).collect()
+    }
+
+    fn values(&self, summary: &[f64]) -> Vec<f64> {
+        self.second.iter().enumerate().map(|(c, r)| r.predict(&bent(summary, c)).clamp(0.0, 1.0)).collect()
     }
 }
 
 /// A summary in standard deviations of the parameter's range. Not in its own: what hardly varies tells nothing, and must not be made
 /// to.
 fn of_one_scale(place: f64) -> f64 {
-    (place - 0.5) * 12.0_f64.sqrt()
+    ((place - 0.5) * 12.0_f64.sqrt()).clamp(-FARTHEST, FARTHEST)
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>() / a.len().max(1) as f64
-}
-
-/// The second kernel: straight and bent.
-fn bent(a: &[f64], b: &[f64], own: usize, width: f64) -> f64 {
-    let square = |(x, y): (&f64, &f64)| (x - y) * (x - y);
-    let all = a.iter().zip(b).map(square).sum::<f64>() / a.len().max(1) as f64;
-    let of_own = (a[own] - b[own]) * (a[own] - b[own]);
-    libm::exp(-0.5 * (OWN * of_own + (1.0 - OWN) * all) / (width * width))
-        + STRAIGHT * (dot(a, b) + OWN * a[own] * b[own])
-}
-
-impl Second {
-    fn new(rows: &[Vec<f64>], own: usize, y: &[f64]) -> Self {
-        let n = rows.len();
-        let tried: Vec<(f64, Ridge)> = WIDTHS
-            .into_iter()
-            .map(|width| {
-                (width, Kernel::new(DMatrix::from_fn(n, n, |i, j| bent(&rows[i], &rows[j], own, width))).best(y))
-            })
-            .collect();
-        let mut tried = tried.into_iter();
-        let (mut width, mut ridge) =
-            tried.next().unwrap_or_else(|| (WIDTHS[0], Kernel::new(DMatrix::zeros(n, n)).best(y)));
-        for (other, candidate) in tried {
-            if candidate.error < ridge.error {
-                (width, ridge) = (other, candidate);
-            }
+/// The ridge in which each statistic counts as much as it goes with the parameter by itself: of two hundred, most have no say in it.
+fn weighed(rows: &[Vec<f64>], y: &[f64]) -> Ridge {
+    let middle = mean(y);
+    let weight = |s: usize| {
+        let [mut with, mut own, mut all] = [0.0; 3];
+        for (row, value) in rows.iter().zip(y) {
+            with += row[s] * (value - middle);
+            own += row[s] * row[s];
+            all += (value - middle) * (value - middle);
         }
-        let mut misses: Vec<[f64; 2]> =
-            ridge.unseen.iter().zip(y).map(|(u, v)| [u.clamp(0.0, 1.0), (u.clamp(0.0, 1.0) - v).abs()]).collect();
-        misses.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
-        let mut second = Self { width, ridge, misses, reach: 1.0 };
-        let mut ratios: Vec<f64> = second.misses.iter().map(|[at, miss]| miss / second.usual(*at)).collect();
-        ratios.sort_unstable_by(f64::total_cmp);
-        // As many of n + 1 as the confidence asks: the new one is one of them.
-        let rank = crate::number::whole(libm::ceil(CONFIDENCE * (n as f64 + 1.0))).clamp(1, n.max(1));
-        second.reach = ratios.get(rank - 1).copied().unwrap_or(f64::INFINITY);
-        second
+        if own * all > 0.0 { with.abs() / (own * all).sqrt() } else { 0.0 }
+    };
+    let weights: Vec<f64> = (0..rows.first().map_or(0, Vec::len)).map(weight).collect();
+    let of_weight: Vec<Vec<f64>> = rows.iter().map(|r| r.iter().zip(&weights).map(|(x, w)| x * w).collect()).collect();
+    let mut ridge = Features::new(&of_weight).best(y);
+    ridge.factors.iter_mut().zip(&weights).for_each(|(f, w)| *f *= w);
+    ridge
+}
+
+/// Features of the second regression: the parameter's own summary and its powers, all others, and each with the own one.
+fn bent(summary: &[f64], own: usize) -> Vec<f64> {
+    let x = summary[own];
+    let few = 1.0 / (summary.len() as f64).sqrt();
+    let mut row = vec![x, x * x - 1.0, x * (x * x - 3.0)];
+    row.extend(summary.iter().map(|s| few * s));
+    row.extend(summary.iter().map(|s| few * x * s));
+    row
+}
+
+/// How far intervals reach.
+#[derive(Debug, Clone)]
+struct Reach {
+    /// Logarithm of the usual miss.
+    misses: Ridge,
+    /// Intervals reach so many times the usual miss.
+    times: f64,
+}
+
+impl Reach {
+    /// From the summaries, values and misses of unseen rows.
+    fn new(summaries: &[Vec<f64>], own: usize, values: &[f64], missed: &[f64]) -> Self {
+        let rows: Vec<Vec<f64>> = summaries.iter().map(|s| bent(s, own)).collect();
+        let logarithms: Vec<f64> = missed.iter().map(|m| libm::log(m + LEAST_MISS)).collect();
+        let misses = Features::new(&rows).best(&logarithms);
+        // A row's own miss has no part in what is usual about it.
+        let usual: Vec<f64> = misses.unseen.iter().map(|u| libm::exp(*u)).collect();
+        let asked = |which: &dyn Fn(usize) -> bool| {
+            let mut times: Vec<f64> = (0..missed.len()).filter(|i| which(*i)).map(|i| missed[i] / usual[i]).collect();
+            times.sort_unstable_by(f64::total_cmp);
+            // As many of n + 1 as the confidence asks: the new one is one of them.
+            let rank = crate::number::whole(libm::ceil(CONFIDENCE * (times.len() as f64 + 1.0))).max(1);
+            times.get(rank - 1).copied().unwrap_or(f64::INFINITY)
+        };
+        let mut reach = Self { misses, times: asked(&|_| true) };
+        // What counts is how often those intervals hold that are narrow enough to be told: of too few of them nothing is known.
+        loop {
+            let narrow = |i: usize| {
+                let e = reach.about(values[i], usual[i]);
+                e.high - e.low <= WIDEST
+            };
+            let times = asked(&narrow);
+            if times <= reach.times || !(0..values.len()).any(narrow) {
+                return reach;
+            }
+            reach.times = times;
+        }
     }
 
-    /// Mean miss of the rows whose predictions are next to a place.
-    fn usual(&self, at: f64) -> f64 {
-        let n = self.misses.len();
-        let count = crate::number::whole(NEIGHBOURS * n as f64).clamp(1, n.max(1));
-        let middle = self.misses.partition_point(|m| m[0] < at);
-        let from = middle.saturating_sub(count / 2).min(n - count.min(n));
-        let near = &self.misses[from..(from + count).min(n)];
-        // A little of the mean of all: neighbours may be right by chance.
-        let all = self.misses.iter().map(|m| m[1]).sum::<f64>() / n as f64;
-        0.8 * near.iter().map(|m| m[1]).sum::<f64>() / near.len().max(1) as f64 + 0.2 * all
+    fn usual(&self, row: &[f64]) -> f64 {
+        libm::exp(self.misses.predict(row))
     }
 
-    fn estimate(&self, rows: &[Vec<f64>], own: usize, summary: &[f64]) -> Estimate {
-        let kernel = DVector::from_iterator(rows.len(), rows.iter().map(|r| bent(r, summary, own, self.width)));
-        let value = self.ridge.predict(&kernel).clamp(0.0, 1.0);
-        let half = self.reach * self.usual(value);
+    fn about(&self, value: f64, usual: f64) -> Estimate {
+        let half = self.times * usual;
         Estimate { value, low: (value - half).max(0.0), high: (value + half).min(1.0) }
     }
 }
@@ -223,7 +293,7 @@ mod tests {
     fn intervals_hold_what_they_say_and_what_cannot_be_told_is_wide() {
         const TABLES: u64 = 8;
         const TRIALS: usize = 200;
-        let (mut inside, mut width, mut explained) = ([0.0; 3], [0.0; 3], 0.0);
+        let (mut inside, mut width, mut explained) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         let part = 1.0 / (TABLES as f64 * TRIALS as f64);
         for seed in 0..TABLES {
             let (statistics, places) = rows(seed, 150);
@@ -235,11 +305,13 @@ mod tests {
                     width[i] += part * (e.high - e.low);
                 }
             }
-            explained += regression.explained()[2] / TABLES as f64;
+            for (sum, part) in explained.iter_mut().zip(regression.explained()) {
+                *sum += part / TABLES as f64;
+            }
         }
         // Eight quantiles of 150: a standard error of .7 %, and .5 % of the trials.
-        assert!(inside.iter().all(|part| (0.90..=0.98).contains(part)), "{inside:?}");
-        assert!(explained < 0.25, "{explained}");
+        assert!(inside.iter().all(|part| (0.92..=0.98).contains(part)), "{inside:?}");
+        assert!(explained[0] > 0.95 && explained[1] > 0.95 && explained[2] < 0.1, "{explained:?}");
         assert!(width[0] < 0.25 && width[1] < 0.2 && width[2] > 0.85, "{width:?}");
     }
 }

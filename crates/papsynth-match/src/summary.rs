@@ -19,7 +19,8 @@ impl As {
     fn of(self, value: f64) -> f64 {
         match self {
             Self::Itself => value,
-            Self::Log(more) => libm::log((value + more).max(1e-9)),
+            // What is unknown stays so.
+            Self::Log(more) => libm::log((value + more).clamp(1e-9, f64::MAX)),
         }
     }
 }
@@ -53,8 +54,20 @@ const NUCLEI: [(&str, As); 25] = [
     ("nucleus eccentricity", As::Itself),
 ];
 
-/// Those of them whose means are compared between fields: where the field differs, all its nuclei do.
-const BETWEEN: [&str; 4] = ["core absorbance", "core sd without trend", "rim sigma, px", "absorbance beside"];
+/// Features whose spread within windows and between them are told apart: where the field differs, all its nuclei do.
+const NUCLEI_APART: [(&str, As); 5] = [
+    ("core above surroundings", As::Log(0.02)),
+    ("core sd over contrast", As::Log(0.01)),
+    ("core sd without trend", As::Log(0.002)),
+    ("rim sigma, px", As::Log(0.0)),
+    ("absorbance beside", As::Log(0.01)),
+];
+
+/// The same of free cells.
+const CELLS_APART: [(&str, As); 2] = [("cytoplasm absorbance", As::Log(0.005)), ("cell area, um2", As::Log(0.0))];
+
+/// Distances within which pairs of nuclei are counted over all windows, µm.
+const PAIRS_UM: [f64; 5] = [8.0, 16.0, 33.0, 66.0, 130.0];
 
 /// Features of free cells.
 const CELLS: [(&str, As); 13] = [
@@ -86,6 +99,8 @@ pub(crate) struct Window {
     whole: Vec<f64>,
     nuclei: Table,
     cells: Table,
+    /// Pairs of nuclei within each of [`PAIRS_UM`], and how many as many nuclei thrown at random would make.
+    pairs: [[f64; 2]; PAIRS_UM.len()],
 }
 
 /// Numbers of the statistics of a window.
@@ -137,7 +152,7 @@ fn names_of_windows(s: &Statistics) -> Vec<String> {
     names.extend((0..s.spectrum.len()).map(|i| format!("log power, ring {i}")));
     names.extend(TAILS.map(|a| format!("part above {a}")));
     names.extend((1..=noise::LAW).map(|i| format!("noise in the dark, bin {i}")));
-    names.push("unevenness of the light".to_owned());
+    names.extend(["unevenness of the light, finely", "unevenness of the light, coarsely"].map(str::to_owned));
     names.extend(small::names());
     names
 }
@@ -150,15 +165,29 @@ impl Window {
         whole.extend(s.spectrum);
         whole.extend(TAILS.map(|a| As::Log(0.002).of(tail(&s.histogram, a))));
         whole.extend(noise::law(&picture.grey, picture.width, empty));
-        whole.push(noise::unevenness(&picture.grey, picture.width, empty));
+        whole.extend(noise::unevenness(&picture.grey, picture.width, empty));
         whole.extend(small::counts(&picture.grey, picture.width, crate::number::single(empty)));
         let names = names_of_windows(&s);
-        Ok((Self { whole, nuclei, cells }, names))
+        let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, picture, um / view.pixel_um));
+        Ok((Self { whole, nuclei, cells, pairs }, names))
     }
 
     pub(crate) fn nuclei(&self) -> usize {
         self.nuclei.len()
     }
+}
+
+/// How many pairs of places are within a distance, and how many are to be expected.
+fn pairs(places: &[[f64; 2]], picture: &Picture, within_px: f64) -> [f64; 2] {
+    let near = |a: &[f64; 2], b: &[f64; 2]| {
+        let [x, y] = [a[0] - b[0], a[1] - b[1]];
+        x * x + y * y <= within_px * within_px
+    };
+    let found: usize =
+        places.iter().enumerate().map(|(i, a)| places[i + 1..].iter().filter(|b| near(a, b)).count()).sum();
+    let n = places.len() as f64;
+    let part = std::f64::consts::PI * within_px * within_px / picture.grey.len() as f64;
+    [found as f64, 0.5 * n * (n - 1.0) * part]
 }
 
 /// Part of the histogram above an absorbance.
@@ -206,15 +235,26 @@ impl Summary {
             let [middle, spread] = pooled(&nuclei, name, scale);
             put(format!("nuclei: {name}"), middle);
             put(format!("nuclei: {name}, spread"), As::Log(0.003).of(spread));
-            if BETWEEN.contains(&name) {
-                put(format!("nuclei: {name}, between windows"), As::Log(0.005).of(between(&nuclei, name, scale)));
-            }
+        }
+        for (name, scale) in NUCLEI_APART {
+            let [within, between] = apart(&nuclei, name, scale);
+            put(format!("nuclei: {name}, within windows"), As::Log(0.01).of(within));
+            put(format!("nuclei: {name}, between windows"), As::Log(0.02).of(between));
+        }
+        for (i, um) in PAIRS_UM.iter().enumerate() {
+            let [found, expected] = [0, 1].map(|k| windows.iter().map(|w| w.pairs[i][k]).sum::<f64>());
+            put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
         }
         let cells: Vec<&Table> = windows.iter().map(|w| &w.cells).collect();
         for (name, scale) in CELLS {
             let [middle, spread] = pooled(&cells, name, scale);
             put(format!("cells: {name}"), middle);
             put(format!("cells: {name}, spread"), As::Log(0.003).of(spread));
+        }
+        for (name, scale) in CELLS_APART {
+            let [within, between] = apart(&cells, name, scale);
+            put(format!("cells: {name}, within windows"), As::Log(0.01).of(within));
+            put(format!("cells: {name}, between windows"), As::Log(0.02).of(between));
         }
         Self { names, values }
     }
@@ -230,17 +270,23 @@ fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
     [middle, 0.741 * (high - low)]
 }
 
-/// Standard deviation of the means of tables, without what the spread within them makes of it.
-fn between(tables: &[&Table], name: &str, scale: As) -> f64 {
+/// Standard deviation within tables, and that of their means without what the former makes of it.
+fn apart(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
     let groups: Vec<Vec<f64>> = tables
         .iter()
         .map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<_>>())
         .filter(|v| v.len() >= 2)
         .collect();
+    if groups.is_empty() {
+        return [f64::NAN; 2];
+    }
+    let rest: f64 = groups.iter().map(|g| deviation(g) * deviation(g) * (g.len() - 1) as f64).sum();
+    let freedom: f64 = groups.iter().map(|g| (g.len() - 1) as f64).sum();
+    let variance = rest / freedom;
     if groups.len() < 3 {
-        return f64::NAN;
+        return [variance.sqrt(), f64::NAN];
     }
     let means: Vec<f64> = groups.iter().map(|g| mean(g)).collect();
-    let within: Vec<f64> = groups.iter().map(|g| deviation(g) * deviation(g) / g.len() as f64).collect();
-    (deviation(&means) * deviation(&means) - mean(&within)).max(0.0).sqrt()
+    let chance: Vec<f64> = groups.iter().map(|g| variance / g.len() as f64).collect();
+    [variance.sqrt(), (deviation(&means) * deviation(&means) - mean(&chance)).max(0.0).sqrt()]
 }

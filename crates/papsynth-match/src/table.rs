@@ -1,18 +1,16 @@
 //! The table of simulated recipes: what windows of recipes all over the ranges are like.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use papsynth::key::Key;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::parameter::{PARAMETERS, Parameter, Values};
-use crate::recipe::{Setting, recipe};
-use crate::summary::{Summary, Window};
+use crate::recipe::{Setting, recipe, simulated};
+use crate::summary::Summary;
 use crate::view::{MakeEngine, View};
 
 /// How far the work is.
@@ -42,14 +40,13 @@ impl Default for TableParams {
 }
 
 /// Simulated recipes and what their windows are like.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone)]
 pub struct Table {
     /// The parameters that differ between its recipes.
     pub sought: Vec<Parameter>,
     /// Their places in their ranges, recipe by recipe.
     pub places: Vec<Vec<f64>>,
     /// What the windows of each recipe are like.
-    #[serde(with = "rows")]
     pub statistics: Vec<Vec<f64>>,
     /// Names of those numbers.
     pub names: Vec<String>,
@@ -58,20 +55,28 @@ pub struct Table {
 /// Tells how far the work is; false stops it.
 pub(crate) type Tell<'a> = dyn Fn(Step) -> bool + Sync + 'a;
 
-impl Table {
-    /// Draws recipes from the ranges of `sought` parameters, the others as in `known`, and simulates their windows. The same for the same
-    /// seed, whatever the threads.
+/// A table that is to be simulated: recipes from the ranges of sought parameters.
+pub struct Plan<'a> {
+    setting: &'a Setting,
+    known: &'a Values,
+    sought: Vec<Parameter>,
+    view: &'a View,
+    make: &'a MakeEngine<'a>,
+    params: TableParams,
+    draws: Vec<Vec<f64>>,
+}
+
+impl<'a> Plan<'a> {
+    /// Draws recipes from the ranges of all parameters that are found by simulation; the others are as in `known`.
     ///
     /// # Errors
-    /// If more than a fifth of the recipes cannot be made, or `tell` says stop.
-    pub fn simulate(
-        setting: &Setting,
-        known: &Values,
-        sought: &[Parameter],
-        view: &View,
-        make: &MakeEngine<'_>,
+    /// If a parameter is out of its range.
+    pub fn new(
+        setting: &'a Setting,
+        known: &'a Values,
+        view: &'a View,
+        make: &'a MakeEngine<'a>,
         params: &TableParams,
-        tell: &Tell<'_>,
     ) -> Result<Self, Error> {
         for (field, value, low, high, accepted) in [
             ("recipes", params.recipes, 30, 100_000, "30 to 100000"),
@@ -81,50 +86,77 @@ impl Table {
                 return Err(Error::Parameter { field, value: value as f64, accepted });
             }
         }
+        let sought = simulated(setting);
         let draws = latin(params.recipes, sought.len(), params.seed);
+        Ok(Self { setting, known, sought, view, make, params: params.clone(), draws })
+    }
+
+    /// The parameters that differ between the recipes.
+    #[must_use]
+    pub fn sought(&self) -> &[Parameter] {
+        &self.sought
+    }
+
+    /// Simulates one of the recipes: its places in the ranges of the sought parameters, and what its windows are like. The same
+    /// whenever it is asked for.
+    ///
+    /// # Errors
+    /// If the recipe cannot be made.
+    pub fn row(&self, row: usize) -> Result<(Vec<f64>, Summary), Error> {
+        let places = &self.draws[row % self.draws.len()];
+        let values = spread_out(self.known, &self.sought, places);
+        let around = Setting { size_px: self.view.simulated_px(), ..self.setting.clone() };
+        let engine = (self.make)(&recipe(&around, &values, |_| true)).map_err(|e| Error::Engine(e.to_string()))?;
+        let windows = self.params.windows;
+        let mut pictures = Vec::with_capacity(windows);
+        for index in row * windows..(row + 1) * windows {
+            let key = Key { seed: self.params.seed, index: index as u64 };
+            pictures.push(self.view.simulate(&engine, key).map_err(|e| Error::Engine(e.to_string()))?);
+        }
+        Ok((places.clone(), Summary::of(&pictures, self.view)?))
+    }
+
+    /// Simulates all of them. The same for the same seed, whatever the threads.
+    ///
+    /// # Errors
+    /// If more than a fifth of the recipes cannot be made, or `tell` says stop.
+    pub fn simulate(self, tell: &Tell<'_>) -> Result<Table, Error> {
+        let recipes = self.params.recipes;
         let done = AtomicUsize::new(0);
-        let stopped = Mutex::new(false);
-        let one = |row: usize| -> Result<Summary, Error> {
-            let go_on = || !stopped.lock().map_or(true, |s| *s);
-            if !go_on() {
+        let stopped = AtomicBool::new(false);
+        let one = |row: usize| -> Result<(Vec<f64>, Summary), Error> {
+            if stopped.load(Ordering::Relaxed) {
                 return Err(Error::Stopped);
             }
-            let values = spread_out(known, sought, &draws[row]);
-            let windows = simulate(setting, &values, |_| true, view, make, params.windows, key_of(params, row));
-            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if !tell(Step::Simulated(count, params.recipes))
-                && let Ok(mut stop) = stopped.lock()
-            {
-                *stop = true;
+            let made = self.row(row);
+            if !tell(Step::Simulated(done.fetch_add(1, Ordering::Relaxed) + 1, recipes)) {
+                stopped.store(true, Ordering::Relaxed);
             }
-            windows
+            made
         };
-        let made: Vec<Result<Summary, Error>> = (0..params.recipes).into_par_iter().map(one).collect();
-        let mut table = Self { sought: sought.to_vec(), places: Vec::new(), statistics: Vec::new(), names: Vec::new() };
+        let made: Vec<Result<(Vec<f64>, Summary), Error>> = (0..recipes).into_par_iter().map(one).collect();
+        if stopped.into_inner() {
+            return Err(Error::Stopped);
+        }
+        let mut table = Table { sought: self.sought, places: Vec::new(), statistics: Vec::new(), names: Vec::new() };
         let mut reason = String::new();
-        for (result, draw) in made.into_iter().zip(draws) {
+        for result in made {
             match result {
-                Ok(summary) => {
+                Ok((places, summary)) => {
                     table.names = summary.names;
                     table.statistics.push(summary.values);
-                    table.places.push(draw);
+                    table.places.push(places);
                 }
-                Err(Error::Stopped) => return Err(Error::Stopped),
                 Err(error) => reason = error.to_string(),
             }
         }
         /// Ranges meet in corners where there is no room for so many cells; more than that is a mistake.
         const MOST_FAILED: f64 = 0.2;
-        if ((params.recipes - table.places.len()) as f64) > MOST_FAILED * params.recipes as f64 {
-            return Err(Error::Table { made: table.places.len(), asked: params.recipes, reason });
+        if ((recipes - table.places.len()) as f64) > MOST_FAILED * recipes as f64 {
+            return Err(Error::Table { made: table.places.len(), asked: recipes, reason });
         }
         Ok(table)
     }
-}
-
-/// The first window of a recipe of the table.
-fn key_of(params: &TableParams, row: usize) -> Key {
-    Key { seed: params.seed, index: (row * params.windows) as u64 }
 }
 
 /// The known values with other places of those that are sought.
@@ -134,34 +166,6 @@ pub(crate) fn spread_out(known: &Values, sought: &[Parameter], places: &[f64]) -
         values.set(*parameter, parameter.prior().value(*place));
     }
     values
-}
-
-/// What windows of a recipe are like. `setting` is that of whole fields.
-pub(crate) fn simulate(
-    setting: &Setting,
-    values: &Values,
-    fitted: impl Fn(Parameter) -> bool,
-    view: &View,
-    make: &MakeEngine<'_>,
-    windows: usize,
-    first: Key,
-) -> Result<Summary, Error> {
-    let around = Setting { size_px: view.simulated_px(), ..setting.clone() };
-    let engine = make(&recipe(&around, values, fitted)).map_err(|e| Error::Engine(e.to_string()))?;
-    let mut names = Vec::new();
-    let window = |i: usize| -> Result<(Window, Vec<String>), Error> {
-        let key = Key { index: first.index + i as u64, ..first };
-        let picture = view.simulate(&engine, key).map_err(|e| Error::Engine(e.to_string()))?;
-        Window::new(&picture, view)
-    };
-    // What is the same everywhere, such as a field without anything on it, cannot be measured: it is left out.
-    let mut made = Vec::with_capacity(windows);
-    for i in 0..windows {
-        let (window, of_window) = window(i)?;
-        names = of_window;
-        made.push(window);
-    }
-    Ok(Summary::new(&made, &names))
 }
 
 /// Places over 0 to 1 in so many dimensions: in each, every part of the range is met once (a Latin hypercube).
@@ -196,20 +200,6 @@ fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
 pub fn unseen(count: usize, seed: u64) -> Vec<[f64; PARAMETERS.len()]> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     (0..count).map(|_| std::array::from_fn(|_| unit(&mut rng))).collect()
-}
-
-/// JSON has no NaN: it is written as null.
-pub(crate) mod rows {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(rows: &[Vec<f64>], to: S) -> Result<S::Ok, S::Error> {
-        rows.serialize(to)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Vec<f64>>, D::Error> {
-        let rows = Vec::<Vec<Option<f64>>>::deserialize(from)?;
-        Ok(rows.into_iter().map(|r| r.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect()).collect())
-    }
 }
 
 #[cfg(test)]

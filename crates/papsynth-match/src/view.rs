@@ -24,6 +24,7 @@ const MARGIN_UM: f64 = 20.0;
 pub struct View {
     /// Columns and rows of a window.
     pub window_px: [usize; 2],
+    pub(crate) pixel_um: f64,
     margin_px: usize,
     from: NucleiFrom,
     pub(crate) gauge: Gauge,
@@ -42,7 +43,7 @@ impl View {
             ..GaugeParams::default()
         })?;
         let window_px = [0, 1].map(|i| field_px[i].min(WINDOW_PX[i]));
-        Ok(Self { window_px, margin_px: whole(MARGIN_UM / pixel_um), from, gauge })
+        Ok(Self { window_px, pixel_um, margin_px: whole(MARGIN_UM / pixel_um), from, gauge })
     }
 
     /// Columns and rows of what is simulated for a window.
