@@ -64,11 +64,20 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         }
         shell::run(&mut fit)?;
         let init = folder.join(format!("default-{grade}.toml"));
-        let _ = fs::remove_file(&init);
-        shell::run(program(workspace).args(["init", "--preset", preset, "--out"]).arg(&init))?;
-        for (what, recipe) in [("default", &init), ("matched", &matched)] {
+        let scanner = folder.join("extended-focus.toml");
+        for (preset, file) in [(preset, &init), ("extended-focus", &scanner)] {
+            let _ = fs::remove_file(file);
+            shell::run(program(workspace).args(["init", "--preset", preset, "--out"]).arg(file))?;
+        }
+        let mut recipes = vec![("default", &init), ("matched", &matched)];
+        if grade == "N" {
+            recipes.push(("extended-focus", &scanner));
+        }
+        for (what, recipe) in recipes {
             let fields = folder.join(format!("fields-{what}-{grade}"));
-            let words: [OsString; 3] = [recipe.into(), "--frames".into(), FRAMES.into()];
+            // Few real fields are of one slide.
+            let words: [OsString; 5] =
+                [recipe.into(), "--frames".into(), FRAMES.into(), "--set".into(), "slide.fields=1".into()];
             dataset::generate(workspace, &fields, words)?;
             let report = folder.join(format!("report-{what}-{grade}"));
             let mut judge = program(workspace);

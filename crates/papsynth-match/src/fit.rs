@@ -1,7 +1,7 @@
 //! The whole way: measure, simulate, regress, search.
 
 use papsynth::key::Key;
-use papsynth::recipe::Recipe;
+use papsynth::recipe::{self, Recipe};
 use papsynth_judge::Picture;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -170,8 +170,10 @@ impl Match {
     /// The setting of fields and what is known beforehand of their values.
     #[must_use]
     pub fn setting(&self, measured: &Measured) -> (Setting, Values) {
+        // Pictures of extended focus have more than their noise in common.
+        let fused = measured.extended && self.base.focus.picture == recipe::Picture::Planes;
         let setting = Setting {
-            base: self.base.clone(),
+            base: if fused { self.base.clone().fused() } else { self.base.clone() },
             size_px: measured.size_px,
             pixel_um: self.params.pixel.um(),
             bits: measured.bits,

@@ -67,7 +67,7 @@ macro_rules! parameters {
 
 parameters! {
     /// Mean light of the empty slide, a part of full scale: what scatter takes, half its strength, is off.
-    Level: Measured, Linear 0.55..0.97 "", "background.level: mean light";
+    Level: Measured, Linear 0.55..1.0 "", "background.level: mean light";
     /// Its standard deviation between fields.
     LevelSpread: Measured, Linear 0.0..0.04 "", "background.level: sd";
     /// Fall of the light towards the left and right border.
@@ -137,7 +137,7 @@ parameters! {
     /// Drifts of faint dirt.
     Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.drifts: median";
     /// Unevenness of the light.
-    Scatter: Simulated, Logarithmic 0.001..0.03 "", "background.scatter: mean";
+    Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.scatter: mean";
 }
 
 impl Parameter {

@@ -83,11 +83,12 @@ impl Setting {
             Illumination::Bowl { x2, y2, .. } => (centre(x2), centre(y2)),
             Illumination::Border { .. } => (0.0, 0.0),
         };
-        let grey = level * LEVELS;
         let camera = &base.camera;
-        let per_dn = centre(&camera.full_well_e) / LEVELS;
-        let (photons, read) = (grey / per_dn, centre(&camera.read_noise_e) / per_dn);
-        let pattern = centre(&camera.prnu) * grey;
+        let glare = centre(&camera.glare_removed);
+        let signal = signal(level, glare);
+        let per_dn = centre(&camera.full_well_e) * (1.0 - glare) / LEVELS;
+        let (photons, read) = (signal / per_dn, centre(&camera.read_noise_e) / per_dn);
+        let pattern = centre(&camera.prnu) * signal;
         let noise = photons + read * read + pattern * pattern + ROUNDING;
         let counts: f64 = base.cells.values().map(|mix| centre(&mix.count)).sum();
         let superficial = base.cells.get("superficial").map_or(0.0, |mix| centre(&mix.count));
@@ -180,7 +181,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
 
     if either(P::Level, P::LevelSpread) {
         let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
-        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 0.99);
+        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 1.1);
     }
     if either(P::BowlAcross, P::BowlDown) {
         let off_centre = match &r.background.illumination {
@@ -261,6 +262,11 @@ fn base_area(base: &Recipe) -> f64 {
     w * h * p * p * 1e-6
 }
 
+/// Light of the empty slide with the glare that is taken off, in grey levels of what is left.
+fn signal(level: f64, glare: f64) -> f64 {
+    LEVELS * (level + glare / (1.0 - glare))
+}
+
 /// The noise of the empty slide, divided between photons, reading and a pattern.
 fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     if !(on(P::Noise) || on(P::Photons) || on(P::Pattern)) {
@@ -268,22 +274,23 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     }
     /// Neither part is less than this of what is left of the noise.
     const LEAST: f64 = 0.02;
-    let grey = or_base(P::Level) * LEVELS;
+    let glare = centre(&r.camera.glare_removed);
+    let signal = signal(or_base(P::Level), glare);
     let all = or_base(P::Noise) * or_base(P::Noise);
     let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;
     let rest = (all - pattern - ROUNDING).max(0.1 * all);
     let photons = or_base(P::Photons).clamp(LEAST, 1.0 - LEAST);
-    let per_dn = grey / (photons * rest);
+    let per_dn = signal / (photons * rest);
     let read = per_dn * ((1.0 - photons) * rest).sqrt();
     let camera = &mut r.camera;
-    camera.full_well_e = number(per_dn * LEVELS);
+    camera.full_well_e = number(per_dn * LEVELS / (1.0 - glare));
     // A spread of all noise is laid on the reading alone.
     let spread = (setting.spreads.noise / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
     camera.read_noise_rms_e = 0.0.into();
     camera.dsnu_e = 0.0.into();
     camera.dark_current_e_per_s = 0.0.into();
-    camera.prnu = number(pattern.sqrt() / grey);
+    camera.prnu = number(pattern.sqrt() / signal);
 }
 
 fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {

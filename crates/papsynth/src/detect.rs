@@ -24,6 +24,8 @@ const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1
 /// The camera of a scene.
 pub(crate) struct Detector {
     channels: Vec<Channel>,
+    /// Bits of the grey levels that are handed over.
+    bits: u32,
     /// How colours are made of the channels, if they are.
     srgb: Option<Srgb>,
     jpeg: Option<Jpeg>,
@@ -90,16 +92,18 @@ impl Detector {
     pub(crate) fn new(scene: &Scene) -> Result<Self, String> {
         let camera = scene.camera;
         let jpeg = (camera.jpeg_quality > 0).then(|| jpeg(&camera)).transpose()?;
+        // What is fused is rounded once more afterwards.
+        let unfused = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
         match scene.light {
             SceneLight::Monochrome { .. } => {
-                let channels = vec![Channel::new(&camera, camera.bits, 1.0)?];
-                Ok(Self { channels, srgb: None, jpeg })
+                let channels = vec![Channel::new(&camera, unfused, 1.0)?];
+                Ok(Self { channels, bits: unfused, srgb: None, jpeg })
             }
             SceneLight::Colour { rendition, .. } => {
                 let colour = colour(scene)?;
-                let bits = match rendition {
-                    Rendition::Raw => camera.bits,
-                    Rendition::Display | Rendition::Srgb => INNER_BITS,
+                let (bits, handed_over) = match rendition {
+                    Rendition::Raw => (unfused, unfused),
+                    Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits),
                 };
                 let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.share);
                 let channels = colour.channels().iter().map(channel).collect::<Result<_, _>>()?;
@@ -108,9 +112,14 @@ impl Detector {
                     Rendition::Display => Some(Srgb::new(&UNCHANGED, INNER_BITS, camera.bits)),
                     Rendition::Srgb => Some(Srgb::new(colour.to_srgb(), INNER_BITS, camera.bits)),
                 };
-                Ok(Self { channels, srgb, jpeg })
+                Ok(Self { channels, bits: handed_over, srgb, jpeg })
             }
         }
+    }
+
+    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
+    pub(crate) fn bits(&self) -> u32 {
+        self.bits
     }
 
     /// Light as a fraction of full scale becomes mean electrons.

@@ -7,13 +7,24 @@
 use crate::scene::Fusion;
 
 /// Filters what noise has added to the expected grey levels so that neighbours correlate as they should. Its variance
-/// stays what it was.
-pub(crate) fn correlate(grey: &mut [u16], expected: &[f32], width: usize, channels: usize, fusion: &Fusion, bits: u32) {
+/// stays what it was. Grey levels and expected ones come with the first number of bits and leave with the second.
+pub(crate) fn correlate(
+    grey: &mut [u16],
+    expected: &mut [f32],
+    width: usize,
+    channels: usize,
+    fusion: &Fusion,
+    bits: [u32; 2],
+) {
     let row = width * channels;
-    if row == 0 || (fusion.noise_correlation == [0.0; 2] && fusion.noise_skew == 0.0) {
+    if row == 0 {
         return;
     }
-    let own: Vec<f32> = grey.iter().zip(expected).map(|(grey, mean)| f32::from(*grey) - mean).collect();
+    let [before, top] = bits.map(|bits| ((1_u32 << bits.min(16)) - 1) as f32);
+    let scale = top / before;
+    let own: Vec<f32> = grey.iter().zip(&*expected).map(|(grey, mean)| scale * (f32::from(*grey) - mean)).collect();
+    expected.iter_mut().for_each(|mean| *mean *= scale);
+    let expected = &*expected;
     let variance = own.iter().map(|n| f64::from(n * n)).sum::<f64>() / own.len() as f64;
     // Rounding adds noise that neighbours do not share.
     let diluted = 1.0 + ROUNDING / variance.max(ROUNDING);
@@ -41,7 +52,6 @@ pub(crate) fn correlate(grey: &mut [u16], expected: &[f32], width: usize, channe
     }
     // To first order this changes the correlation along the diagonals alone.
     let skew = (0.5 * fusion.noise_skew) as f32;
-    let top = ((1_u32 << bits.min(16)) - 1) as f32;
     let clipped = Clipped::new(PLANE_NOISE * variance.sqrt());
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let [above, below] = [-1, 1].map(|step| mirrored(y, step, height) * row);
@@ -192,11 +202,11 @@ mod tests {
     fn neighbours_share_as_much_noise_as_asked_and_its_variance_stays() {
         let (width, height) = (320, 300);
         let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
-        let expected = vec![2000.0_f32; width * height];
+        let mut expected = vec![2000.0_f32; width * height];
         let mut grey: Vec<u16> =
             (0..width * height).map(|_| (2000.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
         let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &expected, width, 1, &fusion, 12);
+        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
         let noise: Vec<f64> = grey.iter().map(|g| f64::from(*g) - 2000.0).collect();
         let product = |step: usize| {
             let pairs = (0..noise.len() - step).filter(|i| step + 1 >= width || i % width + step < width);
@@ -218,12 +228,12 @@ mod tests {
         let (width, height) = (320, 300);
         let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "noise");
         // Waves of 1900 levels in noise of 15.
-        let expected: Vec<f32> =
+        let mut expected: Vec<f32> =
             (0..width * height).map(|i| 2000.0 + 1900.0 * libm::sin((i % width) as f64 * 0.7) as f32).collect();
         let mut grey: Vec<u16> =
             expected.iter().map(|e| (f64::from(*e) + 0.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
         let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &expected, width, 1, &fusion, 12);
+        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
         let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
         let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
         let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64;
@@ -241,5 +251,22 @@ mod tests {
             assert!((deviation_below(most) - sd).abs() < 0.01, "{most}: {sd}");
         }
         assert!((deviation_below(6.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn faint_noise_is_shared_too() {
+        let (width, height) = (320, 300);
+        let mut rng = Key { seed: 6, index: 0 }.stream("test", 0, "noise");
+        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
+        let mut expected = vec![200.25 * 257.0_f32; width * height];
+        let mut grey: Vec<u16> =
+            expected.iter().map(|e| (f64::from(*e) + 0.9 * 257.0 * random::normal(&mut rng)) as u16).collect();
+        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.0 };
+        correlate(&mut grey, &mut expected, width, 1, &fusion, [16, 8]);
+        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
+        let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
+        let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64 / variance;
+        assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
+        assert!((down - 0.4).abs() < 0.03, "{down}");
     }
 }

@@ -316,7 +316,8 @@ impl<'a> Exposure<'a> {
         self.rendering.detector.finish(width, &self.keys, grey, self.developing);
         let scene = &self.rendering.scene;
         if let Some(fusion) = &scene.fusion {
-            fuse::correlate(grey, noise_free, width, scene.channels(), fusion, scene.camera.bits);
+            let bits = [self.rendering.detector.bits(), scene.camera.bits];
+            fuse::correlate(grey, noise_free, width, scene.channels(), fusion, bits);
         }
         self.rendering.detector.compress(width, grey);
         *saturated = self.developing.saturated();

@@ -182,31 +182,40 @@ fn oral() -> Recipe {
     recipe
 }
 
-/// Numbers of pictures of extended focus: three sets of them, of two scanners.
+/// As a scanner of squares of a third of a micrometre shows the default slide.
 fn extended_focus() -> Recipe {
-    let mut recipe = lbc();
+    let mut recipe = lbc().fused();
     recipe.field = Field { width_px: 1280.0.into(), height_px: 960.0.into(), pixel_um: 0.33.into(), ..recipe.field };
-    recipe.focus = Focus {
-        planes: 11.0.into(),
-        step_um: 1.0.into(),
-        picture: Picture::Extended,
-        fused_noise_across: Number::uniform(0.22, 0.28),
-        fused_noise_down: Number::uniform(0.40, 0.44),
-        fused_noise_skew: 0.02.into(),
-        ..recipe.focus
-    };
-    if let Optics::BrightField { extra_blur_um, .. } = &mut recipe.optics {
-        *extra_blur_um = Number::log_normal(0.38, 0.3);
-    }
-    // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
-    recipe.camera.prnu = 0.007.into();
-    recipe.camera.full_well_e = 120_000.0.into();
-    recipe.camera.glare_removed = Number::uniform(0.12, 0.22);
-    recipe.camera.read_noise_e = Number::uniform(350.0, 620.0);
-    recipe.stain.field_texture = Number::log_normal(0.23, 0.3);
     recipe.stain.field_cytoplasm = Number::log_normal(1.1, 0.25);
     recipe.background.level = Number::normal(0.93, 0.05).at_least(0.75).at_most(0.99);
     recipe
+}
+
+impl Recipe {
+    /// The same slide as a scanner shows it that fuses planes to a picture of extended focus: focus, blur, noise and texture, as
+    /// three sets of such pictures have them, of two scanners.
+    #[must_use]
+    pub fn fused(mut self) -> Self {
+        self.focus = Focus {
+            planes: 11.0.into(),
+            step_um: 1.0.into(),
+            picture: Picture::Extended,
+            fused_noise_across: Number::uniform(0.22, 0.28),
+            fused_noise_down: Number::uniform(0.40, 0.44),
+            fused_noise_skew: 0.02.into(),
+            ..self.focus
+        };
+        if let Optics::BrightField { extra_blur_um, .. } = &mut self.optics {
+            *extra_blur_um = Number::log_normal(0.38, 0.3);
+        }
+        // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
+        self.camera.prnu = 0.007.into();
+        self.camera.full_well_e = 120_000.0.into();
+        self.camera.glare_removed = Number::uniform(0.12, 0.22);
+        self.camera.read_noise_e = Number::uniform(350.0, 620.0);
+        self.stain.field_texture = Number::log_normal(0.23, 0.3);
+        self
+    }
 }
 
 fn mix<const N: usize>(counts: [(&str, Number); N]) -> BTreeMap<String, CellMix> {
