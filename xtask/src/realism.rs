@@ -175,6 +175,7 @@ fn forest(workspace: &Workspace, reference: &Path, folder: &Path) -> Result<Stri
         "focus.picture=extended",
         "focus.planes=11",
         "focus.step_um=1.0",
+        "slide.fields=1",
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
     dataset::generate(workspace, &fields, words)?;

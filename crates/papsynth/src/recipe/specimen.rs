@@ -317,9 +317,9 @@ impl Default for Cytoplasm {
             tongues: Number::uniform(0.0, 3.2),
             wrinkles: Number::log_normal(7.0, 0.6),
             wrinkle: Number::log_normal(0.42, 0.42),
-            wrinkle_um: Number::uniform(0.22, 0.55),
+            wrinkle_um: Number::uniform(0.18, 0.5),
             endoplasm: Number::log_normal(0.08, 0.6),
-            clouds: Number::uniform(0.12, 0.36),
+            clouds: Number::uniform(0.10, 0.34),
             clouds_um: Number::uniform(3.0, 14.0),
             flecks: Number::Drawn { law: super::Law::LogNormal(0.14, 0.5), min: 0.0, max: 0.5 },
             flecks_threshold: Number::uniform(0.55, 0.85),
@@ -328,7 +328,7 @@ impl Default for Cytoplasm {
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
             fray_um: Number::log_normal(0.52, 0.5),
-            rim_um: Number::log_normal(3.4, 0.26),
+            rim_um: Number::log_normal(2.2, 0.36),
             wedge: 0.18.into(),
             phase_rad: Number::uniform(0.05, 0.15),
         }
@@ -438,8 +438,8 @@ impl Default for Nucleus {
             rim: Number::uniform(0.0, 0.2),
             dome: Number::uniform(0.3, 0.85),
             wedge: 0.2.into(),
-            clumping: Number::uniform(0.05, 0.55),
-            edge_um: Number::uniform(0.2, 0.55),
+            clumping: Number::uniform(0.0, 0.4),
+            edge_um: Number::uniform(0.0, 0.2),
         }
     }
 }
@@ -482,10 +482,10 @@ impl Default for Stain {
     fn default() -> Self {
         Self {
             slide_cytoplasm: Number::log_normal(1.0, 0.15),
-            slide_nucleus: Number::log_normal(1.0, 0.08),
+            slide_nucleus: Number::log_normal(0.8, 0.17),
             field_cytoplasm: Number::log_normal(1.0, 0.2),
-            field_nucleus: Number::log_normal(1.0, 0.09),
-            field_texture: Number::log_normal(0.6, 0.28),
+            field_nucleus: Number::log_normal(1.0, 0.12),
+            field_texture: Number::log_normal(0.7, 0.28),
             slide_balance: 0.15.into(),
             field_balance: 0.05.into(),
             cell_balance: 0.12.into(),

@@ -192,7 +192,7 @@ fn extended_focus() -> Recipe {
 }
 
 impl Recipe {
-    /// The same slide as a scanner shows it that fuses planes to a picture of extended focus: focus, blur, noise and texture, as
+    /// The same slide as a scanner shows it that fuses planes to a picture of extended focus: focus, blur, soft edges, noise and texture, as
     /// three sets of such pictures have them, of two scanners.
     #[must_use]
     pub fn fused(mut self) -> Self {
@@ -208,11 +208,16 @@ impl Recipe {
         if let Optics::BrightField { extra_blur_um, .. } = &mut self.optics {
             *extra_blur_um = Number::log_normal(0.38, 0.3);
         }
+        // What fusing leaves of edges is softer than the lens: specks stay sharper than nuclei and rims.
+        self.nucleus.edge_um = Number::uniform(0.2, 0.55);
+        self.nucleus.clumping = Number::uniform(0.05, 0.55);
+        self.cytoplasm.rim_um = Number::log_normal(3.4, 0.26);
         // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
         self.camera.prnu = 0.007.into();
         self.camera.full_well_e = 120_000.0.into();
         self.camera.glare_removed = Number::uniform(0.12, 0.22);
         self.camera.read_noise_e = Number::uniform(350.0, 620.0);
+        self.stain.slide_nucleus = Number::log_normal(1.0, 0.12);
         self.stain.field_texture = Number::log_normal(0.23, 0.3);
         self
     }
