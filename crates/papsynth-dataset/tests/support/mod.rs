@@ -98,6 +98,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             read_noise_e: 8.0,
             read_noise_rms_e: 0.0,
             offset_dn: 0.0,
+            glare_removed: 0.0,
             photon_noise: PhotonNoise::Exact,
             prnu: 0.0,
             dsnu_e: 0.0,
