@@ -16,14 +16,14 @@ const FIELD: &str = "--set field.width_px=240 --set field.height_px=180 --set fi
 fn the_recipe_that_is_found_makes_fields() {
     let bench = Bench::new("match-finds");
     bench.good(&format!(
-        "generate --out real --frames 2 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
+        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
     ));
-    let outcome = bench.good("match real --out mine.toml --report mine.json --budget 60 --seed 1 --threads 2");
-    assert!(outcome.out.starts_with("2 fields, 2 windows, "), "{}", outcome.out);
+    let outcome = bench.good("match real --out mine.toml --report mine.json --budget 90 --seed 1 --threads 2");
+    assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);
     assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
     assert!(outcome.err.contains("simulated recipes: 30 of 30"), "{}", outcome.err);
     let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
-    assert!(toml.starts_with("# Matched to 2 fields: ") && toml.contains("# measured: "), "{toml}");
+    assert!(toml.starts_with("# Matched to 3 fields: ") && toml.contains("# measured: "), "{toml}");
     let report: serde_json::Value = serde_json::from_slice(&fs::read(bench.path("mine.json")).unwrap()).unwrap();
     assert_eq!(report["match_report"], 1);
     let answers = report["fit"]["answers"].as_array().unwrap();
