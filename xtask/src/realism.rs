@@ -54,6 +54,8 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
     let mut table = String::from("fields | recipe | judged | AUC (95 %) | between real halves\n---|---|---|---|---\n");
+    let scanner = folder.join("extended-focus.toml");
+    begin(workspace, "extended-focus", &scanner)?;
     for (grade, name, preset) in GRADES {
         let matched = folder.join(format!("matched-{grade}.toml"));
         let mut fit = program(workspace);
@@ -64,11 +66,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         }
         shell::run(&mut fit)?;
         let init = folder.join(format!("default-{grade}.toml"));
-        let scanner = folder.join("extended-focus.toml");
-        for (preset, file) in [(preset, &init), ("extended-focus", &scanner)] {
-            let _ = fs::remove_file(file);
-            shell::run(program(workspace).args(["init", "--preset", preset, "--out"]).arg(file))?;
-        }
+        begin(workspace, preset, &init)?;
         let mut recipes = vec![("default", &init), ("matched", &matched)];
         if grade == "N" {
             recipes.push(("extended-focus", &scanner));
@@ -99,6 +97,12 @@ fn program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
     command.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--"]);
     command
+}
+
+/// Writes the recipe of a preset anew.
+fn begin(workspace: &Workspace, preset: &str, file: &Path) -> Result<()> {
+    let _ = fs::remove_file(file);
+    shell::run(program(workspace).args(["init", "--preset", preset, "--out"]).arg(file))
 }
 
 /// Two folders with every other field of each grade, and what is known of them.

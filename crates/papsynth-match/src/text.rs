@@ -1,7 +1,7 @@
 //! A recipe as TOML: what differs from the default, and what is known of each number.
 
-use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe};
-use serde_json::{Map, Value};
+use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe, is_toml_table, toml_value};
+use serde_json::Value;
 
 use crate::fit::{Answer, Fit, Origin};
 use crate::number::rounded;
@@ -44,14 +44,14 @@ impl Fit {
         let Some(fields) = value.as_object() else { return };
         let other_kind = fields.get("kind") != default.get("kind");
         let (tables, plain): (Vec<_>, Vec<_>) =
-            fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_table(v));
+            fields.iter().filter(|(name, _)| *name != "version").partition(|(_, v)| is_toml_table(v));
         let within = |name: &str| if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
         let mut lines = String::new();
         for (name, value) in plain.iter().filter(|(name, _)| *name != "kind") {
             let notes = self.notes(&within(name));
             if !notes.is_empty() || other_kind || default.get(name) != Some(value) {
                 lines.push_str(&notes);
-                lines.push_str(&format!("{name} = {}\n", inline(value)));
+                lines.push_str(&format!("{name} = {}\n", toml_value(value)));
             }
         }
         if !lines.is_empty() || other_kind {
@@ -113,23 +113,6 @@ fn is_at(field: &str, path: &str) -> bool {
     let path = path.replace("sigma_xy_um", "extra_blur_um");
     let (a, b) = (field.split('.'), path.split('.'));
     a.clone().count() == b.clone().count() && a.zip(b).all(|(a, b)| a == "*" || a == b)
-}
-
-/// Distributions are tables in JSON but are written on one line.
-fn is_table(value: &Value) -> bool {
-    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
-    value.as_object().is_some_and(|map: &Map<String, Value>| !LAWS.iter().any(|law| map.contains_key(*law)))
-}
-
-fn inline(value: &Value) -> String {
-    match value {
-        Value::Object(map) => {
-            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect();
-            format!("{{ {} }}", inner.join(", "))
-        }
-        Value::Array(items) => format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", ")),
-        other => other.to_string(),
-    }
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
-use support::{LINE, Outcome, enlarged, picture, write};
+use support::{LINE, Outcome, enlarged, picture, save, write};
 
 /// Camera pixels of a tile, and how much larger it is shown.
 const TILE: [u32; 2] = [210, 160];
@@ -112,8 +112,7 @@ fn main() -> Outcome<()> {
             write(&mut page, label, [x, corner[1] + LINE + TILE[1] * ZOOM + 2], 1);
         }
     }
-    page.save(&out)?;
-    Ok(())
+    save(page, &out)
 }
 
 /// The small field on which a section is shown.

@@ -14,7 +14,7 @@ use papsynth::recipe::{
 use papsynth::scene::Kind;
 use papsynth::truth::Part;
 use papsynth::{Engine, Frame, Inputs};
-use support::{Outcome, around, enlarged, picture, write};
+use support::{Outcome, around, enlarged, picture, save, write};
 
 /// Camera pixels of a tile, and how much larger they are shown.
 const TILE: [u32; 2] = [150, 120];
@@ -46,8 +46,7 @@ fn main() -> Outcome<()> {
         let fits = chapter.name.len() as u32 * 8 * DOT <= TILE[0] * ZOOM;
         write(&mut page, chapter.name, [x + 4, y + TILE[1] * ZOOM + 4], if fits { DOT } else { 1 });
     }
-    page.save(&out)?;
-    Ok(())
+    save(page, &out)
 }
 
 /// What is shown on one tile.

@@ -7,7 +7,7 @@
 use crate::scene::Fusion;
 
 /// Filters what noise has added to the expected grey levels so that neighbours correlate as they should. Its variance
-/// stays what it was. Grey levels and expected ones come with the first number of bits and leave with the second.
+/// stays what it was, but just below the largest grey level. Grey levels and expected ones come with the first number of bits and leave with the second.
 pub(crate) fn correlate(
     grey: &mut [u16],
     expected: &mut [f32],

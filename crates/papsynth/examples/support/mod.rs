@@ -3,8 +3,19 @@
 #![allow(dead_code, clippy::cast_sign_loss, reason = "no example uses all of it; numbers are small")]
 
 use font8x8::UnicodeFonts;
-use image::{Rgb, RgbImage};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{DynamicImage, Rgb, RgbImage};
 use papsynth::Frame;
+
+/// Writes a page as a PNG, as small as it gets: grey where it has no colours.
+pub(crate) fn save(page: RgbImage, out: &str) -> Outcome<()> {
+    let coloured = page.pixels().any(|Rgb([r, g, b])| r != g || g != b);
+    let page = DynamicImage::from(page);
+    let page = if coloured { page } else { page.into_luma8().into() };
+    let file = std::io::BufWriter::new(std::fs::File::create(out)?);
+    page.write_with_encoder(PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive))?;
+    Ok(())
+}
 
 /// What an example's steps give.
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;

@@ -27,6 +27,7 @@ pub use imaging::{
 };
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
+pub use print::{is_toml_table, toml_value};
 pub use specimen::{
     Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam,
     ShapeSpread, Sheet, Slide, Stain, TintMix,

@@ -27,10 +27,10 @@ pub(super) fn commented_toml(recipe: &Recipe) -> String {
 /// Prints the fields of a table, plain ones first, tables after them.
 fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Value) {
     let Some(fields) = value.as_object() else { return };
-    let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(name, value)| is_table(name, value));
+    let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(_, value)| is_toml_table(value));
     for (name, value) in plain {
         comment(out, &describe(schema, name, value, fields, root));
-        out.push_str(&format!("{name} = {}\n", inline(value)));
+        out.push_str(&format!("{name} = {}\n", toml_value(value)));
     }
     for (name, value) in tables {
         let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
@@ -42,19 +42,23 @@ fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Val
     }
 }
 
-/// Distributions are tables in JSON but are written on one line.
-fn is_table(_name: &str, value: &Value) -> bool {
+/// Whether a value of a recipe, as JSON, is a table of its own in TOML. Distributions are tables in JSON but are written on one
+/// line.
+#[must_use]
+pub fn is_toml_table(value: &Value) -> bool {
     const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
     value.as_object().is_some_and(|map| !LAWS.iter().any(|law| map.contains_key(*law)))
 }
 
-fn inline(value: &Value) -> String {
+/// A value of a recipe, as JSON, on one line of TOML.
+#[must_use]
+pub fn toml_value(value: &Value) -> String {
     match value {
         Value::Object(map) => {
-            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect();
+            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", toml_value(v))).collect();
             format!("{{ {} }}", inner.join(", "))
         }
-        Value::Array(items) => format!("[{}]", items.iter().map(inline).collect::<Vec<_>>().join(", ")),
+        Value::Array(items) => format!("[{}]", items.iter().map(toml_value).collect::<Vec<_>>().join(", ")),
         Value::String(text) => toml::Value::String(text.clone()).to_string(),
         other => other.to_string(),
     }
