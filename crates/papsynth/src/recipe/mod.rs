@@ -4,6 +4,7 @@
 //! [`Model`](crate::model::Model). Lengths are in micrometres, angles in degrees, probabilities from 0 to 1,
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
+mod camera;
 mod check;
 mod imaging;
 mod number;
@@ -20,11 +21,9 @@ pub use crate::debris::{
     Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
+pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
 pub use check::Problem;
-pub use imaging::{
-    Background, Binning, Camera, CameraPreset, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, PhotonNoise,
-    Picture, Rendition, Subsampling,
-};
+pub use imaging::{Background, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, Picture, Rendition};
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use print::{is_toml_table, toml_value};
