@@ -40,8 +40,8 @@ fn fields(count: u64, from: NucleiFrom) -> Vec<Picture> {
         (Parameter::Level, 0.8),
         (Parameter::Noise, 3.0),
         (Parameter::Down, 0.3),
-        (Parameter::Blur, 0.5),
-        (Parameter::Cells, 400.0),
+        (Parameter::Blur, 0.8),
+        (Parameter::Cells, 800.0),
     ] {
         values.set(parameter, value);
     }

@@ -242,10 +242,10 @@ pub struct Folds {
 impl Default for Folds {
     fn default() -> Self {
         Self {
-            flap: 0.32.into(),
+            flap: 0.38.into(),
             roll: 0.18.into(),
             cigar: 0.02.into(),
-            depth: Number::uniform(0.10, 0.45),
+            depth: Number::uniform(0.10, 0.50),
             radius_um: Number::uniform(0.35, 0.8),
         }
     }
@@ -312,9 +312,9 @@ impl Default for Cytoplasm {
             sheet: Sheet::Xpbd,
             excess: Number::uniform(1.04, 1.16),
             folds: Folds::default(),
-            corners: Number::uniform(0.15, 0.65),
-            notches: Number::uniform(0.0, 4.0),
-            tongues: Number::uniform(0.0, 3.2),
+            corners: Number::uniform(0.10, 0.60),
+            notches: Number::uniform(0.0, 14.0),
+            tongues: Number::uniform(0.0, 9.0),
             wrinkles: Number::log_normal(7.0, 0.6),
             wrinkle: Number::log_normal(0.42, 0.42),
             wrinkle_um: Number::uniform(0.18, 0.5),
@@ -327,7 +327,7 @@ impl Default for Cytoplasm {
             grain: Number::uniform(0.06, 0.18),
             granular: 0.2.into(),
             granules: Number::log_normal(12.0, 0.6),
-            fray_um: Number::log_normal(0.52, 0.5),
+            fray_um: Number::log_normal(0.65, 0.45),
             rim_um: Number::log_normal(2.2, 0.36),
             wedge: 0.18.into(),
             phase_rad: Number::uniform(0.05, 0.15),
@@ -481,8 +481,8 @@ pub struct Stain {
 impl Default for Stain {
     fn default() -> Self {
         Self {
-            slide_cytoplasm: Number::log_normal(1.0, 0.15),
-            slide_nucleus: Number::log_normal(0.8, 0.17),
+            slide_cytoplasm: Number::log_normal(0.75, 0.2),
+            slide_nucleus: Number::log_normal(0.75, 0.25),
             field_cytoplasm: Number::log_normal(1.0, 0.2),
             field_nucleus: Number::log_normal(1.0, 0.12),
             field_texture: Number::log_normal(0.7, 0.28),

@@ -11,12 +11,12 @@ const CORNERS: [usize; 2] = [5, 5];
 /// How far a side bows outwards at most, relative to its length; half of that inwards.
 const BOW: f64 = 0.07;
 
-/// Depth of notches and length of tongues, relative to the cell's radius: from, to.
-const NOTCH: [f64; 2] = [0.06, 0.28];
-const TONGUE: [f64; 2] = [0.08, 0.35];
+/// Depth of notches and length of tongues, relative to the cell's radius: from, to. Their logarithms are uniform: most are small.
+const NOTCH: [f64; 2] = [0.03, 0.25];
+const TONGUE: [f64; 2] = [0.03, 0.30];
 
 /// Width of notches and tongues at their foot, relative to their depth.
-const FOOT: [f64; 2] = [0.6, 1.6];
+const FOOT: [f64; 2] = [0.7, 2.2];
 
 /// How often an outline of 180 points is smoothed by its neighbours: corners of a fold of cytoplasm are about a micrometre
 /// round.
@@ -34,7 +34,7 @@ pub(super) fn shaped(outline: Vec<Point>, detail: &CellDetail, rng: &mut Stream)
     let radius = (before / core::f64::consts::PI).sqrt();
     for (count, [low, high], sign) in [(detail.notches, NOTCH, -1.0), (detail.tongues, TONGUE, 1.0)] {
         for _ in 0..count {
-            let depth = sign * radius * random::between(low, high, rng);
+            let depth = sign * radius * low * libm::pow(high / low, random::between(0.0, 1.0, rng));
             if let Some(poked) = sound(poked(&shape, depth, rng)) {
                 shape = poked;
             }

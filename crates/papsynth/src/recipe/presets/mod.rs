@@ -135,12 +135,23 @@ fn grouped(recipe: &mut Recipe, class: &str, count: Number, form: GroupForm, siz
 }
 
 fn lsil() -> Recipe {
+    let mut recipe = lesion();
+    recipe.cells = mix([
+        ("intermediate", Number::uniform(2.0, 8.0)),
+        ("superficial", Number::uniform(1.0, 5.0)),
+        ("ascus", Number::uniform(8.0, 24.0)),
+        ("lsil", Number::uniform(1.0, 5.0)),
+    ]);
+    recipe.stain.field_cytoplasm = Number::log_normal(1.1, 0.25);
+    recipe
+}
+
+/// What slides of lesions have in common: cells in wide sheets, nuclei flatter than normal ones.
+fn lesion() -> Recipe {
     let mut recipe = lbc();
-    recipe.cells.extend(mix([
-        ("intermediate", Number::uniform(6.0, 16.0)),
-        ("superficial", Number::uniform(2.0, 8.0)),
-        ("lsil", Number::uniform(3.0, 10.0)),
-    ]));
+    let (count, radius_um) = (Number::uniform(2.0, 6.0), Number::uniform(25.0, 60.0));
+    recipe.layout = Layout::Clusters { count, radius_um, outside: defaults::outside() };
+    recipe.nucleus.dome = Number::uniform(0.1, 0.8);
     recipe
 }
 
@@ -186,7 +197,6 @@ fn oral() -> Recipe {
 fn extended_focus() -> Recipe {
     let mut recipe = lbc().fused();
     recipe.field = Field { width_px: 1280.0.into(), height_px: 960.0.into(), pixel_um: 0.33.into(), ..recipe.field };
-    recipe.stain.field_cytoplasm = Number::log_normal(1.1, 0.25);
     recipe.background.level = Number::normal(0.93, 0.05).at_least(0.75).at_most(0.99);
     recipe
 }
@@ -206,10 +216,10 @@ impl Recipe {
             ..self.focus
         };
         if let Optics::BrightField { extra_blur_um, .. } = &mut self.optics {
-            *extra_blur_um = Number::log_normal(0.38, 0.3);
+            *extra_blur_um = Number::log_normal(0.36, 0.35);
         }
         // What fusing leaves of edges is softer than the lens: specks stay sharper than nuclei and rims.
-        self.nucleus.edge_um = Number::uniform(0.2, 0.55);
+        self.nucleus.edge_um = Number::uniform(0.1, 0.5);
         self.nucleus.clumping = Number::uniform(0.05, 0.55);
         self.cytoplasm.rim_um = Number::log_normal(3.4, 0.26);
         // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
@@ -217,6 +227,7 @@ impl Recipe {
         self.camera.full_well_e = 120_000.0.into();
         self.camera.glare_removed = Number::uniform(0.12, 0.22);
         self.camera.read_noise_e = Number::uniform(350.0, 620.0);
+        self.stain.slide_cytoplasm = Number::log_normal(1.1, 0.15);
         self.stain.slide_nucleus = Number::log_normal(1.0, 0.12);
         self.stain.field_texture = Number::log_normal(0.23, 0.3);
         self
@@ -311,12 +322,15 @@ fn conventional() -> Recipe {
 }
 
 fn high_grade() -> Recipe {
-    let mut recipe = lbc();
+    let mut recipe = lesion();
     recipe.cells = mix([
-        ("intermediate", Number::uniform(8.0, 18.0)),
-        ("superficial", Number::uniform(2.0, 8.0)),
-        ("high-grade", Number::uniform(5.0, 14.0)),
+        ("intermediate", Number::uniform(0.0, 4.0)),
+        ("superficial", Number::uniform(0.0, 2.0)),
+        ("ascus", Number::uniform(5.0, 15.0)),
+        ("lsil", Number::uniform(0.0, 4.0)),
+        ("high-grade", Number::uniform(2.0, 7.0)),
     ]);
+    recipe.stain.field_cytoplasm = Number::log_normal(0.68, 0.25);
     recipe
 }
 
