@@ -418,7 +418,9 @@ fn specks_of_either_form_have_the_size_they_were_given() {
     for form in [papsynth::recipe::SpeckForm::Round, papsynth::recipe::SpeckForm::Dilated] {
         recipe.debris.speckles.form = form;
         let frame = frame(&recipe, 0);
-        let inside = frame.finished.truth.objects.iter().filter(|o| o.kind == Kind::Speckle && !o.truncated);
+        let specks = frame.finished.truth.objects.iter().filter(|o| o.kind == Kind::Speckle && !o.truncated);
+        let inside: Vec<_> = specks.collect();
+        assert!(inside.len() >= 15, "{form:?}: {} specks", inside.len());
         for speck in inside {
             // A capsule of radius 2.5 px and length 1, or two diamonds of 13 px side by side.
             let expected = match form {

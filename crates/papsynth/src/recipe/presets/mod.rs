@@ -142,7 +142,7 @@ fn lsil() -> Recipe {
         ("ascus", Number::uniform(8.0, 24.0)),
         ("lsil", Number::uniform(1.0, 5.0)),
     ]);
-    recipe.stain.field_cytoplasm = Number::log_normal(1.1, 0.25);
+    recipe.stain.field_cytoplasm = Number::log_normal(1.05, 0.25);
     recipe
 }
 
@@ -151,7 +151,7 @@ fn lesion() -> Recipe {
     let mut recipe = lbc();
     let (count, radius_um) = (Number::uniform(2.0, 6.0), Number::uniform(25.0, 60.0));
     recipe.layout = Layout::Clusters { count, radius_um, outside: defaults::outside() };
-    recipe.nucleus.dome = Number::uniform(0.1, 0.8);
+    recipe.nucleus.dome = Number::uniform(0.0, 0.6);
     recipe
 }
 
@@ -219,8 +219,8 @@ impl Recipe {
             *extra_blur_um = Number::log_normal(0.36, 0.35);
         }
         // What fusing leaves of edges is softer than the lens: specks stay sharper than nuclei and rims.
-        self.nucleus.edge_um = Number::uniform(0.1, 0.5);
-        self.nucleus.clumping = Number::uniform(0.05, 0.55);
+        self.nucleus.edge_um = Number::uniform(0.05, 0.5);
+        self.nucleus.clumping = Number::uniform(0.0, 0.5);
         self.cytoplasm.rim_um = Number::log_normal(3.4, 0.26);
         // Two thirds of the variance of noise are the same in every picture; half of it is left in nuclei.
         self.camera.prnu = 0.007.into();
