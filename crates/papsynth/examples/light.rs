@@ -22,8 +22,8 @@ fn main() -> Outcome<()> {
     let name = arguments.next().unwrap_or_default();
     let out = arguments.next().unwrap_or_else(|| format!("target/light-{name}.png"));
     match name.as_str() {
-        "focus" => through_focus(&nucleus(), 6)?.save(out)?,
-        "halo" => through_focus(&speck(), 8)?.save(out)?,
+        "focus" => through_focus(&nucleus(), 48, 4)?.save(out)?,
+        "halo" => through_focus(&speck(), 32, 8)?.save(out)?,
         "colour" => colour()?.save(out)?,
         _ => return Err("usage: light NAME OUT.png, NAME one of focus, halo, colour".into()),
     }
@@ -80,8 +80,8 @@ fn speck() -> Recipe {
     recipe
 }
 
-/// The planes side by side: products, Abbe, Gaussians from top to bottom.
-fn through_focus(recipe: &Recipe, zoom: u32) -> Outcome<GrayImage> {
+/// The planes side by side: products, Abbe, Gaussians from top to bottom; so many pixels of the middle of the field each way.
+fn through_focus(recipe: &Recipe, pixels: u32, zoom: u32) -> Outcome<GrayImage> {
     const GAP: u32 = 4;
     let (engine, scene) = scene(recipe)?;
     let with = |imaging: Imaging| {
@@ -93,7 +93,7 @@ fn through_focus(recipe: &Recipe, zoom: u32) -> Outcome<GrayImage> {
     };
     let gaussian = SceneOptics::Gaussian { sigma_xy_um: 0.225, sigma_z_um_per_um: 0.25 };
     let rows = [with(Imaging::Product), with(Imaging::Abbe), Scene { optics: gaussian, ..scene.clone() }];
-    let side = 32 * zoom;
+    let side = pixels * zoom;
     let columns = STAGES_UM.len() as u32;
     let mut sheet = GrayImage::from_pixel(columns * (side + GAP) - GAP, 3 * (side + GAP) - GAP, image::Luma([255]));
     for (row, scene) in (0..).zip(rows) {
@@ -101,7 +101,7 @@ fn through_focus(recipe: &Recipe, zoom: u32) -> Outcome<GrayImage> {
         engine.image::<Error>(scene, Threads::All, |plane| {
             let grey = |x: u32, y: u32| plane.grey[(y as usize) * 64 + x as usize].min(255) as u8;
             let whole = GrayImage::from_fn(64, 64, |x, y| image::Luma([grey(x, y)]));
-            let middle = image::imageops::crop_imm(&whole, 16, 16, 32, 32).to_image();
+            let middle = image::imageops::crop_imm(&whole, 32 - pixels / 2, 32 - pixels / 2, pixels, pixels).to_image();
             let large = image::imageops::resize(&middle, side, side, image::imageops::FilterType::CatmullRom);
             let (x, y) = (i64::from(column * (side + GAP)), i64::from(row * (side + GAP)));
             image::imageops::replace(&mut sheet, &large, x, y);

@@ -29,7 +29,7 @@ const DOT: u32 = 2;
 fn main() -> Outcome<()> {
     let mut arguments = std::env::args().skip(1);
     let chapters = match arguments.next().as_deref() {
-        Some("cells") => cells(),
+        Some("cells") => all_of(&Model::builtin(), cells())?,
         Some("debris") => debris(),
         _ => return Err("usage: picture_book cells|debris OUT.png [colour]".into()),
     };
@@ -72,9 +72,9 @@ fn chapter(name: &'static str, kind: Kind, add: impl FnOnce(&mut Debris)) -> Cha
     Chapter { name, kind, recipe }
 }
 
-/// The same seen from farther away.
+/// The same seen from farther away, as all cells are.
 fn far(mut chapter: Chapter) -> Chapter {
-    chapter.recipe.field.pixel_um = 0.45.into();
+    chapter.recipe.field.pixel_um = 0.55.into();
     chapter
 }
 
@@ -106,6 +106,7 @@ fn cells() -> Vec<Chapter> {
         far(class("metaplastic", 4.0, heap(4.0))),
         far(class("endocervical", 9.0, group(GroupForm::Palisade, 9.0, 0.46))),
         far(class("endocervical-en-face", 19.0, group(GroupForm::Honeycomb, 19.0, 0.85))),
+        far(class("ascus", 1.0, Group::default())),
         far(class("lsil", 2.0, heap(2.0))),
         far(class("high-grade", 3.0, heap(3.0))),
         far(class("severe", 5.0, heap(5.0))),
@@ -114,6 +115,14 @@ fn cells() -> Vec<Chapter> {
         far(class("oral-intermediate", 1.0, Group::default())),
         far(class("oral-parabasal", 3.0, heap(3.0))),
     ]
+}
+
+/// The chapters, if no class of the model is without one.
+fn all_of(model: &Model, chapters: Vec<Chapter>) -> Outcome<Vec<Chapter>> {
+    match model.classes.keys().find(|class| chapters.iter().all(|chapter| chapter.name != class.as_str())) {
+        Some(class) => Err(format!("the picture book has no tile of the class {class}").into()),
+        None => Ok(chapters),
+    }
 }
 
 fn debris() -> Vec<Chapter> {
