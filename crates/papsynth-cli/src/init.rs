@@ -10,7 +10,8 @@ use crate::exit::{self, Failure};
 
 pub(crate) fn run(args: &Init) -> Result<(), Failure> {
     if args.list {
-        let lines = Preset::ALL.map(|preset| format!("{:<12}{}\n", preset.name(), preset.summary()));
+        let longest = Preset::ALL.iter().map(|preset| preset.name().len()).max().unwrap_or(0);
+        let lines = Preset::ALL.map(|preset| format!("{:<longest$}  {}\n", preset.name(), preset.summary()));
         return exit::print(&lines.concat());
     }
     let text = args.preset.recipe().to_commented_toml();

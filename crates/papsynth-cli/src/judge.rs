@@ -70,7 +70,10 @@ fn refuse(error: Error) -> Failure {
 
 /// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
 fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
-    let (real, synthetic) = (listed(&args.real, &args.group)?, listed(&args.synthetic, &args.group)?);
+    // Groups are of the real fields; synthetic ones are all of the kind that is judged, unless they have groups too.
+    let real = listed(&args.real, &args.group)?;
+    let grouped = field_files(&args.synthetic)?.iter().any(|f| !f.group.is_empty());
+    let synthetic = listed(&args.synthetic, if grouped { &args.group } else { &[] })?;
     let recorded = |files: &[FieldFile]| files.iter().find_map(|f| f.pixel_um);
     let of_real = args.pixel_um.or(recorded(&real));
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
@@ -99,14 +102,18 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     Ok(files)
 }
 
-/// The fields in a folder; of these groups alone, if it has any of them.
+/// The fields in a folder; of these groups alone, if any are named.
 pub(crate) fn fields_of(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     let mut files = field_files(folder)?;
     let wanted = |file: &FieldFile| groups.contains(&file.group);
     if files.iter().any(wanted) {
         files.retain(wanted);
-    } else if !groups.is_empty() && files.iter().any(|f| !f.group.is_empty()) {
+    } else if !groups.is_empty() {
         let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
+        if files.iter().all(|f| f.group.is_empty()) {
+            let help = "fields have no groups there: frames.csv in that folder would name them, as frame,grade";
+            return Err(Failure::input(Complaint::new(message).help(help)));
+        }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
         return Err(Failure::input(
             Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter()))),
@@ -193,10 +200,10 @@ fn told(report: &Report, out: &Path) -> String {
         let r = &test.result;
         let [low, high] = r.interval;
         text.push_str(&format!(
-            "{:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {:.3}: {}\n",
+            "{:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {}: {}\n",
             test.name,
             r.auc,
-            r.null_mean(),
+            r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}")),
             test.verdict
         ));
         for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {

@@ -17,7 +17,7 @@ use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::judge::{fields_of, picture};
 use crate::setup::read_model;
-use crate::text_file::may_replace;
+use crate::text_file::{can_write, may_replace};
 
 /// How files begin that may be replaced.
 const RECIPE: &[u8] = b"# Matched to ";
@@ -49,6 +49,10 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
     if let Some(report) = &args.report {
         may_replace(report, REPORT, "an older report of a match")?;
     }
+    if args.report.as_ref() == Some(&args.out) {
+        let message = format!("--report {}: this is the file of the recipe; expected another", args.out.display());
+        return Err(Failure::input(Complaint::new(message)));
+    }
     let interrupt = Interrupt::watch()?;
     let model = read_model(args.model.as_deref())?;
     let files = fields_of(&args.real, &args.group)?;
@@ -63,6 +67,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
         }
     };
     let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
+    [Some(&args.out), args.report.as_ref()].into_iter().flatten().try_for_each(|out| can_write(out))?;
 
     let windows = WINDOWS.min(fields.len()).max(1);
     let budget = args.budget.unwrap_or(if args.quick { QUICK } else { BUDGET });

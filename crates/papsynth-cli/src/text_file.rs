@@ -1,6 +1,6 @@
 //! Reading a text that the user names.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{Read, stdin};
 use std::path::Path;
 
@@ -18,6 +18,20 @@ pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), F
     }
     let message = format!("{}: there is another kind of file of this name; expected {what} or none", out.display());
     Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
+}
+
+/// Makes sure, before long work, that a file can be written there: its folder is made, and takes files.
+pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
+    if out.is_dir() {
+        let message = format!("{}: this is a folder; expected the name of a file", out.display());
+        return Err(Failure::input(Complaint::new(message)));
+    }
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(|error| Failure::file("make", folder, &error))?;
+    let name = out.file_name().unwrap_or_default().to_string_lossy();
+    let probe = folder.join(format!(".{name}.{}", std::process::id()));
+    File::create_new(&probe).map_err(|error| Failure::file("write", out, &error))?;
+    fs::remove_file(&probe).map_err(|error| Failure::file("remove", &probe, &error))
 }
 
 /// A text and the name it goes by; `-` is standard input.

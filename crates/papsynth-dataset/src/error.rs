@@ -160,6 +160,16 @@ pub enum Problem {
         /// Columns and rows of the image.
         image: [usize; 2],
     },
+    /// Most points of a table lie outside its image.
+    #[error("{outside} of {count} points lie outside the image of {} x {} pixels; the columns wanted are y,x in pixels", image[0], image[1])]
+    PointsOutside {
+        /// How many lie outside.
+        outside: usize,
+        /// How many there are.
+        count: usize,
+        /// Columns and rows of the image.
+        image: [usize; 2],
+    },
     /// No pixel of a mask is set.
     #[error("the mask is empty: no pixel of it is above 0")]
     EmptyMask,

@@ -58,10 +58,10 @@ pub struct TwoSample {
 }
 
 impl TwoSample {
-    /// Mean AUC between random halves of the real fields; NaN if there were too few fields to halve.
+    /// Median AUC between random halves of the real fields; none if there were too few fields to halve.
     #[must_use]
-    pub fn null_mean(&self) -> f64 {
-        if self.null.is_empty() { f64::NAN } else { mean(&self.null) }
+    pub fn null_median(&self) -> Option<f64> {
+        crate::beside::Spread::of(self.null.iter().copied()).p50
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a statistic of real fields says by itself: light, noise, bits.
 
-use papsynth_judge::{Known, NucleiFrom, Picture};
+use papsynth_judge::{NucleiFrom, Picture};
 use rayon::prelude::*;
 
 use crate::error::Error;
@@ -97,8 +97,9 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
             return Err(Error::Black { name: field.name.clone(), level, least: DARK });
         }
     }
-    let of = |known: &Known| NucleiFrom::of(known);
-    let nuclei_from = fields.iter().map(|f| of(&f.nuclei)).min().unwrap_or_default();
+    // Points are of those nuclei that somebody took an interest in: simulated windows know all of theirs.
+    let masks = fields.iter().all(|field| NucleiFrom::of(&field.nuclei) == NucleiFrom::Masks);
+    let nuclei_from = if masks { NucleiFrom::Masks } else { NucleiFrom::Search };
     let view = View::new(size_px, pixel_um, nuclei_from)?;
     let scale = f64::from(first.full_scale);
     let lights: Vec<Result<Light, Error>> = fields.par_iter().map(|field| light(field, &view)).collect();
@@ -203,6 +204,7 @@ fn bits(fields: &[Picture]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use papsynth_judge::Known;
 
     fn flat(level: f32, name: &str, width: usize) -> Picture {
         let grey = (0..width * 96).map(|i| level + (i % 3) as f32).collect();

@@ -1,7 +1,8 @@
 //! What every parameter of a section of the recipe does: `effects SECTION OUT.png`.
 //!
 //! A row a parameter: the same small field with the parameter low, as the default recipe has it, and high; or with each of
-//! the values that a choice has. Rows are found in the recipe itself, so none is forgotten.
+//! the values that a choice has. Rows are found in the recipe itself, of each of its kinds, so none is forgotten; only layouts from a
+//! file of the user's are not shown.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 
@@ -22,9 +23,6 @@ const ZOOM: u32 = 1;
 /// Rows side by side, and pixels between tiles.
 const COLUMNS: u32 = 2;
 const GAP: u32 = 4;
-
-/// Tiles of a row.
-const TILES: u32 = 3;
 
 /// Factor from the default to low and high values.
 const FACTOR: f64 = 4.0;
@@ -51,8 +49,11 @@ const OF_NOTHING: [(&str, f64); 18] = [
     ("orangeophilic", 3.0),
 ];
 
+/// Highest values of what cannot be drawn with higher ones: a patch has to fit into its donors.
+const HIGHEST: [(&str, f64); 1] = [("nucleus.patch_um", 3.5)];
+
 /// Values of what is chosen from a list, by the path.
-const CHOICES: [(&str, &[&str]); 18] = [
+const CHOICES: [(&str, &[&str]); 21] = [
     ("cytoplasm.shape", &["correlated", "independent"]),
     ("cytoplasm.sheet", &["flat", "verlet", "xpbd"]),
     ("nucleus.shape", &["correlated", "independent"]),
@@ -60,16 +61,19 @@ const CHOICES: [(&str, &[&str]); 18] = [
     ("nucleus.acceptance", &["near", "threshold"]),
     ("nucleus.seam", &["min-cut", "feather"]),
     ("nucleus.restore", &["before-detection", "after-detection", "off"]),
-    ("cells.intermediate.group.form", &["alone", "heap", "honeycomb"]),
+    ("cells.intermediate.group.form", &["alone", "heap", "honeycomb", "palisade"]),
     ("focus.picture", &["planes", "extended"]),
     ("debris.leukocytes.form", &["round", "lobed"]),
-    ("debris.speckles.form", &["dilated", "grown"]),
+    ("debris.speckles.form", &["round", "dilated"]),
     ("camera.photon_noise", &["exact", "normal", "off"]),
     ("camera.binning", &["charge", "digital"]),
     ("camera.jpeg_subsampling", &["full", "columns", "squares"]),
+    ("layout.kind", &["clusters", "swath", "uniform"]),
+    ("background.illumination.kind", &["bowl", "border"]),
     ("optics.imaging", &["product", "abbe"]),
     ("optics.kind", &["bright-field", "gaussian"]),
     ("light.kind", &["monochrome", "colour"]),
+    ("light.mixing", &["spectral", "per-wavelength", "three-vectors"]),
     ("light.rendition", &["display", "srgb", "raw"]),
 ];
 
@@ -93,9 +97,20 @@ fn main() -> Outcome<()> {
     };
     let out = arguments.next().unwrap_or_else(|| format!("target/effects-{section}.png"));
     let mut rows = Vec::new();
-    collect(&whole, &section, of, &mut rows);
+    collect(&whole, &section, of, &mut rows)?;
+    // What other kinds have that the base's has not.
+    for (path, kinds) in CHOICES.iter().filter(|(path, _)| path.starts_with(&format!("{section}."))) {
+        let Some(table) = path.strip_suffix(".kind") else { continue };
+        for kind in *kinds {
+            let other = with(&base(&section), path, json!(kind)).ok_or_else(|| format!("{path}: {kind} is none"))?;
+            let whole = serde_json::to_value(other)?;
+            let of = table.split('.').fold(&whole, |at, step| &at[step]);
+            collect(&whole, table, of, &mut rows)?;
+        }
+    }
+    let tiles = rows.iter().map(|row| row.tiles.len() as u32).max().unwrap_or(0);
     let model = Model::builtin();
-    let size = [TILES * (TILE[0] * ZOOM + GAP) + GAP, TILE[1] * ZOOM + 2 * LINE + GAP];
+    let size = [tiles * (TILE[0] * ZOOM + GAP) + GAP, TILE[1] * ZOOM + 2 * LINE + GAP];
     let lines = (rows.len() as u32).div_ceil(COLUMNS);
     let mut page = RgbImage::from_pixel(COLUMNS * size[0], lines * size[1] + GAP, Rgb([255; 3]));
     for (index, row) in (0_u32..).zip(&rows) {
@@ -121,7 +136,7 @@ fn base(section: &str) -> Recipe {
     recipe.field.width_px = f64::from(TILE[0]).into();
     recipe.field.height_px = f64::from(TILE[1]).into();
     recipe.field.pixel_um = 0.33.into();
-    recipe.slide.spacing_um = 30.0.into();
+    recipe.slide.spacing_um = 8.0.into();
     recipe.layout = Layout::Uniform {};
     if section != "debris" {
         recipe.debris = Debris::none();
@@ -156,17 +171,22 @@ fn abundant(recipe: &Recipe) -> Recipe {
     serde_json::from_value(whole).unwrap_or_else(|_| recipe.clone())
 }
 
-/// The rows of everything below a path.
-fn collect(whole: &Value, path: &str, value: &Value, rows: &mut Vec<Row>) {
+/// The rows of everything below a path that are not there already.
+fn collect(whole: &Value, path: &str, value: &Value, rows: &mut Vec<Row>) -> Outcome<()> {
     const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
     match value {
         Value::Object(fields) if !fields.keys().any(|key| LAWS.contains(&key.as_str())) => {
-            for (name, value) in fields {
-                collect(whole, &format!("{path}.{name}"), value, rows);
-            }
+            fields.iter().try_for_each(|(name, value)| collect(whole, &format!("{path}.{name}"), value, rows))
         }
-        Value::String(_) => rows.extend(choice(whole, path)),
-        _ => rows.extend(number(whole, path, value)),
+        _ if rows.iter().any(|row| row.path == path) => Ok(()),
+        Value::String(_) => {
+            rows.push(choice(whole, path).ok_or_else(|| format!("{path}: no values are known that it may have"))?);
+            Ok(())
+        }
+        _ => {
+            rows.push(number(whole, path, value).ok_or_else(|| format!("{path}: no other value was accepted"))?);
+            Ok(())
+        }
     }
 }
 
@@ -174,7 +194,7 @@ fn choice(whole: &Value, path: &str) -> Option<Row> {
     let (_, values) = CHOICES.iter().find(|(known, _)| *known == path)?;
     let recipe: Recipe = serde_json::from_value(whole.clone()).ok()?;
     let tile = |value: &&str| Some(((*value).to_owned(), with(&recipe, path, json!(value))?));
-    Some(Row { path: path.to_owned(), tiles: values.iter().filter_map(tile).collect() })
+    Some(Row { path: path.to_owned(), tiles: values.iter().map(tile).collect::<Option<_>>()? })
 }
 
 fn number(whole: &Value, path: &str, value: &Value) -> Option<Row> {
@@ -198,7 +218,8 @@ fn number(whole: &Value, path: &str, value: &Value) -> Option<Row> {
         let high = OF_NOTHING.iter().find(|(known, _)| *known == name).map_or(1.0, |(_, high)| *high);
         (0.0, high)
     } else {
-        (middle / FACTOR, middle * FACTOR)
+        let high = HIGHEST.iter().find(|(known, _)| *known == path).map_or(f64::INFINITY, |(_, high)| *high);
+        (middle / FACTOR, (middle * FACTOR).min(high))
     };
     let tile = |value: f64| nearest(&recipe, path, value, middle).map(|(value, recipe)| (shown(value), recipe));
     let tiles = vec![tile(low)?, tile(middle)?, tile(high)?];

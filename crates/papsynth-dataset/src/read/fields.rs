@@ -99,7 +99,7 @@ impl FieldFile {
     /// Reads it. How bright a saturated pixel is, an image of 16 bits does not tell: 12, 14 or 16 bits are assumed, the fewest that hold it.
     ///
     /// # Errors
-    /// If a file cannot be read, or its masks are of another size than the image.
+    /// If a file cannot be read, its masks are of another size than the image, or most of its points lie outside the image.
     pub fn read(&self, limits: &Limits) -> Result<FieldImage, Error> {
         let image = LevelImage::read(&self.image, limits)?;
         let channel = if image.channels == 3 { GREEN } else { 0 };
@@ -110,7 +110,9 @@ impl FieldFile {
         let nuclei = match &self.nuclei {
             NucleiFile::Unknown => FieldNuclei::Unknown,
             NucleiFile::Points(path) => {
-                FieldNuclei::Points(points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?)
+                let points = points(&bytes(path, TABLE_BYTES)?).map_err(Error::input(path))?;
+                within(&points, [image.width, grey.len() / image.width.max(1)]).map_err(Error::input(path))?;
+                FieldNuclei::Points(points)
             }
             NucleiFile::Labels(path) => {
                 let labels = read_label_map(path, limits)?;
@@ -169,7 +171,7 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     Ok(images.into_iter().map(field).collect())
 }
 
-/// The whole frames of a data set; of a stack, its image with everything in focus.
+/// The frames of a data set, which must all be whole; of a stack, its image with everything in focus.
 fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let folder = Folder::new(path);
     let identity = read_manifest(&folder)?.identity;
@@ -232,6 +234,17 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
     Ok(points)
 }
 
+/// Refuses points of which most lie outside the image: they are of another one, or x stands before y. A few beyond its border are not
+/// unusual.
+fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
+    let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
+    let outside = points.iter().filter(|p| !inside(p)).count();
+    if 2 * outside > points.len() {
+        return Err(Problem::PointsOutside { outside, count: points.len(), image });
+    }
+    Ok(())
+}
+
 /// The group of each image, by its name.
 fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     let mut rows = rows(bytes)?.into_iter();
@@ -271,6 +284,17 @@ mod tests {
         for bad in ["1,2,3", "1", "a,b", "1,nan", "1,2\ny,x"] {
             assert!(matches!(points(bad.as_bytes()), Err(Problem::Row { .. })), "{bad}");
         }
+    }
+
+    #[test]
+    fn points_of_another_image_are_refused() {
+        let image = [100, 50];
+        assert_eq!(within(&[], image), Ok(()));
+        assert_eq!(within(&[[99.4, 49.0], [-3.0, 2.0]], image), Ok(()));
+        assert!(matches!(
+            within(&[[10.0, 90.0], [-3.0, 2.0], [1.0, 1.0]], image),
+            Err(Problem::PointsOutside { outside: 2, count: 3, .. })
+        ));
     }
 
     #[test]

@@ -55,7 +55,7 @@ impl Default for Fibres {
             length_um: Number::uniform(60.0, 200.0),
             width_um: Number::uniform(5.0, 15.0),
             waves: Number::uniform(0.0, 0.8),
-            height_um: Number::uniform(-2.0, 15.0),
+            height_um: Number::choice([0.0, 8.0, 30.0, 170.0]),
             absorbance: Number::uniform(0.03, 0.2),
             phase_rad: Number::uniform(0.4, 1.2),
         }

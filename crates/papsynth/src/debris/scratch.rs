@@ -50,7 +50,7 @@ impl Default for Scratches {
             count: Number::log_normal(0.12, 0.8),
             length_um: Number::uniform(20.0, 120.0),
             width_um: Number::log_normal(0.7, 0.4),
-            height_um: Number::uniform(-4.0, -1.0),
+            height_um: Number::choice([-3.0, 170.0, 170.0]),
             absorbance: Number::uniform(0.02, 0.08),
             phase_rad: Number::uniform(-0.4, 0.4),
         }

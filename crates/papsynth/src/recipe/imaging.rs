@@ -212,7 +212,7 @@ pub struct Background {
 impl Default for Background {
     fn default() -> Self {
         Self {
-            level: Number::normal(0.90, 0.015),
+            level: Number::normal(0.90, 0.055).at_least(0.74).at_most(0.985),
             illumination: Illumination::Bowl {
                 x2: defaults::x2(),
                 y2: defaults::y2(),

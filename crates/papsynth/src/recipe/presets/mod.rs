@@ -227,7 +227,7 @@ impl Recipe {
         self.camera.full_well_e = 120_000.0.into();
         self.camera.glare_removed = Number::uniform(0.12, 0.22);
         self.camera.read_noise_e = Number::uniform(350.0, 620.0);
-        self.stain.slide_cytoplasm = Number::log_normal(1.1, 0.15);
+        self.stain.slide_cytoplasm = Number::log_normal(1.2, 0.15);
         self.stain.slide_nucleus = Number::log_normal(1.0, 0.12);
         self.stain.field_texture = Number::log_normal(0.23, 0.3);
         self
@@ -328,7 +328,9 @@ fn high_grade() -> Recipe {
         ("superficial", Number::uniform(0.0, 2.0)),
         ("ascus", Number::uniform(5.0, 15.0)),
         ("lsil", Number::uniform(0.0, 4.0)),
-        ("high-grade", Number::uniform(2.0, 7.0)),
+        ("high-grade", Number::uniform(1.0, 4.0)),
+        ("moderate", Number::uniform(1.0, 3.0)),
+        ("severe", Number::uniform(0.0, 2.0)),
     ]);
     recipe.stain.field_cytoplasm = Number::log_normal(0.68, 0.25);
     recipe
