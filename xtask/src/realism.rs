@@ -85,8 +85,10 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
             table.push_str(&judgements(&report, name, what)?);
         }
     }
-    let forest = forest(workspace, &reference, &folder)?;
-    table.push_str(&forest);
+    let matched = folder.join("matched-N.toml");
+    for (what, recipe) in [("default", None), ("matched to negative fields", Some(&matched))] {
+        table.push_str(&forest(workspace, &reference, &folder, what, recipe)?);
+    }
     let file = folder.join("table.md");
     fs::write(&file, &table).with_context(|| format!("cannot write {}", file.display()))?;
     println!("\n{table}\nReports: {}", workspace.shown(&folder));
@@ -152,25 +154,52 @@ fn judgements(report: &Path, fields: &str, recipe: &str) -> Result<String> {
         lines.push_str(&format!("{fields} | {recipe} | {name} | {auc:.3} ({low:.3} to {high:.3}) | {null}\n"));
     }
     for test in report["moments"].as_array().into_iter().flatten() {
-        let (name, verdict) = (test["name"].as_str().unwrap_or_default(), test["verdict"].as_str().unwrap_or("-"));
-        lines.push_str(&format!("{fields} | {recipe} | {name} | {verdict} |\n"));
+        let name = test["name"].as_str().unwrap_or_default();
+        let descriptors: Vec<&Value> = test["result"]["descriptors"].as_array().into_iter().flatten().collect();
+        // The middle of each, with the band of pairs of disjoint halves of the real fields.
+        let inside = |d: &Value, what: &str, band: &str| {
+            let [low, value, high] = [&d[band][0], &d[what][1], &d[band][2]].map(|v| v.as_f64().unwrap_or(f64::NAN));
+            value >= low && value <= high
+        };
+        let within = |d: &&&Value| inside(d, "slope", "null_slope") && inside(d, "shift", "null_shift");
+        let (within, of) = (descriptors.iter().filter(within).count(), descriptors.len());
+        let slopes: Vec<f64> = descriptors.iter().filter_map(|d| d["slope"][1].as_f64()).collect();
+        let [least, most] = slopes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(*s), b.max(*s)]);
+        lines.push_str(&format!(
+            "{fields} | {recipe} | {name} | {within} of {of} Q-Q slopes and shifts within the band, slopes {least:.2} to {most:.2} |\n"
+        ));
     }
+    let scalars: Vec<&Value> = report["beside"]["scalars"].as_array().into_iter().flatten().collect();
+    let outside: Vec<&str> =
+        scalars.iter().filter(|s| s["within"] == false).filter_map(|s| s["name"].as_str()).collect();
+    lines.push_str(&format!(
+        "{fields} | {recipe} | field statistics | {} of {} medians within the real 10th to 90th percentile; not: {} |\n",
+        scalars.len() - outside.len(),
+        scalars.len(),
+        if outside.is_empty() { "-".to_owned() } else { outside.join(", ") }
+    ));
     Ok(lines)
 }
 
 /// Trains a pixel forest on synthetic fields and has it find the nuclei of a real one.
-fn forest(workspace: &Workspace, reference: &Path, folder: &Path) -> Result<String> {
+fn forest(
+    workspace: &Workspace,
+    reference: &Path,
+    folder: &Path,
+    what: &str,
+    recipe: Option<&PathBuf>,
+) -> Result<String> {
     let python = match Python::environment(workspace, "forest", FOREST)? {
         Python::Ready(python) => python,
         Python::Missing(reason) => {
             Outcome::skipped_unless_ci(reason.clone())?;
-            return Ok(format!("a real field | - | pixel forest | skipped: {reason} |\n"));
+            return Ok(format!("a real field | {what} | pixel forest | skipped: {reason} |\n"));
         }
     };
     let script = workspace.root.join("xtask/python/pixel_forest.py");
     ensure!(script.exists(), "{} is missing", workspace.shown(&script));
     let stack = reference.join("focus_stack");
-    let fields = folder.join("fields-forest");
+    let fields = folder.join(format!("fields-forest-{}", if recipe.is_some() { "matched" } else { "default" }));
     // As sharp as the default, of as many planes as that field was fused of, in pixels of about the same size.
     let settings = [
         "field.pixel_um=0.31",
@@ -182,14 +211,15 @@ fn forest(workspace: &Workspace, reference: &Path, folder: &Path) -> Result<Stri
         "slide.fields=1",
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
-    dataset::generate(workspace, &fields, words)?;
+    let recipe = recipe.map(OsString::from);
+    dataset::generate(workspace, &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
     let mut command = Command::new(&python);
     command.arg(&script).arg(&fields).arg(stack.join("extended_focus.png")).arg(stack.join("nuclei.png"));
     let output = command.output().with_context(|| format!("cannot run {}", workspace.shown(&script)))?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: Value = serde_json::from_slice(&output.stdout).context("the pixel forest gave no JSON")?;
     Ok(format!(
-        "a real field | default, extended focus | nuclei by a pixel forest of {} fields | Dice {} (on its own kind {}) |\n",
+        "a real field | {what}, extended focus | nuclei by a pixel forest of {} fields | Dice {} (on its own kind {}) |\n",
         found["fields"], found["dice_real"], found["dice_synthetic"]
     ))
 }

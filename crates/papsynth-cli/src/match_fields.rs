@@ -108,8 +108,13 @@ fn refuse(error: &Error, real: &std::path::Path) -> Failure {
 
 /// What was found, as a table.
 fn told(fit: &Fit) -> String {
+    let begun = if fit.extended {
+        "these fields are fused: begun from the preset as a scanner that fuses planes shows it\n"
+    } else {
+        ""
+    };
     let mut text = format!(
-        "{} fields, {} windows, {} nuclei; {} recipes simulated\n\n{:<24} {:>10} {:>21} {:>10}  from\n",
+        "{} fields, {} windows, {} nuclei; {} recipes simulated\n{begun}\n{:<24} {:>10} {:>21} {:>10}  from\n",
         fit.fields, fit.windows, fit.nuclei, fit.simulated, "parameter", "value", "95 % interval", "before"
     );
     let number = |value: f64| format!("{value:.3}");

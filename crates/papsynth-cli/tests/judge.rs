@@ -156,6 +156,14 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
         bench.grey_png(&format!("grades/{name}.png"), 64, 48, speckled);
     }
     fs::write(bench.path("grades/frames.csv"), "frame,grade\na,N\nb,N\n").unwrap();
+    fs::create_dir_all(bench.path("points")).unwrap();
+    for name in ["a", "b"] {
+        bench.grey_png(&format!("points/{name}.png"), 64, 48, speckled);
+        // x before y.
+        fs::write(bench.path(&format!("points/{name}.csv")), "60,20\n55,12\n").unwrap();
+    }
+    bench.good(&format!("generate --out damaged --frames 2 {FIELD} {CELLS}"));
+    fs::write(bench.path("damaged/images/000001.png"), "x").unwrap();
     for (words, wanted) in [
         ("judge good empty --pixel-um 0.3", "empty: holds no PNG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
@@ -165,6 +173,9 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
         ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40, its image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),
         ("judge grades good --pixel-um 0.3 --group H", "grades: no field is of group H"),
+        ("judge good good --pixel-um 0.3 --group Z", "good: no field is of group Z"),
+        ("judge points good --pixel-um 0.3", "2 of 2 points lie outside the image of 64 x 48 pixels"),
+        ("judge good damaged --pixel-um 0.3", "damaged: frame 1 is not whole"),
         ("judge good good --pixel-um 0.3 --nuclei masks", "--nuclei masks: "),
         ("judge good good --pixel-um 0", "expected 0.05 to 4 micrometres"),
     ] {

@@ -8,7 +8,7 @@ use std::fs;
 use support::Bench;
 
 /// Coarse pixels: many cells in few of them.
-const FIELD: &str = "--set field.width_px=240 --set field.height_px=180 --set field.pixel_um=0.5 --set slide.fields=1 \
+const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields=1 \
     --set cells.intermediate.count=5 --set cells.superficial.count=2 --set cells.parabasal.count=0 \
     --set cells.metaplastic.count=0 --quiet";
 
@@ -64,6 +64,10 @@ fn what_cannot_be_matched_is_refused_at_once() {
         ("match two --pixel-um 0.33 --out a.toml", "120 x 160"),
         ("match noise --out a.toml", "--pixel-um"),
         ("match noise --pixel-um 0.33 --out taken.toml", "taken.toml"),
+        ("match noise --pixel-um 0.33 --out two", "this is a folder"),
+        ("match noise --pixel-um 0.33 --out taken.toml/a.toml", "taken.toml"),
+        ("match noise --pixel-um 0.33 --out a.toml --report a.toml", "--report a.toml"),
+        ("match noise --pixel-um 0.33 --group N --out a.toml", "no field is of group N"),
         ("match noise --pixel-um 9 --out a.toml", "micrometres"),
         ("match noise --pixel-um 0.33 --budget 3 --out a.toml", "windows"),
         ("match noise --pixel-um 0.33 --budget 60 --quick --out a.toml", "--quick"),

@@ -29,6 +29,11 @@ impl Fit {
              # Distance of simulated windows from the real ones, in standard errors: {:.2} before, {:.2} after.\n",
             distance.before, distance.after
         );
+        if self.extended {
+            out.push_str(
+                "# The fields were fused of several planes: begun from the recipe as a scanner that fuses shows it.\n",
+            );
+        }
         let lost: Vec<&str> =
             self.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.path).collect();
         if !lost.is_empty() {
