@@ -209,8 +209,9 @@ Examples:
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as `papsynth judge` takes them: images of one size, and beside them, if they are known, points or masks of
-nuclei. Five to ten fields will do; of one alone no spread between fields can be told.")]
+REAL is a folder as `papsynth judge` takes them: images of one size, and beside them, if they are known, masks of nuclei.
+Without masks nuclei are searched for, in real and simulated fields alike; points are not used, as they are seldom of all nuclei.
+Five to ten fields will do; of one alone no spread between fields can be told.")]
 pub(crate) struct Match {
     /// Folder of real fields
     #[arg(value_name = "REAL")]
