@@ -177,7 +177,12 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let identity = read_manifest(&folder)?.identity;
     let mut fields = Vec::new();
     for index in recorded_frames(&folder)? {
-        let Ok(record) = whole_record(&folder, &identity, index, Check::Sizes)? else { continue };
+        let whole = whole_record(&folder, &identity, index, Check::Sizes)?;
+        let record = whole.map_err(|flaw| {
+            let message =
+                format!("frame {index} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
+            Error::Folder { path: path.to_owned(), message }
+        })?;
         let frame = record.summary;
         let image = match Form::of(frame.planes_um.len()) {
             Form::Single => layout::image(index, Form::Single),
