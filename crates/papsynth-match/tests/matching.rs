@@ -38,6 +38,7 @@ fn fields(count: u64, from: NucleiFrom) -> Vec<Picture> {
     let mut values = setting.base_values();
     for (parameter, value) in [
         (Parameter::Level, 0.8),
+        (Parameter::LevelSpread, 0.005),
         (Parameter::Noise, 3.0),
         (Parameter::Down, 0.3),
         (Parameter::Blur, 0.8),
