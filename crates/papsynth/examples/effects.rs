@@ -11,7 +11,7 @@ mod support;
 use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe};
+use papsynth::recipe::{CellMix, Debris, Layout, Preset, Recipe, is_toml_table};
 use papsynth::{Engine, Inputs};
 use serde_json::{Map, Value, json};
 use support::{LINE, Outcome, enlarged, picture, save, write};
@@ -173,9 +173,8 @@ fn abundant(recipe: &Recipe) -> Recipe {
 
 /// The rows of everything below a path that are not there already.
 fn collect(whole: &Value, path: &str, value: &Value, rows: &mut Vec<Row>) -> Outcome<()> {
-    const LAWS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
     match value {
-        Value::Object(fields) if !fields.keys().any(|key| LAWS.contains(&key.as_str())) => {
+        Value::Object(fields) if is_toml_table(value) => {
             fields.iter().try_for_each(|(name, value)| collect(whole, &format!("{path}.{name}"), value, rows))
         }
         _ if rows.iter().any(|row| row.path == path) => Ok(()),
