@@ -86,7 +86,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         }
     }
     let matched = folder.join("matched-N.toml");
-    for (what, recipe) in [("default", None), ("matched to negative fields", Some(&matched))] {
+    for (what, recipe) in [("default", None), ("matched", Some(&matched))] {
         table.push_str(&forest(workspace, &reference, &folder, what, recipe)?);
     }
     let file = folder.join("table.md");
@@ -156,13 +156,7 @@ fn judgements(report: &Path, fields: &str, recipe: &str) -> Result<String> {
     for test in report["moments"].as_array().into_iter().flatten() {
         let name = test["name"].as_str().unwrap_or_default();
         let descriptors: Vec<&Value> = test["result"]["descriptors"].as_array().into_iter().flatten().collect();
-        // The middle of each, with the band of pairs of disjoint halves of the real fields.
-        let inside = |d: &Value, what: &str, band: &str| {
-            let [low, value, high] = [&d[band][0], &d[what][1], &d[band][2]].map(|v| v.as_f64().unwrap_or(f64::NAN));
-            value >= low && value <= high
-        };
-        let within = |d: &&&Value| inside(d, "slope", "null_slope") && inside(d, "shift", "null_shift");
-        let (within, of) = (descriptors.iter().filter(within).count(), descriptors.len());
+        let (within, of) = (descriptors.iter().filter(|d| d["within"] == true).count(), descriptors.len());
         let slopes: Vec<f64> = descriptors.iter().filter_map(|d| d["slope"][1].as_f64()).collect();
         let [least, most] = slopes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(*s), b.max(*s)]);
         lines.push_str(&format!(
@@ -199,7 +193,7 @@ fn forest(
     let script = workspace.root.join("xtask/python/pixel_forest.py");
     ensure!(script.exists(), "{} is missing", workspace.shown(&script));
     let stack = reference.join("focus_stack");
-    let fields = folder.join(format!("fields-forest-{}", if recipe.is_some() { "matched" } else { "default" }));
+    let fields = folder.join(format!("fields-forest-{what}"));
     // As sharp as the default, of as many planes as that field was fused of, in pixels of about the same size.
     let settings = [
         "field.pixel_um=0.31",

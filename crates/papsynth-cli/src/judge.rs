@@ -70,10 +70,13 @@ fn refuse(error: Error) -> Failure {
 
 /// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
 fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
-    // Groups are of the real fields; synthetic ones are all of the kind that is judged, unless they have groups too.
-    let real = listed(&args.real, &args.group)?;
-    let grouped = field_files(&args.synthetic)?.iter().any(|f| !f.group.is_empty());
-    let synthetic = listed(&args.synthetic, if grouped { &args.group } else { &[] })?;
+    let real = enough(&args.real, fields_of(&args.real, &args.group)?)?;
+    let mut synthetic = field_files(&args.synthetic)?;
+    // Groups are those of the real fields: synthetic ones without any are all of the kind that is judged.
+    if synthetic.iter().any(|f| !f.group.is_empty()) {
+        synthetic = of_groups(&args.synthetic, synthetic, &args.group)?;
+    }
+    let synthetic = enough(&args.synthetic, synthetic)?;
     let recorded = |files: &[FieldFile]| files.iter().find_map(|f| f.pixel_um);
     let of_real = args.pixel_um.or(recorded(&real));
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
@@ -90,9 +93,8 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     Ok((side(real, args.pixel_um, of_real), side(synthetic, args.synthetic_pixel_um, of_synthetic)))
 }
 
-/// The fields in a folder, two or more.
-fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
-    let files = fields_of(folder, groups)?;
+/// The fields of a folder, if they are two or more.
+fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, Failure> {
     if files.len() < LEAST {
         let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
         return Err(Failure::input(
@@ -104,7 +106,10 @@ fn listed(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
 
 /// The fields in a folder; of these groups alone, if any are named.
 pub(crate) fn fields_of(folder: &Path, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
-    let mut files = field_files(folder)?;
+    of_groups(folder, field_files(folder)?, groups)
+}
+
+fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Result<Vec<FieldFile>, Failure> {
     let wanted = |file: &FieldFile| groups.contains(&file.group);
     if files.iter().any(wanted) {
         files.retain(wanted);
@@ -214,7 +219,7 @@ fn told(report: &Report, out: &Path) -> String {
         }
     }
     for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.is_within()).count();
+        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
         let of = test.result.descriptors.len();
         text.push_str(&format!(
             "{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n",

@@ -1,4 +1,4 @@
-//! Reading a text that the user names.
+//! Files that the user names: a text to be read, and what may be written.
 
 use std::fs::{self, File};
 use std::io::{Read, stdin};
@@ -20,14 +20,15 @@ pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), F
     Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
 }
 
-/// Makes sure, before long work, that a file can be written there: its folder is made, and takes files.
+/// Makes sure, before long work, that a file can be written there, and leaves nothing behind.
 pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
     if out.is_dir() {
         let message = format!("{}: this is a folder; expected the name of a file", out.display());
         return Err(Failure::input(Complaint::new(message)));
     }
-    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(|error| Failure::file("make", folder, &error))?;
+    // Folders that are not there yet are made when it is written.
+    let named = out.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty());
+    let folder = named.into_iter().find(|folder| folder.exists()).unwrap_or(Path::new("."));
     let name = out.file_name().unwrap_or_default().to_string_lossy();
     let probe = folder.join(format!(".{name}.{}", std::process::id()));
     File::create_new(&probe).map_err(|error| Failure::file("write", out, &error))?;

@@ -103,7 +103,7 @@ fn summary(page: &mut String, report: &Report) {
         );
     }
     for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.is_within()).count();
+        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
         let slopes: Vec<String> = test.result.descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
         put(
             page,
@@ -238,7 +238,7 @@ fn moments(page: &mut String, test: &Test<Moments>) {
             page,
             format_args!(
                 "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                if d.is_within() { "" } else { " class=\"out\"" },
+                if d.within { "" } else { " class=\"out\"" },
                 escape(&d.name),
                 three(d.slope),
                 three(d.null_slope),

@@ -201,7 +201,7 @@ impl Judge {
         for (n, what) in sizes {
             match moments::compare(&real, &synthetic, n, self.params.draws, self.params.seed) {
                 Some(result) => {
-                    let within = result.descriptors.iter().all(moments::Descriptor::is_within);
+                    let within = result.descriptors.iter().all(|d| d.within);
                     let verdict = if within { Verdict::NotToldApart } else { Verdict::ToldApart };
                     tests.push(Test { name: format!("texture of {} nuclei, {what}", result.n), verdict, result });
                 }

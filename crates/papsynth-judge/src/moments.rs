@@ -87,17 +87,10 @@ pub struct Descriptor {
     pub shift: [f64; 3],
     /// The same between halves.
     pub null_shift: [f64; 3],
+    /// Whether the middle of both slope and shift lies where those of real halves do.
+    pub within: bool,
     /// Quantiles of both sides to be drawn: real, synthetic.
     pub quantiles: Vec<[f64; 2]>,
-}
-
-impl Descriptor {
-    /// Whether both the slope and the shift lie where those of real halves do.
-    #[must_use]
-    pub fn is_within(&self) -> bool {
-        let within = |value: f64, [low, _, high]: [f64; 3]| value >= low && value <= high;
-        within(self.slope[1], self.null_slope) && within(self.shift[1], self.null_shift)
-    }
 }
 
 /// Slope of the least-squares line through the quantiles of `y` against those of `x`; both have the same length, which is that of the
@@ -184,12 +177,16 @@ pub(crate) fn compare(real: &[Table], synthetic: &[Table], n: usize, draws: usiz
             values
         });
         let points = (0..DRAWN).map(|i| (i as f64 + 0.5) / DRAWN as f64);
+        let [slope, shift] = [&mut slopes, &mut shifts].map(|values| at(values, [0.05, 0.5, 0.95]));
+        let [null_slope, null_shift] = [&mut null_slopes, &mut null_shifts].map(|values| band(values));
+        let within = |value: [f64; 3], [low, _, high]: [f64; 3]| value[1] >= low && value[1] <= high;
         Descriptor {
             name: (*name).to_owned(),
-            slope: at(&mut slopes, [0.05, 0.5, 0.95]),
-            null_slope: band(&mut null_slopes),
-            shift: at(&mut shifts, [0.05, 0.5, 0.95]),
-            null_shift: band(&mut null_shifts),
+            slope,
+            null_slope,
+            shift,
+            null_shift,
+            within: within(slope, null_slope) && within(shift, null_shift),
             quantiles: points.map(|q| [of_sorted(&sorted[0], q), of_sorted(&sorted[1], q)]).collect(),
         }
     });
@@ -271,7 +268,7 @@ mod tests {
         let within = |synthetic: &[Table]| {
             let result = compare(&real, synthetic, 0, 200, 7).unwrap();
             assert_eq!(result.n, 240);
-            result.descriptors.iter().filter(|d| d.is_within()).count()
+            result.descriptors.iter().filter(|d| d.within).count()
         };
         assert_eq!(within(&tables(16, 1.0, 4.0, 2)), 6);
         assert_eq!(within(&tables(16, 0.5, 4.0, 3)), 0);
@@ -294,7 +291,7 @@ mod tests {
         for fields in [6, 12] {
             let told = |pair: u64| {
                 let [real, other] = [0, 1].map(|side| tables(fields, 1.0, 4.0, 1000 + 2 * pair + side));
-                !compare(&real, &other, 0, 100, pair).unwrap().descriptors.iter().all(Descriptor::is_within)
+                !compare(&real, &other, 0, 100, pair).unwrap().descriptors.iter().all(|d| d.within)
             };
             // Of forty, two are expected; seven would come once in two hundred times.
             let count = (0..PAIRS).filter(|pair| told(*pair)).count();

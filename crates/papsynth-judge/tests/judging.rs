@@ -1,8 +1,8 @@
 //! What the judge says of fields that are known to be alike or not.
 
 use papsynth_judge::{
-    Descriptor, Error, Family, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report,
-    TwoSampleParams, Verdict,
+    Error, Family, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report, TwoSampleParams,
+    Verdict,
 };
 
 mod support;
@@ -37,7 +37,7 @@ fn fields_of_the_same_kind_are_not_told_apart() {
         "{:?}",
         report.two_sample.iter().map(|t| (&t.name, t.result.auc)).collect::<Vec<_>>()
     );
-    assert!(report.moments.iter().flat_map(|t| &t.result.descriptors).all(Descriptor::is_within));
+    assert!(report.moments.iter().flat_map(|t| &t.result.descriptors).all(|d| d.within));
 }
 
 #[test]
