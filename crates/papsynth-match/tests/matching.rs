@@ -11,9 +11,9 @@ use papsynth_match::{
 };
 use rayon::prelude::*;
 
-/// Coarse pixels: many cells in few of them.
+/// Coarse pixels: many cells in few of them, with slide between them.
 const PIXEL_UM: f64 = 0.5;
-const FIELD: [usize; 2] = [240, 180];
+const FIELD: [usize; 2] = [280, 210];
 
 fn engine(recipe: &Recipe) -> Result<Engine, papsynth::Error> {
     Engine::new(recipe, &Model::builtin(), &Inputs::default())
@@ -41,8 +41,8 @@ fn fields(count: u64, from: NucleiFrom) -> Vec<Picture> {
         (Parameter::LevelSpread, 0.005),
         (Parameter::Noise, 3.0),
         (Parameter::Down, 0.3),
-        (Parameter::Blur, 0.8),
-        (Parameter::Cells, 800.0),
+        (Parameter::Blur, 0.5),
+        (Parameter::Cells, 400.0),
     ] {
         values.set(parameter, value);
     }
