@@ -231,7 +231,7 @@ pub(crate) struct Match {
     /// Look at fields of this group alone; repeatable
     #[arg(long, value_name = "NAME")]
     pub(crate) group: Vec<String>,
-    /// Windows of 640 x 480 pixels to simulate, which takes most of the time [default: 2000]
+    /// Windows of 640 x 480 pixels to simulate, 60 or more, which takes most of the time [default: 2000]
     #[arg(long, value_name = "N", value_parser = parse_budget, conflicts_with = "quick")]
     pub(crate) budget: Option<usize>,
     /// Simulate a sixth as much: wider intervals, fewer parameters

@@ -113,6 +113,8 @@ mod tests {
             ("version = 1\nclasses = 3", "expected a table"),
             ("version = 1\n[classes.a]\nlike = \"b\"\n[classes.b]\nlike = \"a\"", "in a circle"),
             ("version = 1\n[classes.a]\nlike = \"nobody\"", "no class `nobody`"),
+            ("version = 1\n[classes.\"../a\"]\nlike = \"intermediate\"", "`../a` is no name"),
+            ("version = 1\n[classes.\"\"]\nlike = \"intermediate\"", "`` is no name"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\ncytoplasm.form.taper = 4", "cytoplasm.form.taper: 4"),
             ("version = 1\n[classes.a]\nlike = \"intermediate\"\nnucleus.size = 4", "unknown field `size`"),
             ("version = 1\n[classes.a]\nbethesda = \"NILM\"", "missing field"),

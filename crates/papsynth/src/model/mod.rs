@@ -314,6 +314,9 @@ impl Model {
     /// The first number that cannot be, by its path, with what would be accepted.
     pub fn check(&self) -> Result<(), String> {
         for (name, class) in &self.classes {
+            if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
+                return Err(format!("classes: `{name}` is no name; expected letters, digits, `-` and `_`"));
+            }
             class.check().map_err(|problem| format!("classes.{name}.{problem}"))?;
         }
         Ok(())

@@ -203,7 +203,7 @@ fn extended_focus() -> Recipe {
 
 impl Recipe {
     /// The same slide as a scanner shows it that fuses planes to a picture of extended focus: focus, blur, soft edges, noise and texture, as
-    /// three sets of such pictures have them, of two scanners.
+    /// three sets of such pictures have them, of two scanners; stained as strongly as the slides of those sets are.
     #[must_use]
     pub fn fused(mut self) -> Self {
         self.focus = Focus {
@@ -227,7 +227,6 @@ impl Recipe {
         self.camera.full_well_e = 120_000.0.into();
         self.camera.glare_removed = Number::uniform(0.12, 0.22);
         self.camera.read_noise_e = Number::uniform(350.0, 620.0);
-        // Those slides are stained more strongly than the default's: fields of theirs are darker where they are covered.
         self.stain.slide_cytoplasm = Number::log_normal(1.2, 0.15);
         self.stain.slide_nucleus = Number::log_normal(1.0, 0.12);
         self.stain.field_texture = Number::log_normal(0.23, 0.3);
