@@ -1,6 +1,7 @@
 use crate::lanes::{Batch, Start, Topology};
 use crate::mesh::Disc;
 use crate::outline::{Inside, Outline};
+use crate::params::check_excess;
 use crate::refine::Refinement;
 use crate::{ClothParams, Error, Point, Rng, Sheet, Solver, VerletParams, XpbdParams, rest};
 use multiversion::multiversion;
@@ -17,6 +18,15 @@ pub struct Cloth {
     disc: Disc,
     topology: Topology,
     refinement: Refinement,
+}
+
+/// A sheet that is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Job<'a> {
+    /// What it is pressed into: a simple polygon, either way round, of any unit.
+    pub outline: &'a [Point],
+    /// Area of the flat sheet over that of the outline, 1 to 4; see [`ClothParams::excess`].
+    pub excess: f64,
 }
 
 /// An outline on its way to a sheet.
@@ -46,7 +56,7 @@ impl Cloth {
     ///
     /// If the outline has fewer than 3 points, one that is not finite, or no area.
     pub fn crumple<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Sheet, Error> {
-        let task = self.task(outline, rng)?;
+        let task = self.task(Job { outline, excess: self.params.excess }, rng)?;
         let mut sheets = self.solved(std::slice::from_ref(&task));
         sheets.pop().ok_or(Error::TooFewPoints { points: 0 })
     }
@@ -62,11 +72,26 @@ impl Cloth {
     ///
     /// If there are not as many sources as outlines.
     pub fn crumple_many<R: Rng>(&self, outlines: &[&[Point]], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
-        assert_eq!(outlines.len(), rngs.len(), "each outline needs its own source of random numbers");
-        let mut tasks = Vec::with_capacity(outlines.len());
-        let mut errors = Vec::with_capacity(outlines.len());
-        for (outline, rng) in outlines.iter().zip(rngs) {
-            match self.task(outline, rng) {
+        let excess = self.params.excess;
+        let jobs: Vec<Job> = outlines.iter().map(|&outline| Job { outline, excess }).collect();
+        self.crumple_each(&jobs, rngs)
+    }
+
+    /// The same, each sheet with an excess of its own.
+    ///
+    /// # Errors
+    ///
+    /// Each sheet has its own result; see [`Cloth::crumple`].
+    ///
+    /// # Panics
+    ///
+    /// If there are not as many sources as sheets.
+    pub fn crumple_each<R: Rng>(&self, jobs: &[Job<'_>], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
+        assert_eq!(jobs.len(), rngs.len(), "each outline needs its own source of random numbers");
+        let mut tasks = Vec::with_capacity(jobs.len());
+        let mut errors = Vec::with_capacity(jobs.len());
+        for (job, rng) in jobs.iter().zip(rngs) {
+            match self.task(*job, rng) {
                 Ok(task) => {
                     tasks.push(task);
                     errors.push(None);
@@ -79,9 +104,10 @@ impl Cloth {
         errors.into_iter().map(|error| error.map_or_else(&mut next, Err)).collect()
     }
 
-    fn task<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Task, Error> {
-        let outline = Outline::new(outline)?;
-        let (start, offset) = rest::start(&self.disc, &outline, &self.params, rng);
+    fn task<R: Rng + ?Sized>(&self, job: Job<'_>, rng: &mut R) -> Result<Task, Error> {
+        check_excess(job.excess)?;
+        let outline = Outline::new(job.outline)?;
+        let (start, offset) = rest::start(&self.disc, &outline, job.excess, &self.params, rng);
         Ok(Task { outline, start, offset })
     }
 
@@ -169,6 +195,10 @@ mod tests {
 
     fn outlines() -> Vec<Vec<Point>> {
         vec![wavy(3.0, 0.2), angular(), wavy(7.0, 0.1), vec![[0.0, 0.0], [3.0, 0.2], [1.0, 4.0]], wavy(2.0, 0.5)]
+    }
+
+    fn task(cloth: &Cloth, outline: &[Point], seed: u64) -> Task {
+        cloth.task(Job { outline, excess: cloth.params.excess }, &mut rng(seed)).unwrap()
     }
 
     /// How far outside the polygon a point is.
@@ -261,6 +291,19 @@ mod tests {
     }
 
     #[test]
+    fn each_sheet_has_its_own_excess() {
+        let (plain, outline) = (Cloth::new(&few()).unwrap(), wavy(3.0, 0.1));
+        let excesses = [1.02, 1.3, 5.0, 1.15];
+        let jobs = excesses.map(|excess| Job { outline: &outline, excess });
+        let sheets = plain.crumple_each(&jobs, &mut [0, 1, 2, 3].map(rng));
+        for (k, excess) in excesses.into_iter().enumerate() {
+            let alone =
+                Cloth::new(&ClothParams { excess, ..few() }).and_then(|c| c.crumple(&outline, &mut rng(k as u64)));
+            assert_eq!(sheets[k], alone, "{excess}");
+        }
+    }
+
+    #[test]
     fn errors_stay_with_their_outline() {
         let cloth = Cloth::new(&few()).unwrap();
         let good = wavy(3.0, 0.1);
@@ -323,8 +366,7 @@ mod tests {
         let params = ClothParams::paper();
         let cloth = Cloth::new(&params).unwrap();
         let Solver::Verlet(verlet) = &params.solver else { panic!("not the paper's solver") };
-        let tasks: Vec<Task> =
-            (0..4_u8).map(|k| cloth.task(&wavy(2.0 + f64::from(k), 0.08), &mut rng(u64::from(k))).unwrap()).collect();
+        let tasks: Vec<Task> = (0..4_u8).map(|k| task(&cloth, &wavy(2.0 + f64::from(k), 0.08), u64::from(k))).collect();
         let starts: Vec<Start> = tasks.iter().map(|t| t.start.clone()).collect();
         let batch = cloth.run(&starts, wide);
         for (l, start) in starts.iter().enumerate() {
@@ -346,7 +388,7 @@ mod tests {
         let params = ClothParams { steps: 12, ..few() };
         let Solver::Xpbd(xpbd) = &params.solver else { panic!("not the default solver") };
         let cloth = Cloth::new(&params).unwrap();
-        let task = cloth.task(&wavy(3.0, 0.1), &mut rng(12)).unwrap();
+        let task = task(&cloth, &wavy(3.0, 0.1), 12);
         let mut exact = Batch::<f64, 1>::new(&cloth.topology, std::slice::from_ref(&task.start));
         exact.xpbd(&cloth.topology, params.steps, xpbd);
         let lanes = cloth.run(&[task.start.clone(), task.start], wide);

@@ -158,18 +158,20 @@ pub(crate) fn project<T: Real, const L: usize>(
     }
 }
 
-/// One distance, in all lanes. A function of its own, so that the compiler knows its arguments apart.
+/// One distance, in all lanes: on copies, so that the compiler knows them apart and takes all lanes at once.
 #[inline(always)]
 fn bind<T: Real, const L: usize>(p: &mut Node<T, L>, q: &mut Node<T, L>, rest: &Lane<T, L>, binding: &Binding<T>) {
     let least = -(binding.gain * binding.gives_way);
+    let (mut a, mut b) = (*p, *q);
     for l in 0..L {
-        let d = [q[0][l] - p[0][l], q[1][l] - p[1][l], q[2][l] - p[2][l]];
+        let d = [b[0][l] - a[0][l], b[1][l] - a[1][l], b[2][l] - a[2][l]];
         let s = pull(d, rest[l], binding.gain).at_least(least);
         for axis in 0..3 {
-            p[axis][l] = p[axis][l] + d[axis] * (s * binding.weights[0]);
-            q[axis][l] = q[axis][l] - d[axis] * (s * binding.weights[1]);
+            a[axis][l] = a[axis][l] + d[axis] * (s * binding.weights[0]);
+            b[axis][l] = b[axis][l] - d[axis] * (s * binding.weights[1]);
         }
     }
+    (*p, *q) = (a, b);
 }
 
 /// Ground and ceiling.

@@ -18,7 +18,7 @@ mod testing;
 mod verlet;
 mod xpbd;
 
-pub use cloth::Cloth;
+pub use cloth::{Cloth, Job};
 pub use crease::{Crease, Turn, crease_outline};
 pub use error::Error;
 pub use params::{ClothParams, Rest, Smoothing, Solver, VerletParams, XpbdParams};

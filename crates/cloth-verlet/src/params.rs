@@ -12,7 +12,7 @@ pub struct ClothParams {
     /// there are vertices on the rim of the default mesh. The paper: 75.
     /// With [`Solver::Xpbd`] the rim follows the outline point by point and its own number of vertices is used.
     pub outline_points: usize,
-    /// Area of the flat sheet over that of the outline, 1 to 4. Default 1.15 (ours).
+    /// Area of the flat sheet over that of the outline, 1 to 4, unless a [`Job`](crate::Job) has its own. Default 1.15 (ours).
     /// With [`Rest::Disc`] a least value: the disc may need to be larger.
     pub excess: f64,
     /// What the sheet is cut from.
@@ -161,7 +161,7 @@ impl ClothParams {
     pub(crate) fn check(&self) -> Result<(), Error> {
         count("vertices", self.vertices, (32, 65_536), "32 to 65536")?;
         count("outline_points", self.outline_points, (8, 65_536), "8 to 65536")?;
-        range("excess", self.excess, (1.0, 4.0), "1 to 4")?;
+        check_excess(self.excess)?;
         count("steps", self.steps, (1, 100_000), "1 to 100000")?;
         match &self.solver {
             Solver::Verlet(p) => {
@@ -185,6 +185,11 @@ impl ClothParams {
             }
         }
     }
+}
+
+/// Whether a sheet may be so large.
+pub(crate) fn check_excess(excess: f64) -> Result<(), Error> {
+    range("excess", excess, (1.0, 4.0), "1 to 4")
 }
 
 pub(crate) fn range(

@@ -41,16 +41,17 @@ pub(crate) fn outline_points(disc: &Disc, params: &ClothParams) -> usize {
 pub(crate) fn start<R: Rng + ?Sized>(
     disc: &Disc,
     outline: &Outline,
+    excess: f64,
     params: &ClothParams,
     rng: &mut R,
 ) -> (Start, f64) {
     let offset = unit(rng);
     let target = outline.resampled(outline_points(disc, params), offset);
     let (rest, from) = match params.rest {
-        Rest::Disc => round(disc, &target, outline, params),
+        Rest::Disc => round(disc, &target, outline, excess, params),
         Rest::Outline => {
-            let from = grown(&target, params.excess, rng);
-            (flattened(disc, &from, params.excess), from)
+            let from = grown(&target, excess, rng);
+            (flattened(disc, &from, excess), from)
         }
     };
     let (lift, held) = match &params.solver {
@@ -62,9 +63,15 @@ pub(crate) fn start<R: Rng + ?Sized>(
 }
 
 /// The paper's start: a disc, turned so that its rim stands where the outline's points are.
-fn round(disc: &Disc, target: &[Point], outline: &Outline, params: &ClothParams) -> (Vec<Point>, Vec<Point>) {
+fn round(
+    disc: &Disc,
+    target: &[Point],
+    outline: &Outline,
+    excess: f64,
+    params: &ClothParams,
+) -> (Vec<Point>, Vec<Point>) {
     let farthest = outline.points.iter().fold(0.0_f64, |m, p| m.max(p[0] * p[0] + p[1] * p[1])).sqrt();
-    let radius = farthest.max(params.excess.sqrt());
+    let radius = farthest.max(excess.sqrt());
     let room = match &params.solver {
         Solver::Verlet(p) => p.outline_start,
         Solver::Xpbd(_) => 1.0,

@@ -2,16 +2,19 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Run};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Progress as Step, Run};
 
 use crate::args::Generate;
-use crate::exit::{Complaint, Failure};
+use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
-use crate::report::{Progress, Start};
+use crate::profile::Account;
+use crate::report::{self, Progress, Start};
 use crate::setup::Setup;
 
 pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
-    let setup = Setup::load(&args.engine)?;
+    let account = args.profile.then(Account::open);
+    let profile = account.as_ref().map(|account| account.profile.clone());
+    let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
     let count = frames.end - frames.start;
@@ -28,8 +31,12 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     };
     let progress = Progress::start(args, Start { dir: args.out.clone(), seed, frames: count, threads: setup.threads })?;
     let check = if args.verify { Check::Hashes } else { Check::Sizes };
-    let run = Run { frames, at_once, threads, check, stop: interrupt.flag() };
-    let outcome = dataset.generate(&setup.engine, &run, &|step| progress.step(step));
+    let run = Run { frames, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
+    let step = |step: Step| {
+        account.iter().for_each(|account| account.step(step));
+        progress.step(step);
+    };
+    let outcome = dataset.generate(&setup.engine, &run, &step);
     progress.clear();
     let outcome = outcome.map_err(|error| match error {
         Error::Engine(error) => setup.recipe.refuse(&error),
@@ -44,7 +51,12 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     if outcome.made > 0 || !dataset.is_finished()? {
         dataset.finish().map_err(|error| damaged(&error))?;
     }
-    progress.done(&outcome)
+    progress.done(&outcome)?;
+    match account {
+        Some(account) if args.json => report::event(&account.event(setup.threads)),
+        Some(account) => exit::print(&account.table(setup.threads)),
+        None => Ok(()),
+    }
 }
 
 /// A frame of the right size that cannot be read.

@@ -13,6 +13,7 @@ mod learn;
 mod match_fields;
 mod nearest;
 mod preview;
+mod profile;
 mod recipe_file;
 mod report;
 mod schema;

@@ -17,7 +17,7 @@ const GAP_GREY: u8 = 255;
 
 pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
     text_file::may_replace(&args.out, b"\x89PNG", "an older picture")?;
-    let setup = Setup::load(&args.engine)?;
+    let setup = Setup::load(&args.engine, None)?;
     let key = Key { seed: args.engine.seed, index: args.index };
     let refuse = |error: Error| setup.recipe.refuse(&error);
     let scene = setup.engine.scene(key).map_err(refuse)?;

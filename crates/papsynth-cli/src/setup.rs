@@ -1,8 +1,10 @@
 //! From the command line to an engine.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use papsynth::model::Model;
+use papsynth::profile::Profile;
 use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 
@@ -30,13 +32,15 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
-    pub(crate) fn load(args: &EngineArgs) -> Result<Self, Failure> {
+    /// `profile` adds up how long the stages take.
+    pub(crate) fn load(args: &EngineArgs, profile: Option<Arc<Profile>>) -> Result<Self, Failure> {
         let mut recipe = RecipeFile::load(&args.recipe)?;
         let model = read_model(args.model.as_deref())?;
         recipe.check_classes(&model)?;
         let folder = recipe.folder.clone();
-        let (inputs, map) = read_inputs(&mut recipe.recipe, &folder, &Limits::default())
+        let (mut inputs, map) = read_inputs(&mut recipe.recipe, &folder, &Limits::default())
             .map_err(|error| Failure::dataset(&error, recipe.complaint("layout.path", error.to_string())))?;
+        inputs.profile = profile;
         let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
         for note in recipe.recipe.notes() {
             exit::note(&note.to_string());

@@ -317,6 +317,25 @@ fn json_tells_start_frames_and_end() {
 }
 
 #[test]
+fn a_profile_accounts_for_the_time_and_changes_no_byte() {
+    let bench = Bench::new("profile");
+    let run = bench.good(&format!("generate --out out --frames 2 --threads 1 --json --profile {TINY}"));
+    let event: serde_json::Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
+    assert_eq!(event["event"], "profile");
+    let stages = event["stages"].as_array().unwrap();
+    let spent: f64 = stages.iter().map(|stage| stage["ms_a_frame"].as_f64().unwrap()).sum();
+    // Stages do not overlap, so one thread cannot have spent more than there was.
+    assert!(spent > 0.0 && spent * event["frames_per_s"].as_f64().unwrap() <= 1000.0, "{event}");
+    assert!(["pixels_per_s", "objects_per_s"].iter().all(|rate| event[rate].as_f64().unwrap() > 0.0), "{event}");
+    let run = bench.good(&format!("generate --out told --frames 2 --profile {TINY}"));
+    let named = |name: &str| run.out.lines().any(|line| line.starts_with(name));
+    assert!(stages.iter().all(|stage| named(stage["stage"].as_str().unwrap())), "{}", run.out);
+    assert!(named("all stages") && run.out.contains("frames a second on"), "{}", run.out);
+    bench.good(&format!("generate --out plain --frames 2 {TINY}"));
+    assert_eq!(bench.files("told"), bench.files("plain"));
+}
+
+#[test]
 fn quiet_says_nothing_and_plain_lines_name_frames() {
     let bench = Bench::new("quiet");
     let run = bench.good(&format!("generate --out out --frames 1 --quiet {TINY}"));

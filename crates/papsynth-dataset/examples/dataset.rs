@@ -29,7 +29,7 @@ fn main() -> Result<(), Error> {
     let stop = AtomicBool::new(false);
     dataset.generate(
         &engine,
-        &Run { frames: 0..1, at_once: 1, threads: Threads::One, check: Check::Sizes, stop: &stop },
+        &Run { frames: 0..1, at_once: 1, threads: Threads::One, check: Check::Sizes, stop: &stop, profile: None },
         &|_| (),
     )?;
     dataset.finish()?;

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use papsynth::key::Key;
+use papsynth::profile::{Profile, Stage};
 use papsynth::{Engine, Threads};
 
 use crate::dataset::Dataset;
@@ -25,6 +26,8 @@ pub struct Run<'a> {
     pub check: Check,
     /// Set to end early: frames that are being made are completed, no other is begun.
     pub stop: &'a AtomicBool,
+    /// What adds up how long writing takes.
+    pub profile: Option<&'a Profile>,
 }
 
 /// A frame is done.
@@ -100,10 +103,20 @@ impl Dataset {
         }
         let key = Key { seed: self.identity.seed, index };
         let scene = engine.scene(key)?;
-        let mut writer = self.frame_writer(&scene)?;
-        let finished = engine.image::<Error>(scene, run.threads, |plane| writer.write_plane(plane))?;
-        report(Progress::Made(&writer.finish(&finished)?));
+        let mut writer = run.files(|| self.frame_writer(&scene))?;
+        let finished = engine.image::<Error>(scene, run.threads, |plane| run.files(|| writer.write_plane(plane)))?;
+        report(Progress::Made(&run.files(|| writer.finish(&finished))?));
         Ok(Made::Now)
+    }
+}
+
+impl Run<'_> {
+    /// Counts the time of some work to the files.
+    fn files<T>(&self, work: impl FnOnce() -> T) -> T {
+        match self.profile {
+            Some(profile) => profile.time(Stage::Files, work),
+            None => work(),
+        }
     }
 }
 

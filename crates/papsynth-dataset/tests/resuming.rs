@@ -176,7 +176,7 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     let stop = AtomicBool::new(false);
     let run = |dataset: &Dataset, frames, at_once| {
         let seen = Mutex::new(Vec::new());
-        let run = Run { frames, at_once, threads: Threads::One, check: Check::Sizes, stop: &stop };
+        let run = Run { frames, at_once, threads: Threads::One, check: Check::Sizes, stop: &stop, profile: None };
         let outcome = dataset.generate(&engine, &run, &|progress| {
             seen.lock().unwrap().push(match progress {
                 Progress::Kept(index) => (index, false),
@@ -205,8 +205,14 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     assert_eq!((outcome, seen), (Outcome { kept: 0, made: 0, stopped: true }, vec![]));
     let other = Scratch::new("split-3");
     let stranger = open(other.path()).unwrap();
-    let run =
-        Run { frames: 0..1, at_once: 1, threads: Threads::One, check: Check::Sizes, stop: &AtomicBool::new(false) };
+    let run = Run {
+        frames: 0..1,
+        at_once: 1,
+        threads: Threads::One,
+        check: Check::Sizes,
+        stop: &AtomicBool::new(false),
+        profile: None,
+    };
     assert!(stranger.generate(&engine, &run, &|_| ()).unwrap_err().to_string().contains("another recipe"));
 }
 
@@ -216,7 +222,7 @@ fn damage_that_keeps_the_size_is_found_and_mended() {
     let (recipe, engine) = small();
     let dataset = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
     let stop = AtomicBool::new(false);
-    let run = |check| Run { frames: 0..2, at_once: 1, threads: Threads::One, check, stop: &stop };
+    let run = |check| Run { frames: 0..2, at_once: 1, threads: Threads::One, check, stop: &stop, profile: None };
     assert!(!dataset.is_finished().unwrap());
     dataset.generate(&engine, &run(Check::Sizes), &|_| ()).unwrap();
     assert!(!dataset.is_finished().unwrap());

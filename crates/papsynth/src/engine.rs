@@ -1,12 +1,13 @@
 //! The engine: recipe, model, seed and index in; image and truth out.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::Error;
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::Studio;
+use crate::profile::{Profile, Stage, Watch};
 use crate::recipe::Recipe;
 use crate::render::{Desk, Rendering};
 use crate::scene::{self, Scene, WeightMap};
@@ -21,6 +22,8 @@ pub struct Inputs {
     pub weight_map: Option<WeightMap>,
     /// On which machines the bytes are the same.
     pub arithmetic: Arithmetic,
+    /// What adds up how long the stages take.
+    pub profile: Option<Arc<Profile>>,
 }
 
 /// On which machines the same recipe gives the same bytes. This is the one place that decides it.
@@ -65,7 +68,8 @@ impl Engine {
             Arithmetic::Fastest => optics_psf::Fft::Fastest,
             Arithmetic::Portable => optics_psf::Fft::Portable,
         });
-        let studio = Studio::new(recipe, model, fft).map_err(Error::Model)?;
+        let watch = Watch(inputs.profile.clone());
+        let studio = Studio::new(recipe, model, fft, watch).map_err(Error::Model)?;
         Ok(Self {
             recipe: recipe.clone(),
             model: model.clone(),
@@ -87,7 +91,7 @@ impl Engine {
     /// # Errors
     /// If the layout has no room for what is asked.
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
-        scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key)
+        self.studio.watch.time(Stage::Scene, || scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key))
     }
 
     /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.

@@ -16,6 +16,7 @@ pub mod key;
 pub mod learn;
 pub mod model;
 mod phantom;
+pub mod profile;
 mod random;
 pub mod recipe;
 mod render;

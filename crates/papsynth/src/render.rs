@@ -6,6 +6,7 @@ use crate::detect::{Detector, Developing, sum_over};
 use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::{self, Phantom, Studio};
+use crate::profile::{Stage, Watch};
 use crate::recipe::Restore;
 use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene};
@@ -38,6 +39,7 @@ pub(crate) struct Rendering {
     detector: Detector,
     /// How detectable each piece is, plane by plane.
     detectability: Vec<Vec<f64>>,
+    watch: Watch,
 }
 
 impl Rendering {
@@ -48,7 +50,8 @@ impl Rendering {
         threads: Threads,
         mut desk: Desk,
     ) -> Result<Self, String> {
-        let pools = studio.pools.make(scene.key);
+        let watch = studio.watch.clone();
+        let pools = watch.time(Stage::Pools, || studio.pools.make(scene.key));
         let objects: Vec<&Object> = scene.objects.iter().collect();
         let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
         let made = threads::map(threads, &batches, |batch| phantom::make(studio, &scene, &pools, batch));
@@ -56,12 +59,12 @@ impl Rendering {
         for batch in made {
             phantoms.extend(batch?);
         }
-        let (masks, covered) = masks(&scene, &phantoms, threads);
+        let (masks, covered) = watch.time(Stage::Masks, || masks(&scene, &phantoms, threads));
         let slide = Slide { scene: &scene, phantoms: &phantoms, masks: &masks };
-        let path = LightPath::new(slide, lenses, threads, &mut desk.light)?;
+        let path = watch.time(Stage::Light, || LightPath::new(slide, lenses, threads, &mut desk.light))?;
         let feathered = Feathered::new(&scene, &phantoms)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, masks, covered, path, feathered, desk, detector, detectability: Vec::new() })
+        Ok(Self { scene, phantoms, masks, covered, path, feathered, desk, detector, detectability: Vec::new(), watch })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -72,13 +75,16 @@ impl Rendering {
     pub(crate) fn plane(&mut self, index: usize) -> Result<&Plane, String> {
         let stage_um = self.scene.planes_um[index];
         let Desk { mut light, mut plane, mut developing, ids } = core::mem::take(&mut self.desk);
-        let passage = self.pass(FocusAt::Stage(stage_um), &mut light)?;
+        let watch = self.watch.clone();
+        let passage = watch.time(Stage::Light, || self.pass(FocusAt::Stage(stage_um), &mut light))?;
         plane.start(index, stage_um, self.scene.channels(), self.scene.view.width * self.scene.view.height);
         plane.floored = passage.floored;
-        let mut exposure = Exposure::new(self, &mut plane, &mut developing);
-        self.path.spread(&mut light, |band| exposure.add(band));
-        exposure.finish();
-        let electrons: Vec<Vec<f64>> = exposure.electrons.iter().map(MaskSums::sums).collect();
+        let electrons: Vec<Vec<f64>> = watch.time(Stage::Camera, || {
+            let mut exposure = Exposure::new(self, &mut plane, &mut developing);
+            self.path.spread(&mut light, |band| exposure.add(band));
+            exposure.finish();
+            exposure.electrons.iter().map(MaskSums::sums).collect()
+        });
         let detectability = self.detectabilities(&passage.absorbances, &electrons);
         self.detectability.push(detectability);
         self.desk = Desk { light, plane, developing, ids };
@@ -117,9 +123,11 @@ impl Rendering {
 
     /// The all-in-focus image and the truth, and the memory for the next image.
     pub(crate) fn finish(mut self) -> Result<(Finished, Desk), String> {
-        let all_in_focus = if self.planes() > 1 { self.all_in_focus()? } else { Vec::new() };
+        let watch = self.watch.clone();
+        let in_focus = |it: &mut Self| if it.planes() > 1 { it.all_in_focus() } else { Ok(Vec::new()) };
+        let all_in_focus = watch.time(Stage::Light, || in_focus(&mut self))?;
         let mut ids = core::mem::take(&mut self.desk.ids);
-        let truth = self.truth(&mut ids);
+        let truth = watch.time(Stage::Truth, || self.truth(&mut ids));
         Ok((Finished { scene: self.scene, truth, all_in_focus }, Desk { ids, ..self.desk }))
     }
 

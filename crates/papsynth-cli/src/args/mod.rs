@@ -130,6 +130,7 @@ Examples:
   papsynth generate --out fields --frames 8
   papsynth generate my.toml --out fields --frames 1000 --seed 7
   papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
+  papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
   papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
 pub(crate) struct Generate {
@@ -147,6 +148,9 @@ pub(crate) struct Generate {
     /// Read every file of the frames that are there and make those anew whose SHA-256 is wrong, instead of comparing sizes
     #[arg(long)]
     pub(crate) verify: bool,
+    /// Say where the time went, stage by stage, and how many pixels and objects a second were made
+    #[arg(long, conflicts_with = "quiet")]
+    pub(crate) profile: bool,
     /// Say nothing but errors
     #[arg(long, short, conflicts_with = "json")]
     pub(crate) quiet: bool,

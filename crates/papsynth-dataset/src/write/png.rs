@@ -26,13 +26,13 @@ pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixe
     Ok(out)
 }
 
-/// An image in colour, three bytes a pixel: one a data set, and small.
+/// An image in colour, three bytes a pixel.
 pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
     let mut out = Vec::new();
     let mut encoder = Encoder::new(&mut out, side(width)?, side(rgb.len() / (3 * width.max(1)))?);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(BitDepth::Eight);
-    encoder.set_compression(Compression::High);
+    encoder.set_compression(Compression::Balanced);
     write(encoder, rgb)?;
     Ok(out)
 }

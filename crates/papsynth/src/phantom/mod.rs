@@ -14,6 +14,7 @@ pub(crate) mod wobble;
 use dye_spectra::Amounts;
 
 use crate::debris;
+use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene};
 use crate::truth::Part;
 
@@ -67,12 +68,14 @@ pub(crate) fn make(
         })
         .collect();
     let mut made = cell::make(studio, scene, pools, &cells)?;
-    for ((object, _), phantom) in cells.iter().zip(&mut made) {
-        debris::cover(scene, pools, object, phantom);
-    }
-    let mut cells = made.into_iter();
-    let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
-    Ok(objects.iter().map(&mut phantom).map(Option::unwrap_or_default).collect())
+    studio.watch.time(Stage::Debris, || {
+        for ((object, _), phantom) in cells.iter().zip(&mut made) {
+            debris::cover(scene, pools, object, phantom);
+        }
+        let mut cells = made.into_iter();
+        let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
+        Ok(objects.iter().map(&mut phantom).map(Option::unwrap_or_default).collect())
+    })
 }
 
 /// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.

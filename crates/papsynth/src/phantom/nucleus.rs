@@ -30,17 +30,17 @@ const WRINKLE: f64 = 0.075;
 /// Part of the softened edge that may be cut off.
 const EDGE_LOST: f64 = 1e-3;
 
-/// Makes the nucleus of a cell whose middle lies at `cell_centre`.
+/// Makes the nucleus of a cell.
 pub(super) fn make(
     studio: &Studio,
     class: &ClassStudio,
     scene: &Scene,
     object: &Object,
     body: &CellBody,
-    cell_centre: Point,
 ) -> Result<Piece, String> {
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
+    let cell_centre = scene.grid().to_px(object.centre_um);
     let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;

@@ -11,20 +11,20 @@ use voronoi_cytoskeleton::{Skeleton, SkeletonParams};
 use super::chromatin::Donors;
 use super::pools::PoolMaker;
 use crate::model::{CellClass, Model, Shapes};
+use crate::profile::Watch;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
 use crate::scene::unknown_class;
-
-/// Excesses of sheets that meshes are made for: a cell's own lies between the least and the largest of them.
-const EXCESSES: usize = 4;
 
 /// Everything that phantoms are made with.
 #[derive(Debug)]
 pub(crate) struct Studio {
     pub(crate) recipe: Recipe,
     pub(crate) classes: BTreeMap<String, ClassStudio>,
-    pub(crate) cloths: Vec<(f64, Cloth)>,
+    /// The mesh of all sheets, if cells have any.
+    pub(crate) cloth: Option<Cloth>,
     pub(crate) skeleton: Skeleton,
     pub(crate) pools: PoolMaker,
+    pub(crate) watch: Watch,
 }
 
 /// What cells of one class are made with.
@@ -38,7 +38,7 @@ pub(crate) struct ClassStudio {
 }
 
 impl Studio {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, fft: Fft) -> Result<Self, String> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, fft: Fft, watch: Watch) -> Result<Self, String> {
         let mut classes = BTreeMap::new();
         for name in recipe.cells.keys() {
             let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
@@ -47,34 +47,21 @@ impl Studio {
         Ok(Self {
             recipe: recipe.clone(),
             classes,
-            cloths: cloths(recipe)?,
+            cloth: cloth(recipe)?,
             skeleton: Skeleton::new(&SkeletonParams::default()).map_err(|e| e.to_string())?,
             pools: PoolMaker::new(fft)?,
+            watch,
         })
-    }
-
-    /// The mesh whose excess is nearest to a cell's.
-    pub(crate) fn cloth(&self, excess: f64) -> usize {
-        let distance = |index: &usize| (self.cloths[*index].0 - excess).abs();
-        (0..self.cloths.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
     }
 }
 
-fn cloths(recipe: &Recipe) -> Result<Vec<(f64, Cloth)>, String> {
+fn cloth(recipe: &Recipe) -> Result<Option<Cloth>, String> {
     let params = match recipe.cytoplasm.sheet {
-        Sheet::Flat => return Ok(Vec::new()),
+        Sheet::Flat => return Ok(None),
         Sheet::Verlet => ClothParams::paper(),
         Sheet::Xpbd => ClothParams::default(),
     };
-    let [low, high] = recipe.cytoplasm.excess.bounds();
-    let steps = if high > low { EXCESSES } else { 1 };
-    (0..steps)
-        .map(|step| {
-            let excess = low + (high - low) * (step as f64 + 0.5) / steps as f64;
-            let cloth = Cloth::new(&ClothParams { excess, ..params.clone() });
-            cloth.map(|cloth| (excess, cloth)).map_err(|e| format!("cytoplasm: {e}"))
-        })
-        .collect()
+    Cloth::new(&params).map(Some).map_err(|e| format!("cytoplasm: {e}"))
 }
 
 impl ClassStudio {

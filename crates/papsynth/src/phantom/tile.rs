@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use ab_glyph_rasterizer::{Rasterizer, point};
+use multiversion::multiversion;
 
 /// A point in pixels: x right, y down, pixel centres at whole numbers.
 pub(crate) type Point = [f64; 2];
@@ -67,13 +68,68 @@ impl Tile {
         let at = |axis: usize, place: usize| {
             usize::try_from((self.origin[axis] + place as i64).div_euclid(side) - origin[axis]).unwrap_or(0)
         };
+        // Pixels of the first coarse one, which may begin before the tile.
+        let first = (n - usize::try_from(self.origin[0].rem_euclid(side)).unwrap_or(0)).min(self.width);
         for (y, row) in self.values.chunks_exact(self.width).enumerate() {
-            let coarse = &mut values[at(1, y) * width..][..width];
-            for (x, value) in row.iter().enumerate() {
-                coarse[at(0, x)] += weight * value;
+            let (left, rest) = row.split_at(first);
+            let [head, coarse @ ..] = &mut values[at(1, y) * width..][..width] else { continue };
+            left.iter().for_each(|value| *head += weight * value);
+            for (coarse, fine) in coarse.iter_mut().zip(rest.chunks(n)) {
+                fine.iter().for_each(|value| *coarse += weight * value);
             }
         }
         Self { origin, width, values }
+    }
+
+    /// The sum of all values: in sixteen partial sums, so that none has to wait for itself.
+    pub(crate) fn sum(&self) -> f64 {
+        sum(&self.values)
+    }
+
+    /// The tile on a grid `n` times as fine, each pixel repeated.
+    pub(crate) fn repeated(self, n: usize) -> Self {
+        if n == 1 {
+            return self;
+        }
+        let width = self.width * n;
+        let mut values = Vec::with_capacity(self.values.len() * n * n);
+        for row in self.values.chunks_exact(self.width) {
+            let first = values.len();
+            row.iter().for_each(|value| values.extend(core::iter::repeat_n(*value, n)));
+            (1..n).for_each(|_| values.extend_from_within(first..first + width));
+        }
+        Self { origin: self.origin.map(|at| at * n as i64), width, values }
+    }
+
+    /// The tile on a grid `n` times as fine, by cubics through its pixels (Catmull and Rom), none below 0. Nothing lies beyond it.
+    pub(crate) fn refined(self, n: usize) -> Self {
+        match n {
+            1 => self,
+            2 => self.refined_by::<2>(),
+            3 => self.refined_by::<3>(),
+            _ => self.refined_by::<4>(),
+        }
+    }
+
+    fn refined_by<const N: usize>(self) -> Self {
+        let (width, height) = (self.width, self.height());
+        let taps: [Taps; N] = core::array::from_fn(|k| Taps::new((k as f64 + 0.5) / N as f64 - 0.5));
+        let mut values = vec![0.0; self.values.len() * N * N];
+        // Room for the taps on both sides.
+        let mut line = vec![0.0; width + 2 * REACH];
+        let nothing = vec![0.0; width];
+        let row = |y: usize| {
+            let y = y.checked_sub(REACH).filter(|y| *y < height);
+            y.map_or(&nothing[..], |y| &self.values[y * width..(y + 1) * width])
+        };
+        for (y, rows) in values.chunks_exact_mut(N * N * width).enumerate() {
+            for (out, Taps { first, weights }) in rows.chunks_exact_mut(N * width).zip(&taps) {
+                let four = core::array::from_fn(|tap| row(y + first + tap));
+                mix(&mut line[REACH..REACH + width], four, *weights);
+                spread(out, &line, &taps);
+            }
+        }
+        Self { origin: self.origin.map(|at| at * N as i64), width: width * N, values }
     }
 
     pub(crate) fn height(&self) -> usize {
@@ -93,10 +149,27 @@ impl Tile {
     /// Raises every pixel to the share of its area that a simple polygon covers, if that is more. What lies beyond the tile is
     /// left out.
     pub(crate) fn cover(&mut self, polygon: &[Point]) {
+        let mut rasterizer = Rasterizer::new(self.width, self.height());
+        self.draw(&mut rasterizer, polygon);
+        let values = &mut self.values;
+        rasterizer.for_each_pixel(|index, share| values[index] = values[index].max(share.min(1.0)));
+    }
+
+    /// Adds so much of the share of each pixel that simple polygons cover, all of which run the same way round, polygon by polygon.
+    pub(crate) fn add_covers(&mut self, polygons: impl IntoIterator<Item = Vec<Point>>, weight: f32) {
+        let mut rasterizer = Rasterizer::new(self.width, self.height());
+        for polygon in polygons {
+            self.draw(&mut rasterizer, &polygon);
+        }
+        // Areas have signs, so that those of all add up.
+        let values = &mut self.values;
+        rasterizer.for_each_pixel(|index, share| values[index] += weight * share);
+    }
+
+    fn draw(&self, rasterizer: &mut Rasterizer, polygon: &[Point]) {
         let low = self.origin.map(|at| at as f64 - 0.5);
         let high = [low[0] + self.width as f64, low[1] + self.height() as f64];
         let polygon = &*clipped(polygon, low, high);
-        let mut rasterizer = Rasterizer::new(self.width, self.height());
         // Pixel (0, 0) of the rasteriser is the unit square whose corner, not centre, is at zero.
         let shift = |p: Point| {
             let x = p[0] - self.origin[0] as f64 + 0.5;
@@ -107,9 +180,68 @@ impl Tile {
             let to = polygon[(index + 1) % polygon.len()];
             rasterizer.draw_line(shift(from), shift(to));
         }
-        let values = &mut self.values;
-        rasterizer.for_each_pixel(|index, share| values[index] = values[index].max(share.min(1.0)));
     }
+
+    /// Gives every stretch of this tile that another one meets, with what of the other lies there.
+    pub(crate) fn meet(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
+        lay_at(&mut self.values, self.width, self.origin, other.as_ref(), blend);
+    }
+}
+
+/// How far from a pixel its taps may begin or end.
+const REACH: usize = 2;
+
+/// Four neighbours of a pixel and their weights.
+struct Taps {
+    /// The first of them, counted from [`REACH`] before the pixel.
+    first: usize,
+    weights: [f32; 4],
+}
+
+impl Taps {
+    /// For a place so far from a pixel's middle, −½ to ½.
+    fn new(offset: f64) -> Self {
+        let t = offset - offset.floor();
+        let cubic = [
+            ((-0.5 * t + 1.0) * t - 0.5) * t,
+            (1.5 * t - 2.5) * t * t + 1.0,
+            ((-1.5 * t + 2.0) * t + 0.5) * t,
+            (0.5 * t - 0.5) * t * t,
+        ];
+        Self { first: if offset < 0.0 { 0 } else { 1 }, weights: cubic.map(|weight| weight as f32) }
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn mix(out: &mut [f32], [a, b, c, d]: [&[f32]; 4], weights: [f32; 4]) {
+    for ((((out, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        *out = weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
+    }
+}
+
+/// From a row with [`REACH`] more at both ends to one `N` times as fine.
+#[multiversion(targets = "simd")]
+fn spread<const N: usize>(out: &mut [f32], line: &[f32], taps: &[Taps; N]) {
+    for (out, near) in out.as_chunks_mut::<N>().0.iter_mut().zip(line.windows(2 * REACH + 1)) {
+        for (out, Taps { first, weights }) in out.iter_mut().zip(taps) {
+            let near = &near[*first..first + 4];
+            let value = weights[0] * near[0] + weights[1] * near[1] + weights[2] * near[2] + weights[3] * near[3];
+            *out = if value > 0.0 { value } else { 0.0 };
+        }
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn sum(values: &[f32]) -> f64 {
+    const PARTS: usize = 16;
+    let mut parts = [0.0_f64; PARTS];
+    let (whole, rest) = values.as_chunks::<PARTS>();
+    for chunk in whole {
+        for (part, value) in parts.iter_mut().zip(chunk) {
+            *part += f64::from(*value);
+        }
+    }
+    parts.iter().sum::<f64>() + rest.iter().map(|value| f64::from(*value)).sum::<f64>()
 }
 
 /// The part of a polygon that lies in a rectangle, cut side by side (Sutherland and Hodgman, doi:10.1145/360767.360802).
@@ -213,6 +345,64 @@ mod tests {
         });
         // A pixel covered in part counts at its centre: right to a hundredth, where a shifted grid would be off by a half.
         assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres at whole numbers");
+    }
+
+    #[test]
+    fn sums_and_coarser_pixels_hold_everything() {
+        for (origin, width, height) in [([0, 0], 7, 30), ([-21, 3], 60, 5), ([2, -9], 3, 41), ([1, 1], 1, 1)] {
+            let values: Vec<f32> = (0..width * height).map(|i| ((i * 37) % 101) as f32 / 101.0).collect();
+            let tile = Tile { origin, width, values };
+            let sum: f64 = tile.values.iter().map(|v| f64::from(*v)).sum();
+            assert!((tile.sum() - sum).abs() < 1e-9);
+            for n in [1, 2, 3] {
+                let coarse = tile.coarsened(n);
+                assert!((coarse.sum() * (n * n) as f64 - sum).abs() < 1e-4, "{n}");
+                let (mut wanted, side) = (coarse.blank(), n as i64);
+                tile.clone().for_each(|[x, y], value| {
+                    let place = |at: f64, axis: usize| {
+                        usize::try_from((at as i64).div_euclid(side) - coarse.origin[axis]).unwrap()
+                    };
+                    wanted.values[place(y, 1) * coarse.width + place(x, 0)] += *value / (n * n) as f32;
+                });
+                assert!(wanted.values.iter().zip(&coarse.values).all(|(a, b)| (a - b).abs() < 1e-5), "{origin:?} {n}");
+            }
+        }
+    }
+
+    #[test]
+    fn finer_pixels_follow_a_quadratic_and_hold_the_same() {
+        for n in 1..=4 {
+            // Cubics through pixels reproduce quadratics where no tap leaves the tile.
+            let shape = |x: f64, y: f64| 5.0 + 0.3 * x - 0.2 * y + 0.02 * x * x - 0.01 * x * y;
+            let mut tile = Tile { origin: [-4, 3], width: 12, values: vec![0.0; 12 * 10] };
+            tile.for_each(|p, value| *value = shape(p[0], p[1]) as f32);
+            let mut fine = tile.clone().refined(n);
+            assert_eq!((fine.width, fine.height(), fine.origin), (12 * n, 10 * n, [-4 * n as i64, 3 * n as i64]));
+            let middle = |at: f64| (at + 0.5) / n as f64 - 0.5;
+            fine.for_each(|p, value| {
+                let [x, y] = p.map(middle);
+                let inside = (-2.0..=5.0).contains(&x) && (5.0..=10.0).contains(&y);
+                assert!(!inside || (f64::from(*value) - shape(x, y)).abs() < 1e-4, "{n}: {x} {y} {value}");
+            });
+            let repeated = tile.clone().repeated(n).coarsened(n);
+            assert!(repeated.values.iter().zip(&tile.values).all(|(a, b)| (a - b).abs() < 1e-5));
+            // What ends within the tile is hardly more on the finer grid, where its undershoot is cut off.
+            let mut blob = tile.blank();
+            blob.cover(&disc([1.2, 7.6], 2.7));
+            let (sum, area) = (blob.sum(), blob.refined(n).sum() / (n * n) as f64);
+            assert!((area / sum - 1.0).abs() < 0.02, "{n}: {area} {sum}");
+        }
+    }
+
+    #[test]
+    fn tiles_meet_where_they_overlap() {
+        let mut tile = Tile { origin: [-2, 4], width: 5, values: vec![0.0; 20] };
+        let other = Tile { origin: [1, 2], width: 4, values: (1..=16).map(|i| i as f32).collect() };
+        tile.meet(&other, |row, values| row.iter_mut().zip(values).for_each(|(row, value)| *row += value));
+        let mut wanted = vec![0.0; 20];
+        (wanted[3], wanted[4], wanted[8], wanted[9]) = (9.0, 10.0, 13.0, 14.0);
+        assert_eq!(tile.values, wanted);
+        tile.meet(&Tile { origin: [40, 4], ..other }, |_, _| panic!("they do not meet"));
     }
 
     #[test]

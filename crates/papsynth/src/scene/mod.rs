@@ -157,6 +157,15 @@ impl Scene {
         }
     }
 
+    /// The grid that cytoplasm is made on: the camera's pixels where these are fine enough for wrinkles, else the slide's
+    /// grid.
+    pub(crate) fn sheet_grid(&self) -> View {
+        /// σ of the narrowest wrinkle is .18 µm: sampled no farther apart than this, its strength depends on its place by less than
+        /// a hundredth.
+        const COARSEST_UM: f64 = 0.35;
+        if self.view.pixel_um <= COARSEST_UM { self.view } else { self.grid() }
+    }
+
     /// The depth that is in focus at a travel of the stage, µm. Light bends at the cover glass: with a dry lens the focus
     /// goes 1.5 times as deep as the stage.
     #[must_use]

@@ -111,7 +111,7 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     if per_100_um2 <= 0.0 {
         return;
     }
-    let area_um2 = coverage.values.iter().map(|v| f64::from(*v)).sum::<f64>() * pixel_um * pixel_um;
+    let area_um2 = coverage.sum() * pixel_um * pixel_um;
     let wanted = random::count(per_100_um2 * area_um2 / 100.0);
     let (width, height) = (absorbance.width, absorbance.height());
     // As many tries as would put the wanted number inside a box that the cell fills.
@@ -136,15 +136,24 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
 
 /// Makes a sheet thicker towards one side, so much of its thickness a radius from its middle.
 pub(super) fn slant(absorbance: &mut Tile, centre: Point, radius_px: f64, wedge: [f64; 2]) {
-    /// Thinnest that a slant makes the far side, relative to the middle, and thickest the near one.
-    const BOUNDS: [f64; 2] = [0.35, 1.8];
     if wedge == [0.0; 2] {
         return;
     }
-    absorbance.for_each(|p, value| {
-        let slope = (wedge[0] * (p[0] - centre[0]) + wedge[1] * (p[1] - centre[1])) / radius_px;
-        *value *= (1.0 + slope).clamp(BOUNDS[0], BOUNDS[1]) as f32;
-    });
+    let [across, down] = wedge.map(|slope| slope / radius_px);
+    let [left, top] = [0, 1].map(|axis| absorbance.origin[axis] as f64 - centre[axis]);
+    for (y, row) in absorbance.values.chunks_exact_mut(absorbance.width).enumerate() {
+        slant_row(row, (1.0 + across * left + down * (top + y as f64)) as f32, across as f32);
+    }
+}
+
+/// Multiplies by `first`, and by `step` more from value to value.
+#[multiversion(targets = "simd")]
+fn slant_row(row: &mut [f32], first: f32, step: f32) {
+    /// Thinnest that a slant makes the far side, relative to the middle, and thickest the near one.
+    const BOUNDS: [f32; 2] = [0.35, 1.8];
+    for (x, value) in row.iter_mut().enumerate() {
+        *value *= (first + step * x as f32).clamp(BOUNDS[0], BOUNDS[1]);
+    }
 }
 
 /// A sheet thins out towards its rim: thickness falls to nothing over about this distance, px.
@@ -154,34 +163,56 @@ pub(super) fn thin_rim(absorbance: &mut Tile, coverage: &Tile, reach_px: f64) {
         return;
     }
     // Along a straight rim the mean of the cover over a box is a half at the rim and 1 a radius inside it.
-    let mut cover = coverage.clone();
-    let (width, height) = (cover.width, cover.height());
-    let mut line = Vec::new();
-    for row in cover.values.chunks_exact_mut(width) {
-        box_mean(row, radius, &mut line);
+    let width = coverage.width;
+    let mut across = vec![0.0; coverage.values.len()];
+    sums_across(&coverage.values, width, radius, &mut across);
+    let weight = 1.0 / ((2 * radius + 1) as f32 * (2 * radius + 1) as f32);
+    let row = |y: usize| across.get(y * width..(y + 1) * width);
+    let mut sums = vec![0.0; width];
+    for y in 0..radius {
+        row(y).into_iter().for_each(|row| add_row(&mut sums, row, 1.0));
     }
-    let mut column = vec![0.0; height];
-    for x in 0..width {
-        column.iter_mut().zip(cover.values[x..].iter().step_by(width)).for_each(|(to, from)| *to = *from);
-        box_mean(&mut column, radius, &mut line);
-        cover.values[x..].iter_mut().step_by(width).zip(&column).for_each(|(to, from)| *to = *from);
+    for (y, values) in absorbance.values.chunks_exact_mut(width).enumerate() {
+        row(y + radius).into_iter().for_each(|row| add_row(&mut sums, row, 1.0));
+        thin(values, &sums, weight);
+        y.checked_sub(radius).and_then(row).into_iter().for_each(|row| add_row(&mut sums, row, -1.0));
     }
-    for (value, share) in absorbance.values.iter_mut().zip(&cover.values) {
-        let inside = (2.0 * share - 1.0).clamp(0.0, 1.0);
+}
+
+#[multiversion(targets = "simd")]
+fn add_row(sums: &mut [f32], row: &[f32], sign: f32) {
+    for (sum, value) in sums.iter_mut().zip(row) {
+        *sum += sign * value;
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn thin(values: &mut [f32], sums: &[f32], weight: f32) {
+    for (value, sum) in values.iter_mut().zip(sums) {
+        let inside = (2.0 * weight * sum - 1.0).clamp(0.0, 1.0);
         *value *= inside * (2.0 - inside);
     }
 }
 
-/// The mean over so many values to either side, those beyond the ends 0.
-fn box_mean(values: &mut [f32], radius: usize, before: &mut Vec<f32>) {
-    before.clear();
-    before.extend_from_slice(values);
-    let weight = 1.0 / (2 * radius + 1) as f32;
-    let mut sum: f32 = before.iter().take(radius).sum();
-    for (i, value) in values.iter_mut().enumerate() {
-        sum += before.get(i + radius).copied().unwrap_or(0.0);
-        *value = sum * weight;
-        sum -= i.checked_sub(radius).map_or(0.0, |out| before[out]);
+/// Sums over so many values to either side within rows, those beyond the ends 0. Several rows at a time, since each
+/// running sum has to wait for itself.
+fn sums_across(values: &[f32], width: usize, radius: usize, out: &mut [f32]) {
+    const ROWS: usize = 8;
+    let (blocks, out_blocks) = (values.chunks(ROWS * width), out.chunks_mut(ROWS * width));
+    for (block, out) in blocks.zip(out_blocks) {
+        let rows = block.len() / width;
+        let mut sums = [0.0_f32; ROWS];
+        let at = |k: usize, x: usize| if k < rows && x < width { block[k * width + x] } else { 0.0 };
+        for x in 0..radius {
+            sums.iter_mut().enumerate().for_each(|(k, sum)| *sum += at(k, x));
+        }
+        for x in 0..width {
+            for (k, sum) in sums.iter_mut().enumerate().take(rows) {
+                *sum += at(k, x + radius);
+                out[k * width + x] = *sum;
+                *sum -= x.checked_sub(radius).map_or(0.0, |x| at(k, x));
+            }
+        }
     }
 }
 
@@ -194,21 +225,21 @@ const LIFT: f32 = 2.2;
 /// Steps from none to all of what changes towards the middle of a cell.
 const STEPS: usize = 6;
 
-/// How far inside a polygon a place lies: 1 within `inner` times its size about `centre`, 0 outside `outer` times, and even
+/// How far inside a polygon the places of a tile lie: 1 within `inner` times its size about `centre`, 0 outside `outer` times, and even
 /// steps between.
 fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -> Tile {
-    let mut sum = like.blank();
-    for step in 0..STEPS {
+    let scaled = |step: usize| {
         let share = inner + (outer - inner) * (step as f64 + 0.5) / STEPS as f64;
-        let scaled: Vec<Point> = polygon
-            .iter()
-            .map(|p| [centre[0] + share * (p[0] - centre[0]), centre[1] + share * (p[1] - centre[1])])
-            .collect();
-        let mut cover = like.blank();
-        cover.cover(&scaled);
-        sum.values.iter_mut().zip(&cover.values).for_each(|(sum, cover)| *sum += cover / STEPS as f32);
-    }
-    sum
+        grown(polygon, centre, share)
+    };
+    let mut shares = like.blank();
+    shares.add_covers((0..STEPS).map(scaled), 1.0 / STEPS as f32);
+    shares
+}
+
+/// A polygon as many times as large about a point.
+fn grown(polygon: &[Point], centre: Point, times: f64) -> Vec<Point> {
+    polygon.iter().map(|p| [centre[0] + times * (p[0] - centre[0]), centre[1] + times * (p[1] - centre[1])]).collect()
 }
 
 /// The granular inner part of the cytoplasm round the nucleus, denser than the clear outer part.
@@ -231,12 +262,12 @@ pub(super) fn add_endoplasm(
     let radius = body.nucleus.radius_um / pixel_um;
     let round = wobbled_circle(radius, 0.15, 0.15, rng);
     let round: Vec<Point> = round.iter().map(|p| [p[0] + nucleus[0], p[1] + nucleus[1]]).collect();
-    let lifted = ramp(absorbance, &round, nucleus, 1.0, LIFTED);
-    absorbance
-        .values
-        .iter_mut()
-        .zip(&lifted.values)
-        .for_each(|(value, share)| *value *= 1.0 + LIFT * share * body.detail.endoplasm as f32);
+    let near = Tile::around(&grown(&round, nucleus, LIFTED), 1.0);
+    let lifted = ramp(&near, &round, nucleus, 1.0, LIFTED);
+    let lift = LIFT * body.detail.endoplasm as f32;
+    absorbance.meet(&lifted, |values, shares| {
+        values.iter_mut().zip(shares).for_each(|(value, share)| *value *= 1.0 + lift * share);
+    });
     let grain = Look::fine(pixel_um, rng);
     let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
     let width = absorbance.width;
@@ -255,13 +286,84 @@ pub(super) fn add_endoplasm(
 
 /// The cleared space round the nucleus of a koilocyte, and the condensed cytoplasm at its edge.
 pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, body: &CellBody, pixel_um: f64, rng: &mut Stream) {
+    /// How far the condensed rim reaches, relative to the cleared space.
+    const RIM: f64 = 1.35;
     let Some(halo) = body.halo else { return };
     let radius = halo.radius_um / pixel_um;
     let edge = wobbled_circle(radius, 0.12, 0.10, rng);
     let edge: Vec<Point> = edge.iter().map(|p| [nucleus[0] + 1.15 * p[0], nucleus[1] + 0.87 * p[1]]).collect();
-    let clear = ramp(absorbance, &edge, nucleus, 0.88, 1.0);
-    let rim = ramp(absorbance, &edge, nucleus, 1.0, 1.35);
-    for ((value, clear), rim) in absorbance.values.iter_mut().zip(&clear.values).zip(&rim.values) {
-        *value *= (1.0 + halo.rim as f32 * (rim - clear)) * (1.0 - halo.clearing as f32 * clear);
+    let near = Tile::around(&grown(&edge, nucleus, RIM), 1.0);
+    let clear = ramp(&near, &edge, nucleus, 0.88, 1.0);
+    let mut factor = ramp(&near, &edge, nucleus, 1.0, RIM);
+    for (factor, clear) in factor.values.iter_mut().zip(&clear.values) {
+        *factor = (1.0 + halo.rim as f32 * (*factor - clear)) * (1.0 - halo.clearing as f32 * clear);
+    }
+    absorbance.meet(&factor, |values, factors| {
+        values.iter_mut().zip(factors).for_each(|(value, factor)| *value *= factor);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn disc(centre: Point, radius: f64) -> Vec<Point> {
+        (0..200)
+            .map(|i| core::f64::consts::TAU * f64::from(i) / 200.0)
+            .map(|angle| [centre[0] + radius * libm::cos(angle), centre[1] + radius * libm::sin(angle)])
+            .collect()
+    }
+
+    #[test]
+    fn a_rim_thins_by_the_mean_of_the_cover_around() {
+        let mut cover = Tile { origin: [3, -7], width: 31, values: vec![0.0; 31 * 27] };
+        cover.cover(&disc([17.0, 5.0], 11.0));
+        let radius = 4_i64;
+        let mut thin = Tile { values: vec![1.0; 31 * 27], ..cover.clone() };
+        thin_rim(&mut thin, &cover, 4.0);
+        for y in 0..27_i64 {
+            for x in 0..31_i64 {
+                let at = |x: i64, y: i64| {
+                    let inside = (0..31).contains(&x) && (0..27).contains(&y);
+                    if inside { f64::from(cover.values[usize::try_from(y * 31 + x).unwrap()]) } else { 0.0 }
+                };
+                let sum: f64 = (-radius..=radius)
+                    .flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)))
+                    .map(|(dx, dy)| at(x + dx, y + dy))
+                    .sum();
+                let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
+                let found = f64::from(thin.values[usize::try_from(y * 31 + x).unwrap()]);
+                assert!((found - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ramp_is_the_mean_of_nested_covers() {
+        let like = Tile { origin: [-20, -20], width: 41, values: vec![0.0; 41 * 41] };
+        let (polygon, centre) = (disc([1.0, 0.5], 12.0), [0.0, 0.0]);
+        let ramp = ramp(&like, &polygon, centre, 0.6, 1.4);
+        let mut mean = like.blank();
+        for step in 0..STEPS {
+            let mut cover = like.blank();
+            cover.cover(&grown(&polygon, centre, 0.6 + 0.8 * (step as f64 + 0.5) / STEPS as f64));
+            mean.values.iter_mut().zip(&cover.values).for_each(|(mean, share)| *mean += share / STEPS as f32);
+        }
+        for (a, b) in ramp.values.iter().zip(&mean.values) {
+            assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+        assert!((ramp.values[20 * 41 + 20] - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_slant_leaves_the_middle_as_it_is() {
+        let mut tile = Tile { origin: [-30, 10], width: 61, values: vec![2.0; 61 * 41] };
+        slant(&mut tile, [0.0, 30.0], 25.0, [0.5, -0.25]);
+        let at = |x: usize, y: usize| f64::from(tile.values[y * 61 + x]);
+        assert!((at(30, 20) - 2.0).abs() < 1e-6);
+        assert!((at(40, 30) - 2.0 * (1.0 + (5.0 - 2.5) / 25.0)).abs() < 1e-5, "{}", at(40, 30));
+        let mut steep = Tile { origin: [-30, 10], width: 61, values: vec![1.0; 61 * 41] };
+        slant(&mut steep, [0.0, 30.0], 1.0, [0.5, 0.0]);
+        assert!(steep.values.iter().all(|v| (0.35..=1.8).contains(v)));
     }
 }

@@ -1,6 +1,6 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
 
-use cloth_verlet::{Crease, Sheet, Turn, View, crease_outline};
+use cloth_verlet::{Crease, Job, Sheet, Turn, View, crease_outline};
 
 mod detail;
 mod outline;
@@ -13,6 +13,7 @@ use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::phantom::{Phantom, Piece};
 use crate::phantom::{form, nucleus};
+use crate::profile::Stage;
 use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
 use crate::truth::Part;
 
@@ -34,13 +35,11 @@ pub(super) fn make(
 ) -> Result<Vec<Phantom>, String> {
     let plans =
         cells.iter().map(|(object, body)| Plan::new(studio, scene, object, body)).collect::<Result<Vec<_>, _>>()?;
-    let sheets = crumple(studio, scene, cells, &plans)?;
-    cells
-        .iter()
-        .zip(plans)
-        .zip(sheets)
-        .map(|(((object, body), plan), sheet)| finish(studio, scene, pools, object, body, plan, sheet))
-        .collect()
+    let sheets = studio.watch.time(Stage::Sheets, || crumple(studio, scene, cells, &plans))?;
+    let finished = |(((object, body), plan), sheet): ((&(&Object, &CellBody), Plan), Option<Sheet>)| {
+        finish(studio, scene, pools, object, body, plan, sheet)
+    };
+    studio.watch.time(Stage::Cytoplasm, || cells.iter().zip(plans).zip(sheets).map(finished).collect())
 }
 
 /// A cell before it has a sheet.
@@ -58,29 +57,41 @@ impl<'a> Plan<'a> {
             .classes
             .get(&body.class)
             .ok_or_else(|| format!("the scene holds a cell of class `{}`, which its recipe does not", body.class))?;
-        let mut rng = scene.key.stream("cell", object.number, "outline");
-        let radius_px = body.radius_um / scene.grid().pixel_um;
-        let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
-        let centre = scene.grid().to_px(object.centre_um);
-        let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
-        let posed = formed.rotated(object.rotation_deg.to_radians());
-        let outline = posed.outline(POINTS);
-        let middle = fsd_shape::centroid(&outline);
-        let outline: Vec<Point> =
-            outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
-        let own = &mut scene.key.stream("cell", object.number, "outline.corners");
-        let outline = outline::shaped(outline, &body.detail, own);
-        let nucleus = nucleus::make(studio, class, scene, object, body, centre)?;
+        let centre = scene.sheet_grid().to_px(object.centre_um);
+        let outline = studio.watch.time(Stage::Outlines, || outline(class, scene, object, body, centre))?;
+        let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(studio, class, scene, object, body))?;
         let creases = body.fold.map_or(Vec::new(), |fold| creases(fold, &outline, centre, body, scene));
         Ok(Self { class, centre, outline, nucleus, creases })
     }
 }
 
+/// The outline of a cell before its rim is roughened.
+fn outline(
+    class: &ClassStudio,
+    scene: &Scene,
+    object: &Object,
+    body: &CellBody,
+    centre: Point,
+) -> Result<Vec<Point>, String> {
+    let mut rng = scene.key.stream("cell", object.number, "outline");
+    let radius_px = body.radius_um / scene.sheet_grid().pixel_um;
+    let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
+    let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
+    let posed = formed.rotated(object.rotation_deg.to_radians());
+    let outline = posed.outline(POINTS);
+    let middle = fsd_shape::centroid(&outline);
+    let outline: Vec<Point> =
+        outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
+    let own = &mut scene.key.stream("cell", object.number, "outline.corners");
+    Ok(outline::shaped(outline, &body.detail, own))
+}
+
 /// The lines along which a cell is folded, each with its side turned in.
 fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene: &Scene) -> Vec<Crease> {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
-    let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / scene.grid().pixel_um);
-    let nucleus_radius = body.nucleus.radius_um / scene.grid().pixel_um;
+    let pixel_um = scene.sheet_grid().pixel_um;
+    let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / pixel_um);
+    let nucleus_radius = body.nucleus.radius_um / pixel_um;
     let crease = |direction: f64| {
         let normal = [libm::cos(direction), libm::sin(direction)];
         let reach =
@@ -96,7 +107,7 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
             // The line runs a quarter turn before the direction that leads beyond it.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
-            radius: fold.radius_um / scene.grid().pixel_um,
+            radius: fold.radius_um / pixel_um,
             turn,
         }
     };
@@ -114,25 +125,20 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
     }
 }
 
-/// Presses the sheets of all cells, those with meshes of the same excess together.
+/// Presses the sheets of all cells.
 fn crumple(
     studio: &Studio,
     scene: &Scene,
     cells: &[(&Object, &CellBody)],
     plans: &[Plan],
 ) -> Result<Vec<Option<Sheet>>, String> {
-    let mut sheets: Vec<Option<Sheet>> = plans.iter().map(|_| None).collect();
-    let choice: Vec<usize> = cells.iter().map(|(_, body)| studio.cloth(body.detail.excess)).collect();
-    for (index, (_, cloth)) in studio.cloths.iter().enumerate() {
-        let chosen: Vec<usize> = (0..cells.len()).filter(|&i| choice[i] == index).collect();
-        let outlines: Vec<&[Point]> = chosen.iter().map(|&i| plans[i].outline.as_slice()).collect();
-        let mut streams: Vec<Stream> =
-            chosen.iter().map(|&i| scene.key.stream("cell", cells[i].0.number, "sheet")).collect();
-        for (&i, sheet) in chosen.iter().zip(cloth.crumple_many(&outlines, &mut streams)) {
-            sheets[i] = Some(sheet.map_err(|e| e.to_string())?);
-        }
-    }
-    Ok(sheets)
+    let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
+    let jobs =
+        cells.iter().zip(plans).map(|((_, body), plan)| Job { outline: &plan.outline, excess: body.detail.excess });
+    let mut streams: Vec<Stream> =
+        cells.iter().map(|(object, _)| scene.key.stream("cell", object.number, "sheet")).collect();
+    let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
+    sheets.into_iter().map(|sheet| sheet.map(Some).map_err(|e| e.to_string())).collect()
 }
 
 /// Presses, folds and stains a cell. Its absorbance is that of a dye along the light's path (Eq. 12): A = κ·c·l, where
@@ -148,7 +154,7 @@ fn finish(
 ) -> Result<Phantom, String> {
     let own = |purpose: &str| scene.key.stream("cell", object.number, purpose);
     let mut rng = own("detail");
-    let pixel_um = scene.grid().pixel_um;
+    let pixel_um = scene.sheet_grid().pixel_um;
     let mut pieces = vec![plan.outline.clone()];
     for crease in &plan.creases {
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
@@ -188,11 +194,12 @@ fn finish(
         detail::add_cytoskeleton(studio, &mut absorbance, &plan.outline, body.detail.cytoskeleton, pixel_um, &mut rng)?;
     }
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
-    for (value, cover) in absorbance.values.iter_mut().zip(&coverage.values) {
-        // Eq. 12: A = κ·c·l.
-        *value *= cover * body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE) as f32;
-    }
-    let area_px = coverage.values.iter().map(|v| f64::from(*v)).sum();
+    // Eq. 12: A = κ·c·l.
+    let strength = body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE) as f32;
+    absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
+    let step = scene.grid().width / scene.sheet_grid().width;
+    let area_px = coverage.sum() * (step * step) as f64;
+    let (absorbance, coverage) = (absorbance.refined(step), coverage.repeated(step));
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE);
     let dyes = body.dyes;
     let cytoplasm = Piece { part: Part::Cytoplasm, absorbance, coverage, area_px, imaged: false, dyes, phase_rad };

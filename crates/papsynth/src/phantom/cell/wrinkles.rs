@@ -1,6 +1,11 @@
 //! Wrinkles: narrow creases in which a sheet lies doubled, some along its rim, some across it, some forked.
 
+use core::ops::Range;
+
+use multiversion::multiversion;
+
 use super::super::tile::{Point, Tile};
+use crate::exp10::exp;
 use crate::key::Stream;
 use crate::random;
 use crate::scene::CellDetail;
@@ -28,16 +33,18 @@ pub(super) fn add(
     pixel_um: f64,
     rng: &mut Stream,
 ) {
+    let step = STEP_UM / pixel_um;
+    let rim = if detail.wrinkles > 0 { fsd_shape::resample(outline, steps_round(outline, step)) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     let mut canvas = vec![0.0; thickness.values.len()];
     for _ in 0..detail.wrinkles {
         let path = match random::uniform(rng) {
-            u if u < ALONG_RIM => along_rim(outline, STEP_UM / pixel_um, rng),
+            u if u < ALONG_RIM => along_rim(outline, &rim, rng),
             u if u < ALONG_RIM + (1.0 - ALONG_RIM) * FORKED && !drawn.is_empty() => {
                 let stem = &drawn[random::below(drawn.len(), rng)];
-                forked(stem, outline, STEP_UM / pixel_um, rng)
+                forked(stem, outline, step, rng)
             }
-            _ => across(outline, STEP_UM / pixel_um, rng),
+            _ => across(outline, step, rng),
         };
         let brush = Brush {
             width: detail.wrinkle_um * random::between(0.6, 1.6, rng) / pixel_um,
@@ -58,9 +65,13 @@ fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
     (0..count).map(|_| (0.9 + walk.next(rng)).clamp(0.0, 2.5)).collect()
 }
 
-/// A stretch of the rim, moved inwards.
-fn along_rim(outline: &[Point], step: f64, rng: &mut Stream) -> Vec<Point> {
-    let fine = fsd_shape::resample(outline, random::count(fsd_shape::perimeter(outline) / step).max(8));
+/// How many steps it takes to go round.
+fn steps_round(outline: &[Point], step: f64) -> usize {
+    random::count(fsd_shape::perimeter(outline) / step).max(8)
+}
+
+/// A stretch of the rim, moved inwards. `fine` is the outline step by step.
+fn along_rim(outline: &[Point], fine: &[Point], rng: &mut Stream) -> Vec<Point> {
     let middle = fsd_shape::centroid(outline);
     let length = random::count(fine.len() as f64 * random::between(0.06, 0.35, rng)).max(4);
     let first = random::below(fine.len(), rng);
@@ -153,57 +164,174 @@ struct Brush {
 impl Brush {
     /// Adds the wrinkle to what the cell covers. `canvas` is zero before and after.
     fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
-        let (width, height) = (thickness.width as i64, thickness.height() as i64);
+        let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
-        let reach = (3.0 * self.width).max(2.2 * SLOPE_WIDTH * self.width) + 1.0;
-        #[expect(clippy::cast_possible_truncation, reason = "a few pixels round a place in a tile")]
-        let span = |a: f64, b: f64, size: i64| {
-            let (low, high) = ((a.min(b) - reach).floor() as i64, (a.max(b) + reach).ceil() as i64);
-            (low.clamp(0, size), (high + 1).clamp(0, size))
-        };
-        let mut touched = (height, 0);
+        // First column, row; beyond the last ones.
+        let mut touched = [width, height, 0, 0];
         for (index, (ends, uneven)) in path.windows(2).zip(&self.uneven).enumerate() {
-            let [a, b] = [ends[0], ends[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
-            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-            let length = (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
-            let (tx, ty) = (dx / length, dy / length);
+            let ends = [ends[0], ends[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
             let t = (index as f64 + 0.5) / (path.len() - 1) as f64;
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
             let strength = self.strength * fade * (2.0 - fade) * uneven;
             if strength <= 0.0 {
                 continue;
             }
-            let ((x0, x1), (y0, y1)) = (span(a[0], b[0], width), span(a[1], b[1], height));
-            touched = (touched.0.min(y0), touched.1.max(y1));
-            for y in y0..y1 {
-                for x in x0..x1 {
-                    let (px, py) = (x as f64 - a[0], y as f64 - a[1]);
-                    let along = px * tx + py * ty;
-                    let beyond = if along < 0.0 { -along } else { (along - length).max(0.0) };
-                    if beyond > self.width {
-                        continue;
-                    }
-                    let off = self.side * (py * tx - px * ty);
-                    let value = strength * self.profile(off);
-                    let at = usize::try_from(y * width + x).unwrap_or(0);
-                    canvas[at] = canvas[at].max(value as f32);
-                }
+            let strip = self.strip(ends, strength);
+            let rows = strip.rows(height);
+            let [first, end] = strip.paint(canvas, width, rows.clone());
+            if first < end {
+                touched[0] = touched[0].min(first);
+                touched[1] = touched[1].min(rows.start);
+                touched[2] = touched[2].max(end);
+                touched[3] = touched[3].max(rows.end);
             }
         }
-        let rows = usize::try_from(touched.0.min(touched.1)).unwrap_or(0) * thickness.width
-            ..usize::try_from(touched.1).unwrap_or(0) * thickness.width;
-        let pixels = thickness.values[rows.clone()].iter_mut().zip(&coverage.values[rows.clone()]);
-        for ((value, cover), added) in pixels.zip(&mut canvas[rows]) {
-            if *cover > 0.0 {
-                *value += *added;
+        let [left, top, right, bottom] = touched;
+        for row in (top..bottom).map(|y| y * width + left..y * width + right) {
+            let pixels = thickness.values[row.clone()].iter_mut().zip(&coverage.values[row.clone()]);
+            for ((value, cover), added) in pixels.zip(&mut canvas[row]) {
+                *value += if *cover > 0.0 { *added } else { 0.0 };
+                *added = 0.0;
             }
-            *added = 0.0;
         }
     }
 
-    /// Thickness over that of the crest, at a distance from it: a Gaussian crest, and a slope on one side.
-    fn profile(&self, off: f64) -> f64 {
-        let gauss = libm::exp(-0.5 * (off / self.width) * (off / self.width));
-        if off <= 0.0 { gauss } else { gauss + SLOPE * (libm::exp(-off / (SLOPE_WIDTH * self.width)) - gauss) }
+    /// One step of the wrinkle, from one place of the tile to the next.
+    fn strip(&self, [a, b]: [Point; 2], strength: f64) -> Strip {
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let length = (dx * dx + dy * dy).sqrt().max(f64::MIN_POSITIVE);
+        let along = [dx / length, dy / length];
+        Strip {
+            from: a,
+            along,
+            off: [-self.side * along[1], self.side * along[0]],
+            reach: [[-self.width, length + self.width], [-3.0 * self.width, 2.2 * SLOPE_WIDTH * self.width]],
+            strength: strength as f32,
+            crest: (-0.5 / (self.width * self.width)) as f32,
+            slope: (-1.0 / (SLOPE_WIDTH * self.width)) as f32,
+        }
+    }
+}
+
+/// A step of a wrinkle: a rectangle with a profile across it.
+struct Strip {
+    from: Point,
+    /// Unit vectors: where it leads, and to the side of its slope.
+    along: Point,
+    off: Point,
+    /// How far it reaches in these two directions, px.
+    reach: [[f64; 2]; 2],
+    strength: f32,
+    /// −1/(2σ²) of the crest and −1/λ of the slope, px⁻² and px⁻¹.
+    crest: f32,
+    slope: f32,
+}
+
+impl Strip {
+    /// The rows of an image so high that it meets.
+    fn rows(&self, height: usize) -> Range<usize> {
+        let corner = |along: usize, off: usize| {
+            self.from[1] + self.reach[0][along] * self.along[1] + self.reach[1][off] * self.off[1]
+        };
+        let corners = [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)];
+        let (low, high) = corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
+        whole(low, high, height)
+    }
+
+    /// The columns of a row that lie in it.
+    fn columns(&self, y: usize, width: usize) -> Range<usize> {
+        let (mut low, mut high) = (0.0_f64, width as f64);
+        for (direction, [least, most]) in [self.along, self.off].into_iter().zip(self.reach) {
+            // How far along the direction column 0 lies, and how much further each column leads.
+            let at = (y as f64 - self.from[1]) * direction[1] - self.from[0] * direction[0];
+            if direction[0].abs() > 1e-9 {
+                let [a, b] = [(least - at) / direction[0], (most - at) / direction[0]];
+                (low, high) = (low.max(a.min(b)), high.min(a.max(b)));
+            } else if at < least || at > most {
+                return 0..0;
+            }
+        }
+        whole(low, high, width)
+    }
+
+    /// Raises the pixels of some rows to the profile across it, and says which columns those are: the first, and behind the last.
+    fn paint(&self, canvas: &mut [f32], width: usize, rows: Range<usize>) -> [usize; 2] {
+        let mut touched = [width, 0];
+        for y in rows {
+            let columns = self.columns(y, width);
+            if columns.is_empty() {
+                continue;
+            }
+            touched = [touched[0].min(columns.start), touched[1].max(columns.end)];
+            let first = (columns.start as f64 - self.from[0]) * self.off[0] + (y as f64 - self.from[1]) * self.off[1];
+            let row = &mut canvas[y * width..][columns];
+            raise(row, [first as f32, self.off[0] as f32], [self.crest, self.slope], self.strength);
+        }
+        touched
+    }
+}
+
+/// The whole numbers between two others, of those below a count.
+fn whole(low: f64, high: f64, count: usize) -> Range<usize> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to pixels of a tile")]
+    let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
+    clamped(low.ceil())..clamped(high.floor() + 1.0)
+}
+
+/// Raises a row to a profile, whose distances from the crest are `first + i·step`: a Gaussian crest, and a slope on the positive side.
+#[multiversion(targets = "simd")]
+fn raise(row: &mut [f32], [first, step]: [f32; 2], [crest, slope]: [f32; 2], strength: f32) {
+    for (i, value) in row.iter_mut().enumerate() {
+        let off = first + step * i as f32;
+        let gauss = exp(crest * off * off);
+        let sloping = gauss + SLOPE as f32 * (exp(slope * off.max(0.0)) - gauss);
+        let profile = strength * if off > 0.0 { sloping } else { gauss };
+        *value = if profile > *value { profile } else { *value };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_is_painted_as_its_profile_says() {
+        let (width, height) = (90, 70);
+        for (side, direction) in [(1.0, 0.3), (-1.0, 2.0), (1.0, 0.0), (-1.0, -core::f64::consts::FRAC_PI_2)] {
+            let brush = Brush { width: 2.3, strength: 0.0, side, rise: 0.0, fall: 0.0, uneven: Vec::new() };
+            let along = [libm::cos(direction), libm::sin(direction)];
+            let [a, length] = [[40.3, 33.8], [7.0, 7.0]];
+            let strip = brush.strip([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
+            let mut canvas = vec![0.0; width * height];
+            let touched = strip.paint(&mut canvas, width, strip.rows(height));
+            let mut painted = 0;
+            for (index, value) in canvas.iter().enumerate() {
+                let p = [(index % width) as f64 - a[0], (index / width) as f64 - a[1]];
+                let on = p[0] * along[0] + p[1] * along[1];
+                let off = side * (p[1] * along[0] - p[0] * along[1]);
+                let inside = (-2.3..=9.3).contains(&on) && (-6.9..=20.24).contains(&off);
+                let gauss = libm::exp(-0.5 * off * off / (2.3 * 2.3));
+                let slope = if off > 0.0 { SLOPE * (libm::exp(-off / (SLOPE_WIDTH * 2.3)) - gauss) } else { 0.0 };
+                let wanted = if inside { 0.8 * (gauss + slope) } else { 0.0 };
+                assert!((f64::from(*value) - wanted).abs() < 1e-5, "{direction}: {p:?} {value} {wanted}");
+                painted += usize::from(inside);
+                assert!(!inside || (touched[0]..touched[1]).contains(&(index % width)), "{touched:?} {index}");
+            }
+            assert!(painted > 250, "{painted}");
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_the_tile_is_left_out() {
+        let brush = Brush { width: 2.0, strength: 1.0, side: 1.0, rise: 0.1, fall: 0.1, uneven: vec![1.0; 40] };
+        let path: Vec<Point> = (0..40).map(|i| [f64::from(i) - 15.0, 0.4 * f64::from(i) - 9.0]).collect();
+        let tile = Tile { origin: [-5, -3], width: 12, values: vec![1.0; 12 * 9] };
+        let (mut drawn, mut canvas) = (tile.clone(), vec![0.0; 12 * 9]);
+        brush.draw(&path, &mut drawn, &tile, &mut canvas);
+        assert!(canvas.iter().all(|v| *v == 0.0));
+        assert!(drawn.values.iter().any(|v| *v > 1.5) && drawn.values.iter().all(|v| (1.0..=2.0).contains(v)));
+        let mut bare = tile.clone();
+        brush.draw(&path, &mut bare, &tile.blank(), &mut canvas);
+        assert_eq!(bare, tile);
     }
 }

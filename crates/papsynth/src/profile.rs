@@ -1,0 +1,139 @@
+//! Where the time goes, stage by stage.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// A stage of the way from recipe to files. Stages do not overlap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Which objects there are, and where.
+    Scene,
+    /// Fields that cells look their clouds, flecks and grain up in.
+    Pools,
+    /// Outlines of cells.
+    Outlines,
+    /// Nuclei: outline, chromatin, membrane.
+    Nuclei,
+    /// Sheets pressed into outlines.
+    Sheets,
+    /// Sheets folded, drawn, wrinkled, stained.
+    Cytoplasm,
+    /// Everything that is no cell.
+    Debris,
+    /// Complete masks.
+    Masks,
+    /// What comes through the slide, imaged.
+    Light,
+    /// Light on the sensor, noise, grey levels.
+    Camera,
+    /// Fronts and layers, rows of the table.
+    Truth,
+    /// Files encoded and written.
+    Files,
+}
+
+impl Stage {
+    /// Every stage, in the order of the way.
+    pub const ALL: [Self; 12] = [
+        Self::Scene,
+        Self::Pools,
+        Self::Outlines,
+        Self::Nuclei,
+        Self::Sheets,
+        Self::Cytoplasm,
+        Self::Debris,
+        Self::Masks,
+        Self::Light,
+        Self::Camera,
+        Self::Truth,
+        Self::Files,
+    ];
+
+    /// Its name in a report.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scene => "scene",
+            Self::Pools => "pools of texture",
+            Self::Outlines => "outlines of cells",
+            Self::Nuclei => "nuclei",
+            Self::Sheets => "sheets pressed",
+            Self::Cytoplasm => "cytoplasm",
+            Self::Debris => "debris",
+            Self::Masks => "masks",
+            Self::Light => "light",
+            Self::Camera => "camera",
+            Self::Truth => "truth",
+            Self::Files => "files",
+        }
+    }
+}
+
+/// Adds up how long the stages take, over all frames and threads.
+///
+/// The engine has no clock of its own: the caller gives one, such as the time since the program began.
+#[derive(Debug)]
+pub struct Profile {
+    now: fn() -> Duration,
+    nanoseconds: [AtomicU64; Stage::ALL.len()],
+}
+
+impl Profile {
+    /// A profile of nothing yet, by a clock that never runs backwards.
+    #[must_use]
+    pub fn new(now: fn() -> Duration) -> Self {
+        Self { now, nanoseconds: Default::default() }
+    }
+
+    /// Does some work, and counts its time to a stage.
+    pub fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
+        let begun = (self.now)();
+        let done = work();
+        let spent = (self.now)().saturating_sub(begun).as_nanos();
+        self.nanoseconds[stage as usize].fetch_add(u64::try_from(spent).unwrap_or(u64::MAX), Ordering::Relaxed);
+        done
+    }
+
+    /// What a stage took so far: the sum over all threads.
+    #[must_use]
+    pub fn spent(&self, stage: Stage) -> Duration {
+        Duration::from_nanos(self.nanoseconds[stage as usize].load(Ordering::Relaxed))
+    }
+}
+
+/// A profile, if anyone wants one.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Watch(pub(crate) Option<Arc<Profile>>);
+
+impl Watch {
+    pub(crate) fn time<T>(&self, stage: Stage, work: impl FnOnce() -> T) -> T {
+        match &self.0 {
+            Some(profile) => profile.time(stage, work),
+            None => work(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_add_up_by_stage() {
+        static TICKS: AtomicU64 = AtomicU64::new(0);
+        let profile = Profile::new(|| Duration::from_millis(TICKS.fetch_add(7, Ordering::Relaxed)));
+        assert_eq!(profile.time(Stage::Light, || 3), 3);
+        profile.time(Stage::Light, || ());
+        profile.time(Stage::Files, || ());
+        for (place, stage) in Stage::ALL.into_iter().enumerate() {
+            assert_eq!(stage as usize, place);
+            let wanted = match stage {
+                Stage::Light => 14,
+                Stage::Files => 7,
+                _ => 0,
+            };
+            assert_eq!(profile.spent(stage), Duration::from_millis(wanted), "{}", stage.name());
+        }
+    }
+}
