@@ -1,5 +1,7 @@
 //! Benches of the techniques and of the engine.
 
+mod counts;
+
 use std::fs;
 use std::path::Path;
 
@@ -12,12 +14,15 @@ use crate::{Chore, peers, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "bench",
-    usage: "[--save NAME] [--against NAME] [FILTER] | peers [--repetitions N]",
-    about: "runs the benches of all crates, or races the whole simulator against a good Python program",
+    usage: "[--save NAME] [--against NAME] [FILTER] | counts [--bless] | peers [--only NAME,...] [--repetitions N] [--record]",
+    about: "runs the benches of all crates, counts instructions, or races against good programs of others",
     details: "--save keeps the figures under a name, --against compares with such a name, FILTER picks benches by name.\n\
-              `peers` measures both programs in one run on this machine and prints ratios: CPU time and memory of a frame and of a \
-              stack, and what two threads do against two processes. It needs Python, and is left out with a sentence where \
-              there is none; a failure where CI is set.",
+              `counts` counts the instructions of small works under valgrind and fails where one takes 2 % more than \
+              benches/counts.toml keeps for this compiler; --bless writes that file.\n\
+              `peers` does the works of a table in our way and in a good program of others, in turn on one thread of this machine, and \
+              prints times, ratios and what is wanted; nothing is asserted. --only runs the rows whose names begin so, --repetitions says how \
+              often both sides are measured in turn (5), --record adds a line to benches/history.jsonl and draws docs/performance.svg.\n\
+              What needs valgrind or Python is left out with a sentence where there is none; a failure where CI is set.",
     run,
 };
 
@@ -25,10 +30,15 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     if arguments.flag("peers") {
         return peers::run(workspace, arguments);
     }
+    if arguments.flag("counts") {
+        return counts::run(workspace, arguments);
+    }
     let save = arguments.option("--save")?;
     let against = arguments.option("--against")?;
     // Named one by one, since the test harness of a library does not know criterion's arguments.
-    let benches = workspace.packages.iter().flat_map(|package| &package.targets).filter(|(kind, _)| kind == "bench");
+    // Those that count instructions know neither.
+    let packages = workspace.packages.iter().filter(|package| package.name != counts::PACKAGE);
+    let benches = packages.flat_map(|package| &package.targets).filter(|(kind, _)| kind == "bench");
     let mut command = workspace.cargo();
     command.args(["bench", "--workspace"]);
     for (_, name) in benches {

@@ -12,8 +12,8 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
     details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the study the data set, the \
-               judge nobody, the program all of them, the chores nobody. Dependencies of tests count too, so that every crate can be \
-              taken, tested and published alone.",
+              judge nobody, the program all of them, the benches what they time, the chores nobody. Dependencies of tests count too, so \
+              that every crate can be taken, tested and published alone.",
     run,
 };
 
@@ -27,11 +27,12 @@ enum Role {
     Match,
     Study,
     Program,
+    Benches,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 16] = [
+const PLACES: [(&str, Role); 17] = [
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -47,6 +48,7 @@ const PLACES: [(&str, Role); 16] = [
     ("papsynth-study", Role::Study),
     ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
+    ("papsynth-benches", Role::Benches),
     ("xtask", Role::Chores),
 ];
 
@@ -66,6 +68,8 @@ impl Role {
             Self::Match => &[Self::Engine, Self::Judge],
             // It shows files, whoever made them.
             Self::Study => &[Self::Dataset],
+            // They time what is called from outside.
+            Self::Benches => &[Self::Technique, Self::Engine, Self::Dataset],
             // It measures microscopes and cameras, which are no business of the engine.
             Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Match, Self::Study],
         }

@@ -1,0 +1,103 @@
+//! What one cell is made of: its sheet, the texture of its nucleus, its cytoskeleton.
+
+use std::hint::black_box;
+
+use cloth_verlet::{Cloth, ClothParams, Crease, Turn, View};
+use quilt_texture::{QuiltParams, Quilter, Source};
+use voronoi_cytoskeleton::{LineParams, Skeleton, SkeletonParams, draw_into};
+
+use crate::{Work, noise, rng};
+
+/// Sheets that are pressed at once, one in each SIMD lane.
+pub(crate) const SHEETS: u8 = 16;
+
+/// Side of a nucleus in pixels.
+const NUCLEUS_PX: usize = 40;
+
+/// Side of a cell in pixels.
+const CELL_PX: usize = 200;
+
+/// Side of the picture of a sheet in pixels.
+const SHEET_PX: usize = 220;
+
+/// A closed curve of so many points about the origin, some 100 pixels from it.
+fn outline(points: u32, waves: f64) -> Vec<[f64; 2]> {
+    (0..points)
+        .map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(points))
+        .map(|angle| (100.0 * (1.0 + 0.1 * libm::cos(waves * angle)), angle))
+        .map(|(r, angle)| [r * libm::cos(angle), r * libm::sin(angle)])
+        .collect()
+}
+
+/// Sixteen sheets, each pressed into an outline of its own.
+#[must_use]
+pub fn sheets(params: &ClothParams) -> Work {
+    let cloth = Cloth::new(params).expect("the parameters are valid");
+    let outlines: Vec<_> = (0..SHEETS).map(|k| outline(200, f64::from(2 + k % 5))).collect();
+    let rngs: Vec<_> = (0..SHEETS).map(|k| rng(k.into())).collect();
+    Box::new(move || {
+        let outlines: Vec<&[_]> = outlines.iter().map(Vec::as_slice).collect();
+        black_box(cloth.crumple_many(&outlines, &mut rngs.clone()));
+    })
+}
+
+/// The picture of a folded sheet as thickness.
+#[must_use]
+pub fn thickness() -> Work {
+    let cloth = Cloth::new(&ClothParams { steps: 12, ..ClothParams::default() }).expect("the parameters are valid");
+    let mut sheet = cloth.crumple(&outline(200, 3.0), &mut rng(1)).expect("the outline has an area");
+    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, turn: Turn::Flap };
+    sheet.fold(&crease).expect("the crease meets the sheet");
+    let view = View { origin: [-110.0, -110.0], pixel: 1.0 };
+    let mut image = vec![0.0; SHEET_PX * SHEET_PX];
+    Box::new(move || {
+        sheet.thickness_into(&mut image, SHEET_PX, &view, |r| 1.5 - r * r);
+        black_box(&image);
+    })
+}
+
+/// The texture of a nucleus of 40 x 40 pixels from three donors, the paper's way.
+#[must_use]
+pub fn texture() -> Work {
+    let offset = |i: usize| (2 * i + 1) as f32 / NUCLEUS_PX as f32 - 1.0;
+    let inside = |x: f32, y: f32| if x * x + y * y < 1.0 { 1.0 } else { 0.0 };
+    let mask: Vec<f32> =
+        (0..NUCLEUS_PX * NUCLEUS_PX).map(|i| inside(offset(i % NUCLEUS_PX), offset(i / NUCLEUS_PX))).collect();
+    let sources: Vec<_> =
+        (0..3).map(|seed| Source::new(&donor(seed), &mask, NUCLEUS_PX).expect("a disc has room for a patch")).collect();
+    let mut rng = rng(1);
+    let params = QuiltParams::paper();
+    Box::new(move || {
+        let sources: Vec<&Source> = sources.iter().collect();
+        let quilter = Quilter::new(&sources, &params).expect("the parameters are valid");
+        black_box(quilter.synthesise(&mask, NUCLEUS_PX, &mut rng));
+    })
+}
+
+/// White noise averaged over 3 x 3 pixels, with a standard deviation of about 17 grey levels.
+fn donor(seed: u64) -> Vec<f32> {
+    let noise = noise(NUCLEUS_PX * NUCLEUS_PX, seed);
+    let at = |x: usize, y: usize| noise[y % NUCLEUS_PX * NUCLEUS_PX + x % NUCLEUS_PX];
+    let mean = |i: usize| {
+        let (x, y) = (i % NUCLEUS_PX, i / NUCLEUS_PX);
+        (0..9).map(|k| at(x + k % 3, y + k / 3)).sum::<f32>() / 9.0
+    };
+    (0..NUCLEUS_PX * NUCLEUS_PX).map(|i| 177.0 * mean(i)).collect()
+}
+
+/// The cytoskeleton of a cell 200 pixels wide, grown and drawn.
+#[must_use]
+pub fn cytoskeleton() -> Work {
+    let middle = CELL_PX as f64 / 2.0;
+    let outline: Vec<_> = outline(420, 3.0).into_iter().map(|[x, y]| [middle + 0.88 * x, middle + 0.88 * y]).collect();
+    let skeleton = Skeleton::new(&SkeletonParams::default()).expect("the defaults are valid");
+    let line = LineParams::default();
+    let mut rng = rng(7);
+    let mut image = vec![0.0; CELL_PX * CELL_PX];
+    Box::new(move || {
+        image.fill(0.0);
+        let rivers = skeleton.grow(&outline, &mut rng).expect("the outline has an area");
+        draw_into(&mut image, CELL_PX, &rivers, &line).expect("the line is valid");
+        black_box(&image);
+    })
+}
