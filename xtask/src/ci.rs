@@ -7,22 +7,22 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
-use crate::{Chore, browser, dataset, deps, equations, external, publish, shell, test, wasm};
+use crate::{Chore, bench, browser, dataset, deps, equations, external, publish, shell, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
     usage: "",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
-    details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, a data set, other people's \
+    details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
               readers, the study in a browser, wasm32, packages. All steps run even if one fails; each tells its time. Where CI \
-              is set, a step that cannot run for want of Python, Chromium or the real material (PAPSYNTH_REFERENCE) is a failure.",
+              is set, a step that cannot run for want of Python, Chromium, valgrind or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
 /// Cheap ones first. The golden images are part of the tests.
-const STEPS: [Step; 13] = [
+const STEPS: [Step; 14] = [
     ("format", |workspace| cargo(workspace, &["fmt", "--all", "--check"])),
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
@@ -32,6 +32,7 @@ const STEPS: [Step; 13] = [
     }),
     ("documentation", documentation),
     ("tests", |workspace| chore(workspace, &test::CHORE)),
+    ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
     ("data set", |workspace| chore(workspace, &dataset::CHORE)),
     ("external readers", |workspace| chore(workspace, &external::CHORE)),
     ("browser", |workspace| chore(workspace, &browser::CHORE)),

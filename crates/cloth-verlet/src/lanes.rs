@@ -48,9 +48,8 @@ impl Topology {
     pub(crate) fn new(disc: &Disc, sides: usize) -> Topology {
         // Pairs hold the smaller index first, and the rim comes before all others.
         let on_rim = |p: &Pair| p.iter().filter(|&&v| (v as usize) < disc.rim).count();
-        let sorted = |pairs: &[Pair]| {
-            [2, 1, 0].map(|count| spaced(pairs.iter().copied().filter(|p| on_rim(p) == count), disc.points.len()))
-        };
+        let sorted =
+            |pairs: &[Pair]| [2, 1, 0].map(|count| pairs.iter().copied().filter(|p| on_rim(p) == count).collect());
         Topology {
             edges: sorted(&disc.edges),
             bends: sorted(&disc.bends),
@@ -58,24 +57,6 @@ impl Topology {
             rim: disc.rim,
         }
     }
-}
-
-/// Pairs between two of the same vertex, if it can be had: a pair need not wait for the one before it then.
-const APART: usize = 8;
-
-/// Pairs of some of so many vertices in an order in which near ones seldom share a vertex.
-fn spaced(pairs: impl Iterator<Item = Pair>, vertices: usize) -> Vec<Pair> {
-    let mut left: Vec<Pair> = pairs.collect();
-    let mut order = Vec::with_capacity(left.len());
-    // The place in the order from which a vertex may come again.
-    let mut free = vec![0; vertices];
-    while !left.is_empty() {
-        let fits = |pair: &Pair| pair.iter().all(|&v| free[v as usize] <= order.len());
-        let pair = left.remove(left.iter().position(fits).unwrap_or(0));
-        order.push(pair);
-        pair.iter().for_each(|&v| free[v as usize] = order.len() + APART - 1);
-    }
-    order
 }
 
 /// One sheet before it is pressed, in units of its outline's equivalent radius.
@@ -228,22 +209,6 @@ mod tests {
         for (a, b) in before.iter().zip(sum(&now)) {
             assert!((a - b).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn pairs_are_spaced_and_none_is_lost() {
-        let disc = Disc::new(300).unwrap();
-        let order = spaced(disc.edges.iter().copied(), disc.points.len());
-        let close = order.windows(APART).filter(|near| near[1..].iter().any(|p| p.iter().any(|v| near[0].contains(v))));
-        assert!(close.count() < order.len() / 50);
-        let sorted = |pairs: &[Pair]| {
-            let mut pairs = pairs.to_vec();
-            pairs.sort_unstable();
-            pairs
-        };
-        assert_eq!(sorted(&order), sorted(&disc.edges));
-        // Where all share a vertex, they come as they are.
-        assert_eq!(spaced([[0, 1], [0, 2], [0, 3]].into_iter(), 4), [[0, 1], [0, 2], [0, 3]]);
     }
 
     #[test]
