@@ -81,7 +81,15 @@ fn once(mut work: Work) -> Work {
 
 library_benchmark_group!(name = works, benchmarks = once);
 
+/// Makes the C library clear and copy memory by plain vectors at every size. Else it goes by the caches of the machine, and a string
+/// instruction counts once for each byte.
+const PLAIN_MEMORY: &str = "glibc.cpu.x86_rep_movsb_threshold=0xffffffffffffffff:\
+                            glibc.cpu.x86_rep_stosb_threshold=0xffffffffffffffff:\
+                            glibc.cpu.x86_non_temporal_threshold=0xfffffffffffffff";
+
 main!(
-    config = LibraryBenchmarkConfig::default().tool(Callgrind::with_args(["--cache-sim=no"])),
+    config = LibraryBenchmarkConfig::default()
+        .tool(Callgrind::with_args(["--cache-sim=no"]))
+        .env("GLIBC_TUNABLES", PLAIN_MEMORY),
     library_benchmark_groups = works
 );
