@@ -9,15 +9,13 @@ use std::time::Duration;
 pub enum Stage {
     /// Which objects there are, and where.
     Scene,
-    /// Fields that cells look their clouds, flecks and grain up in.
-    Pools,
     /// Outlines of cells.
     Outlines,
     /// Nuclei: outline, chromatin, membrane.
     Nuclei,
     /// Sheets pressed into outlines.
     Sheets,
-    /// Sheets folded, drawn, wrinkled, stained.
+    /// Sheets folded, drawn, wrinkled, stained; with the first of a field the fields that all look their texture up in.
     Cytoplasm,
     /// Everything that is no cell.
     Debris,
@@ -35,9 +33,8 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in the order of the way.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 11] = [
         Self::Scene,
-        Self::Pools,
         Self::Outlines,
         Self::Nuclei,
         Self::Sheets,
@@ -55,7 +52,6 @@ impl Stage {
     pub fn name(self) -> &'static str {
         match self {
             Self::Scene => "scene",
-            Self::Pools => "pools of texture",
             Self::Outlines => "outlines of cells",
             Self::Nuclei => "nuclei",
             Self::Sheets => "sheets pressed",

@@ -51,7 +51,7 @@ impl Rendering {
         mut desk: Desk,
     ) -> Result<Self, String> {
         let watch = studio.watch.clone();
-        let pools = watch.time(Stage::Pools, || studio.pools.make(scene.key));
+        let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
         let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
         let made = threads::map(threads, &batches, |batch| phantom::make(studio, &scene, &pools, batch));
@@ -124,8 +124,8 @@ impl Rendering {
     /// The all-in-focus image and the truth, and the memory for the next image.
     pub(crate) fn finish(mut self) -> Result<(Finished, Desk), String> {
         let watch = self.watch.clone();
-        let in_focus = |it: &mut Self| if it.planes() > 1 { it.all_in_focus() } else { Ok(Vec::new()) };
-        let all_in_focus = watch.time(Stage::Light, || in_focus(&mut self))?;
+        let several = self.planes() > 1;
+        let all_in_focus = if several { watch.time(Stage::Light, || self.all_in_focus())? } else { Vec::new() };
         let mut ids = core::mem::take(&mut self.desk.ids);
         let truth = watch.time(Stage::Truth, || self.truth(&mut ids));
         Ok((Finished { scene: self.scene, truth, all_in_focus }, Desk { ids, ..self.desk }))

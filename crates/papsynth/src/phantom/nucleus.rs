@@ -4,7 +4,7 @@ use optics_psf::{Border, Gaussian, Method};
 
 use super::chromatin::standardise;
 use super::studio::{ClassStudio, Studio};
-use super::tile::{Point, Tile, area};
+use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
 use super::{Piece, form};
 use crate::random;
@@ -57,11 +57,7 @@ pub(super) fn make(
     coverage.cover(&outline);
     let mut inner = coverage.blank();
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
-    let inside: Vec<Point> = outline
-        .iter()
-        .map(|p| [centre[0] + shrink * (p[0] - centre[0]), centre[1] + shrink * (p[1] - centre[1])])
-        .collect();
-    inner.cover(&inside);
+    inner.cover(&grown(&outline, centre, shrink));
 
     let mut rng = scene.key.stream("cell", object.number, "nucleus.texture");
     let mut texture = match studio.recipe.nucleus.chromatin {

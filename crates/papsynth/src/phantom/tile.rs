@@ -313,6 +313,11 @@ pub(crate) fn lay_at(
     }
 }
 
+/// A polygon as many times as large about a point.
+pub(crate) fn grown(polygon: &[Point], about: Point, times: f64) -> Vec<Point> {
+    polygon.iter().map(|p| [about[0] + times * (p[0] - about[0]), about[1] + times * (p[1] - about[1])]).collect()
+}
+
 /// Area of a simple polygon, pixels².
 pub(crate) fn area(polygon: &[Point]) -> f64 {
     fsd_shape::signed_area(polygon).abs()

@@ -6,7 +6,7 @@ use voronoi_cytoskeleton::{LineParams, draw_into};
 use crate::key::Stream;
 use crate::phantom::pools::{Look, Pools, SIDE, Texels};
 use crate::phantom::studio::Studio;
-use crate::phantom::tile::{Point, Tile};
+use crate::phantom::tile::{Point, Tile, grown};
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
 use crate::scene::CellBody;
@@ -235,11 +235,6 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
     let mut shares = like.blank();
     shares.add_covers((0..STEPS).map(scaled), 1.0 / STEPS as f32);
     shares
-}
-
-/// A polygon as many times as large about a point.
-fn grown(polygon: &[Point], centre: Point, times: f64) -> Vec<Point> {
-    polygon.iter().map(|p| [centre[0] + times * (p[0] - centre[0]), centre[1] + times * (p[1] - centre[1])]).collect()
 }
 
 /// The granular inner part of the cytoplasm round the nucleus, denser than the clear outer part.
