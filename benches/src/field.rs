@@ -10,7 +10,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{Law, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Run};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
 
 use crate::{Size, Work};
 
@@ -115,7 +115,13 @@ pub fn default_files(folder: &Path) -> Work {
     let scratch = Scratch(folder.join(format!("fields-{}", std::process::id())));
     let (recipe, model) = (default_recipe(), Model::builtin());
     let engine = Engine::new(&recipe, &model, &Inputs::default()).expect("the recipe is valid");
-    let info = DatasetInfo { recipe: &recipe, model: &model, seed: SEED, map: None };
+    let info = DatasetInfo {
+        recipe: &recipe,
+        model: &model,
+        seed: SEED,
+        map: None,
+        layout: &papsynth_dataset::Layout::default(),
+    };
     let dataset = Dataset::create_or_resume(&scratch.0, &info).expect("a new data set");
     let stop = AtomicBool::new(false);
     let mut index = 0;
@@ -123,7 +129,15 @@ pub fn default_files(folder: &Path) -> Work {
         // The folder lives as long as the work.
         let _ = &scratch;
         let frames = index..index + 1;
-        let run = Run { frames, at_once: 1, threads: Threads::One, check: Check::Sizes, stop: &stop, profile: None };
+        let run = Run {
+            frames,
+            share: Share::ALL,
+            at_once: 1,
+            threads: Threads::One,
+            check: Check::Sizes,
+            stop: &stop,
+            profile: None,
+        };
         dataset.generate(&engine, &run, &|_| ()).expect("the files can be written");
         index += 1;
     })

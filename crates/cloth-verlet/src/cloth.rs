@@ -114,12 +114,9 @@ impl Cloth {
     /// Up to [`LANES`] tasks.
     fn solved(&self, tasks: &[Task]) -> Vec<Sheet> {
         if tasks.len() <= FEW {
-            tasks
-                .iter()
-                .map(|task| self.finished(task, &self.run(std::slice::from_ref(&task.start), narrow).lane(0)))
-                .collect()
+            tasks.iter().map(|task| self.finished(task, &self.run(&[&task.start], narrow).lane(0))).collect()
         } else {
-            let starts: Vec<Start> = tasks.iter().map(|t| t.start.clone()).collect();
+            let starts: Vec<&Start> = tasks.iter().map(|t| &t.start).collect();
             let batch = self.run(&starts, wide);
             tasks.iter().enumerate().map(|(l, task)| self.finished(task, &batch.lane(l))).collect()
         }
@@ -127,7 +124,7 @@ impl Cloth {
 
     fn run<const L: usize>(
         &self,
-        starts: &[Start],
+        starts: &[&Start],
         solve: fn(&mut Batch<f32, L>, &Topology, &ClothParams),
     ) -> Batch<f32, L> {
         let mut batch = Batch::new(&self.topology, starts);
@@ -143,7 +140,7 @@ impl Cloth {
         }
         let Outline { points, centre, radius } = &task.outline;
         let inside = Inside::new(points);
-        for (v, &from_centre) in parts.vertices.iter_mut().zip(&parts.radius) {
+        for (v, &from_centre) in parts.vertices.iter_mut().zip(parts.radius.iter()) {
             // The hem lies on the outline already.
             let [x, y] = if hemmed && from_centre == 1.0 { [v[0], v[1]] } else { inside.nearest([v[0], v[1]]) };
             *v = [centre[0] + radius * x, centre[1] + radius * y, radius * v[2]];
@@ -151,7 +148,7 @@ impl Cloth {
         for r in &mut parts.rest {
             *r = r.map(|c| c * radius);
         }
-        Sheet::new(parts)
+        Sheet::new(parts, (!hemmed).then(|| self.refinement.edges()))
     }
 }
 
@@ -367,7 +364,7 @@ mod tests {
         let cloth = Cloth::new(&params).unwrap();
         let Solver::Verlet(verlet) = &params.solver else { panic!("not the paper's solver") };
         let tasks: Vec<Task> = (0..4_u8).map(|k| task(&cloth, &wavy(2.0 + f64::from(k), 0.08), u64::from(k))).collect();
-        let starts: Vec<Start> = tasks.iter().map(|t| t.start.clone()).collect();
+        let starts: Vec<&Start> = tasks.iter().map(|t| &t.start).collect();
         let batch = cloth.run(&starts, wide);
         for (l, start) in starts.iter().enumerate() {
             let slow = slow_verlet(&cloth.topology, start, params.steps, verlet);
@@ -389,9 +386,9 @@ mod tests {
         let Solver::Xpbd(xpbd) = &params.solver else { panic!("not the default solver") };
         let cloth = Cloth::new(&params).unwrap();
         let task = task(&cloth, &wavy(3.0, 0.1), 12);
-        let mut exact = Batch::<f64, 1>::new(&cloth.topology, std::slice::from_ref(&task.start));
+        let mut exact = Batch::<f64, 1>::new(&cloth.topology, &[&task.start]);
         exact.xpbd(&cloth.topology, params.steps, xpbd);
-        let lanes = cloth.run(&[task.start.clone(), task.start], wide);
+        let lanes = cloth.run(&[&task.start, &task.start], wide);
         for (p, q) in lanes.lane(1).iter().zip(exact.lane(0)) {
             assert!((0..3).all(|i| (p[i] - q[i]).abs() < 1e-3), "{p:?} {q:?}");
         }

@@ -6,6 +6,7 @@ use crate::sheet::edges;
 use crate::{Error, Point, Sheet};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 /// Strips into which half a turn is divided: the tube's silhouette is then right to 1 part in 100 of its radius.
 const STRIPS: u32 = 12;
@@ -99,8 +100,9 @@ impl Sheet {
         let beyond = |v: &[f64; 3]| (v[0] - crease.point[0]) * normal[0] + (v[1] - crease.point[1]) * normal[1];
         let mut far: Vec<f64> = self.vertices.iter().map(beyond).collect();
         let end = far.iter().fold(0.0_f64, |m, &s| m.max(s));
+        let mut ahead: Vec<usize> = (0..self.triangles.len()).collect();
         for line in crease.strips(end) {
-            self.cut(&mut far, line, ON_LINE * crease.radius);
+            self.cut(&mut far, line, ON_LINE * crease.radius, &mut ahead);
         }
         for (v, &s) in self.vertices.iter_mut().zip(&far) {
             if s > 0.0 {
@@ -108,14 +110,17 @@ impl Sheet {
                 *v = [v[0] + (x - s) * normal[0], v[1] + (x - s) * normal[1], v[2] + z];
             }
         }
-        self.edges = edges(&self.triangles, self.vertices.len());
+        self.edges = Arc::new(edges(&self.triangles, self.vertices.len()));
         Ok(())
     }
 
-    /// Divides all triangles along the line where `far` is `line`.
-    fn cut(&mut self, far: &mut Vec<f64>, line: f64, tolerance: f64) {
+    /// Divides all triangles along the line where `far` is `line`. `ahead` are those that may have a corner beyond it, and then
+    /// those that have; lines follow each other outwards.
+    fn cut(&mut self, far: &mut Vec<f64>, line: f64, tolerance: f64, ahead: &mut Vec<usize>) {
         let mut made = BTreeMap::new();
-        for t in 0..self.triangles.len() {
+        ahead.retain(|&t| self.triangles[t].iter().any(|&v| far[v as usize] - line > tolerance));
+        let before = self.triangles.len();
+        for &t in &*ahead {
             // −1 this side, 0 on the line, 1 beyond.
             let place = |v: u32| {
                 let s = far[v as usize] - line;
@@ -139,15 +144,18 @@ impl Sheet {
             let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
             if places[k] == 0 {
                 let m = self.divide(&mut made, far, line, b, c);
-                self.triangles[t] = [a, b, m];
-                self.triangles.push([a, m, c]);
+                let triangles = Arc::make_mut(&mut self.triangles);
+                triangles[t] = [a, b, m];
+                triangles.push([a, m, c]);
             } else {
                 let (m, n) = (self.divide(&mut made, far, line, a, b), self.divide(&mut made, far, line, c, a));
-                self.triangles[t] = [a, m, n];
-                self.triangles.push([m, b, c]);
-                self.triangles.push([m, c, n]);
+                let triangles = Arc::make_mut(&mut self.triangles);
+                triangles[t] = [a, m, n];
+                triangles.push([m, b, c]);
+                triangles.push([m, c, n]);
             }
         }
+        ahead.extend(before..self.triangles.len());
     }
 
     /// The vertex where edge a–b meets the line.
@@ -161,7 +169,8 @@ impl Sheet {
             self.vertices.push([mix(p[0], q[0]), mix(p[1], q[1]), mix(p[2], q[2])]);
             let (p, q) = (self.rest[i], self.rest[j]);
             self.rest.push([mix(p[0], q[0]), mix(p[1], q[1])]);
-            self.radius.push(mix(self.radius[i], self.radius[j]));
+            let radius = mix(self.radius[i], self.radius[j]);
+            Arc::make_mut(&mut self.radius).push(radius);
             far.push(line);
             #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
             let new = far.len() as u32 - 1;
@@ -314,7 +323,7 @@ mod tests {
     fn flat() -> Sheet {
         let sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
         let vertices = sheet.rest.iter().map(|r| [30.0 + r[0], r[1] - 20.0, 0.0]).collect();
-        Sheet::new(Parts { vertices, rest: sheet.rest, radius: sheet.radius, triangles: sheet.triangles })
+        Sheet::new(Parts { vertices, rest: sheet.rest, radius: sheet.radius, triangles: sheet.triangles }, None)
     }
 
     #[test]
@@ -365,7 +374,7 @@ mod tests {
             // The flat sheet's own rim.
             let rim: Vec<Point> = {
                 let mut next = BTreeMap::new();
-                for e in &sheet.edges {
+                for e in sheet.edges.iter() {
                     match e.sides {
                         [_, crate::sheet::OUTSIDE] => next.insert(e.ends[0], e.ends[1]),
                         [crate::sheet::OUTSIDE, _] => next.insert(e.ends[1], e.ends[0]),

@@ -85,8 +85,8 @@ impl<T: Real, const L: usize> Batch<T, L> {
     /// # Panics
     ///
     /// If `starts` is empty; lanes beyond its length repeat the first.
-    pub(crate) fn new(topology: &Topology, starts: &[Start]) -> Batch<T, L> {
-        let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).unwrap_or(&starts[0]));
+    pub(crate) fn new(topology: &Topology, starts: &[&Start]) -> Batch<T, L> {
+        let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).copied().unwrap_or(starts[0]));
         let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| T::of(value(s))));
         let now: Vec<Node<T, L>> = (0..lanes[0].rest.len())
             .map(|v| [row(&|s| s.rest[v][0]), row(&|s| s.rest[v][1]), row(&|s| s.heights[v])])
@@ -121,14 +121,16 @@ pub(crate) fn advance<T: Real, const L: usize>(
     keep: T,
     gravity_dt2: T,
 ) {
+    let fall = [T::ZERO, T::ZERO, gravity_dt2];
     for (n, b) in now.iter_mut().zip(before) {
-        for (axis, acceleration) in [T::ZERO, T::ZERO, gravity_dt2].into_iter().enumerate() {
+        // On copies, so that the compiler knows them apart and takes all lanes at once.
+        let (at, mut next) = (*n, *b);
+        for axis in 0..3 {
             for l in 0..L {
-                let x = n[axis][l];
-                n[axis][l] = verlet(x, b[axis][l], acceleration, keep);
-                b[axis][l] = x;
+                next[axis][l] = verlet(at[axis][l], next[axis][l], fall[axis], keep);
             }
         }
+        (*n, *b) = (next, at);
     }
 }
 

@@ -1,6 +1,7 @@
 //! The disc that every sheet is cut from: one triangulation for all, so that sheets can be solved side by side.
 
 use crate::{Error, Point};
+use multiversion::multiversion;
 use spade::{DelaunayTriangulation, Triangulation};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -12,6 +13,9 @@ const RELAXATIONS: usize = 16;
 /// The sunflower's angle, 2π(1 - 1/φ): consecutive points never line up.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
+/// Vertices of a square patch of the mesh: those of sixteen sheets side by side, with their neighbours', are half of a first cache.
+const PATCH: f64 = 100.0;
+
 /// A pair of vertices bound by a distance.
 pub(crate) type Pair = [u32; 2];
 
@@ -22,7 +26,7 @@ pub(crate) struct Disc {
     pub(crate) rim: usize,
     /// Counter-clockwise.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Smaller index first, in sets that share no vertex.
+    /// Smaller index first, in the order in which the solver takes them.
     pub(crate) edges: Vec<Pair>,
     /// The two vertices opposite each inner edge, ordered likewise.
     pub(crate) bends: Vec<Pair>,
@@ -41,28 +45,26 @@ impl Disc {
         let triangles = delaunay(&points)?;
         let (edges, bends) = pairs(&triangles);
         let harmonics = harmonics(&points, rim);
-        Ok(Disc {
-            rim,
-            triangles,
-            edges: coloured(&edges, points.len()),
-            bends: coloured(&bends, points.len()),
-            harmonics,
-            points,
-        })
+        Ok(Disc { rim, triangles, edges: ordered(&edges, &points), bends: ordered(&bends, &points), harmonics, points })
     }
 
     /// Carries a closed curve of `rim` points into the disc: each coordinate becomes the harmonic function
     /// with these values on the circle, the shape that a soap film would take.
     pub(crate) fn spread(&self, curve: &[Point]) -> Vec<Point> {
-        let mut all = curve.to_vec();
-        all.resize(self.points.len(), [0.0; 2]);
+        let (mut xs, mut ys) = (vec![0.0; self.points.len() - self.rim], vec![0.0; self.points.len() - self.rim]);
         for (weights, &[x, y]) in self.harmonics.iter().zip(curve) {
-            for (p, w) in all[self.rim..].iter_mut().zip(weights) {
-                p[0] += w * x;
-                p[1] += w * y;
-            }
+            add_multiples(&mut xs, &mut ys, weights, [x, y]);
         }
-        all
+        curve.iter().copied().chain(xs.into_iter().zip(ys).map(|(x, y)| [x, y])).collect()
+    }
+}
+
+/// Adds x and y times the weights.
+#[multiversion(targets = "simd")]
+fn add_multiples(xs: &mut [f64], ys: &mut [f64], weights: &[f64], [x, y]: Point) {
+    for ((sum_x, sum_y), w) in xs.iter_mut().zip(ys).zip(weights) {
+        *sum_x += w * x;
+        *sum_y += w * y;
     }
 }
 
@@ -127,7 +129,38 @@ fn pairs(triangles: &[[u32; 3]]) -> (Vec<Pair>, Vec<Pair>) {
     (opposite.into_keys().collect(), bends)
 }
 
-/// Sorts pairs into sets without a common vertex (greedy colouring): neighbours in the list never wait for each other.
+/// Orders pairs for the solver: patch by patch, so that what a patch needs stays in the first cache, the patches scattered over the disc,
+/// so that no direction is preferred; within a patch in sets without a common vertex, so that neighbours in the list never
+/// wait for each other.
+fn ordered(pairs: &[Pair], points: &[Point]) -> Vec<Pair> {
+    let patches = patches(pairs, points);
+    patches.iter().flat_map(|patch| coloured(patch, points.len())).collect()
+}
+
+/// Pairs by the square of a grid over the disc that their middle lies in.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "patch numbers, far below 2^32"
+)]
+fn patches(pairs: &[Pair], points: &[Point]) -> Vec<Vec<Pair>> {
+    let side = (points.len() as f64 / PATCH).sqrt().ceil() as usize;
+    let mut patches = vec![Vec::new(); side * side];
+    for &pair in pairs {
+        let [a, b] = pair.map(|v| points[v as usize]);
+        let place =
+            |axis: usize| ((0.25 * (a[axis] + b[axis]) + 0.5) * side as f64).clamp(0.0, side as f64 - 1.0) as usize;
+        patches[place(1) * side + place(0)].push(pair);
+    }
+    // Multiples of the golden angle never come close to each other.
+    let turn = |patch: usize| (patch as f64 * GOLDEN_ANGLE / TAU).fract();
+    let mut order: Vec<usize> = (0..patches.len()).collect();
+    order.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)));
+    order.into_iter().map(|patch| std::mem::take(&mut patches[patch])).collect()
+}
+
+/// Sorts pairs into sets without a common vertex (greedy colouring).
 fn coloured(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
     let mut taken = vec![0_u64; vertices];
     let mut sets: Vec<Vec<Pair>> = Vec::new();
@@ -208,7 +241,7 @@ mod tests {
         for pairs in [&disc.edges, &disc.bends] {
             let mut taken = BTreeSet::new();
             let mut sets = 1;
-            for &[a, b] in pairs {
+            for [a, b] in coloured(pairs, 200) {
                 assert!(a < b);
                 if !taken.insert(a) | !taken.insert(b) {
                     sets += 1;
@@ -216,6 +249,24 @@ mod tests {
                 }
             }
             assert!(sets < 20, "{sets}");
+        }
+    }
+
+    #[test]
+    fn patches_are_small_and_hold_every_pair_once() {
+        let disc = Disc::new(2000).unwrap();
+        let (mut edges, bends) = pairs(&disc.triangles);
+        for (found, all) in [(&disc.edges, &edges), (&disc.bends, &bends)] {
+            let mut found = found.clone();
+            found.sort_unstable();
+            let mut all = all.clone();
+            all.sort_unstable();
+            assert_eq!(found, all);
+        }
+        edges.reverse();
+        for patch in patches(&edges, &disc.points) {
+            let vertices: BTreeSet<u32> = patch.iter().flatten().copied().collect();
+            assert!(vertices.len() < 200, "{}", vertices.len());
         }
     }
 

@@ -2,9 +2,11 @@
 
 use crate::mesh::Disc;
 use crate::outline::Outline;
+use crate::sheet::{Edge, edges};
 use crate::{Point, Smoothing, Vertex};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Part of a side of the rim within which a corner of the outline counts as the side's end.
 const SAME: f64 = 1e-9;
@@ -12,12 +14,13 @@ const SAME: f64 = 1e-9;
 /// The finer mesh and how its vertices follow from the coarse ones.
 #[derive(Debug)]
 pub(crate) struct Refinement {
-    triangles: Vec<[u32; 3]>,
+    triangles: Arc<Vec<[u32; 3]>>,
+    edges: Arc<Vec<Edge>>,
     /// For each fine vertex the coarse ones it is the weighted mean of: `taps[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     taps: Vec<(u32, f64)>,
     /// Distance of each fine vertex from the centre of the disc.
-    radius: Vec<f64>,
+    radius: Arc<Vec<f64>>,
     /// The rim's vertices in order, and the triangle inside each of its sides.
     hem: Vec<(u32, u32)>,
 }
@@ -27,8 +30,8 @@ pub(crate) struct Refinement {
 pub(crate) struct Parts {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) rest: Vec<Point>,
-    pub(crate) radius: Vec<f64>,
-    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) radius: Arc<Vec<f64>>,
+    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
 }
 
 fn sorted(a: u32, b: u32) -> [u32; 2] {
@@ -49,9 +52,12 @@ impl Refinement {
             taps.extend(stencil);
             starts.push(index(taps.len()));
         }
-        let mut refinement = Refinement { triangles, starts, taps, radius: Vec::new(), hem: Vec::new() };
-        refinement.radius = refinement.mean(&disc.points).map(|[x, y]| (x * x + y * y).sqrt().min(1.0)).collect();
-        refinement.hem = hem(&refinement.triangles);
+        let edges = Arc::new(edges(&triangles, starts.len() - 1));
+        let hem = hem(&triangles);
+        let mut refinement =
+            Refinement { triangles: Arc::new(triangles), edges, starts, taps, radius: Arc::default(), hem };
+        let radius = refinement.mean(&disc.points).map(|[x, y]| (x * x + y * y).sqrt().min(1.0)).collect();
+        refinement.radius = Arc::new(radius);
         refinement
     }
 
@@ -71,19 +77,25 @@ impl Refinement {
         Parts {
             vertices: self.mean(vertices).collect(),
             rest: self.mean(rest).collect(),
-            radius: self.radius.clone(),
-            triangles: self.triangles.clone(),
+            radius: Arc::clone(&self.radius),
+            triangles: Arc::clone(&self.triangles),
         }
+    }
+
+    /// The edges of a sheet that has been given no hem.
+    pub(crate) fn edges(&self) -> Arc<Vec<Edge>> {
+        Arc::clone(&self.edges)
     }
 
     /// Lays the rim on the outline: its vertices at equal arcs, and one more at each corner between them. The rest state is only
     /// divided, so that areas stay what they were.
     pub(crate) fn hem(&self, parts: &mut Parts, outline: &Outline, offset: f64) {
         let count = self.hem.len();
+        let radius = Arc::make_mut(&mut parts.radius);
         for (&(v, _), p) in self.hem.iter().zip(outline.resampled(count, offset)) {
             parts.vertices[v as usize][0] = p[0];
             parts.vertices[v as usize][1] = p[1];
-            parts.radius[v as usize] = 1.0;
+            radius[v as usize] = 1.0;
         }
         let corners = outline.corners(count, offset);
         let mut rest = &corners[..];
@@ -113,11 +125,11 @@ impl Refinement {
             let new = index(parts.vertices.len());
             parts.vertices.push([x, y, za + part * (zb - za)]);
             parts.rest.push([ra[0] + part * (rb[0] - ra[0]), ra[1] + part * (rb[1] - ra[1])]);
-            parts.radius.push(1.0);
-            parts.triangles.push([last, new, apex]);
+            Arc::make_mut(&mut parts.radius).push(1.0);
+            Arc::make_mut(&mut parts.triangles).push([last, new, apex]);
             last = new;
         }
-        parts.triangles[triangle as usize] = [last, b, apex];
+        Arc::make_mut(&mut parts.triangles)[triangle as usize] = [last, b, apex];
     }
 }
 

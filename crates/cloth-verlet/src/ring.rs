@@ -18,10 +18,15 @@ const LONGEST: u32 = 4;
 /// fastest point, and this much more, in equivalent radii.
 const HASTE: (f64, f64) = (2.0, 1e-3);
 
-/// The sides of the outline that a vertex may meet: `count` of them from `first` on, round the end if need be.
+/// Sides that follow each other and are passed over together where all lanes have met a nearer one.
+const GROUP: usize = 4;
+/// What the circle round a group is wider by than its corners lie apart, in equivalent radii: a hundred times the rounding of f32.
+const SPARE: f64 = 1e-5;
+
+/// The sides of the outline that a vertex may meet: `count` groups, from the group `own` on by turns to both sides.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct View {
-    first: u32,
+    own: u32,
     count: u32,
 }
 
@@ -34,9 +39,22 @@ impl View {
     )]
     pub(crate) fn from([x, y]: Point, sides: usize) -> View {
         let count = sides as f64;
-        let half = (count * HALF_VIEW / (x * x + y * y).sqrt().max(WIDEST)).ceil().min((count / 2.0).floor());
-        let own = (libm::atan2(y, x) / TAU + 1.0) * count;
-        View { first: (own - half) as u32 % sides as u32, count: (2.0 * half) as u32 }
+        let half = (count * HALF_VIEW / (x * x + y * y).sqrt().max(WIDEST)).ceil() as usize;
+        let own = ((libm::atan2(y, x) / TAU + 1.0) * count) as usize % sides;
+        let groups = (2 * half.div_ceil(GROUP) + 1).min(sides.div_ceil(GROUP));
+        View { own: (own / GROUP) as u32, count: groups as u32 }
+    }
+
+    /// Numbers of the groups, of which there are `all`. The order is the vertex's own: of sides equally near, the first counts in
+    /// every lane, whatever is passed over.
+    #[inline(always)]
+    fn groups(&self, all: usize) -> impl Iterator<Item = usize> {
+        let (own, count) = (self.own as usize, self.count as usize);
+        (0..count).map(move |k| {
+            let apart = k.div_ceil(2);
+            let group = if k % 2 == 1 { own + apart } else { own + all - apart };
+            if group < all { group } else { group - all }
+        })
     }
 }
 
@@ -50,6 +68,47 @@ struct Corner<T, const L: usize> {
     inverse: Lane<T, L>,
 }
 
+/// A circle that holds a group of sides.
+#[derive(Debug, Clone, Copy)]
+struct Circle<T, const L: usize> {
+    middle: [Lane<T, L>; 2],
+    radius: Lane<T, L>,
+}
+
+impl<T: Real, const L: usize> Circle<T, L> {
+    /// Round corners that follow each other.
+    #[inline(always)]
+    fn round(corners: &[Corner<T, L>]) -> Circle<T, L> {
+        let (first, last) = (&corners[0].at, &corners[corners.len() - 1].at);
+        let zero = Lane([T::ZERO; L]);
+        let (mut middle, mut radius) = ([zero; 2], zero);
+        for axis in 0..2 {
+            for l in 0..L {
+                middle[axis][l] = T::of(0.5) * (first[axis][l] + last[axis][l]);
+            }
+        }
+        for corner in corners {
+            for l in 0..L {
+                let (x, y) = (corner.at[0][l] - middle[0][l], corner.at[1][l] - middle[1][l]);
+                radius[l] = radius[l].at_least(x * x + y * y);
+            }
+        }
+        Circle { middle, radius: Lane(radius.0.map(|square| square.sqrt() + T::of(SPARE))) }
+    }
+
+    /// Whether, in any lane, something in the circle may be as near to `p` as `limit`.
+    #[inline(always)]
+    fn reaches(&self, [px, py]: &[Lane<T, L>; 2], limit: &Lane<T, L>) -> bool {
+        let mut near = false;
+        for l in 0..L {
+            let (x, y) = (px[l] - self.middle[0][l], py[l] - self.middle[1][l]);
+            let reach = (limit[l] + self.radius[l]).at_least(T::ZERO);
+            near |= x * x + y * y <= reach * reach;
+        }
+        near
+    }
+}
+
 /// The outline of every lane.
 #[derive(Debug)]
 pub(crate) struct Ring<T, const L: usize> {
@@ -58,6 +117,8 @@ pub(crate) struct Ring<T, const L: usize> {
     pub(crate) before: Curve<T, L>,
     /// One more than there are points: the last is the first.
     corners: Vec<Corner<T, L>>,
+    /// One round each [`GROUP`] of sides.
+    circles: Vec<Circle<T, L>>,
     /// How far each vertex may still go before it could be outside.
     slack: Vec<Lane<T, L>>,
 }
@@ -67,7 +128,14 @@ impl<T: Real, const L: usize> Ring<T, L> {
         let corner =
             |&at: &[Lane<T, L>; 2]| Corner { at, normal: [Lane([T::ZERO; L]); 2], inverse: Lane([T::ZERO; L]) };
         let corners = points.iter().chain(points.first()).map(corner).collect();
-        Ring { corners, before: points.clone(), points, slack: vec![Lane([T::ZERO; L]); vertices] }
+        let nowhere = Circle { middle: [Lane([T::ZERO; L]); 2], radius: Lane([T::ZERO; L]) };
+        Ring {
+            corners,
+            circles: vec![nowhere; points.len().div_ceil(GROUP)],
+            before: points.clone(),
+            points,
+            slack: vec![Lane([T::ZERO; L]); vertices],
+        }
     }
 
     /// Moves every vertex from `first` on that is outside to the nearest of the sides in its view, after step `step`.
@@ -78,22 +146,22 @@ impl<T: Real, const L: usize> Ring<T, L> {
         // the lanes, which all wait for one, are looked at together.
         let stride = T::of(f64::from(1_u32 << step.trailing_zeros().min(LONGEST)));
         for ((node, view), slack) in now.iter_mut().zip(views).zip(&mut self.slack).skip(first) {
-            let mut due = false;
+            let mut any = false;
             for l in 0..L {
                 slack[l] = slack[l] - pace[l];
-                due |= slack[l] < pace[l] * stride;
+                any |= slack[l] < pace[l] * stride;
             }
-            if due {
-                let nearest = Nearest::to(&[node[0], node[1]], &self.corners, view);
+            if any {
+                // Lanes that are not due stay as they are, whatever their neighbours do.
+                let due: [bool; L] = std::array::from_fn(|l| slack[l] < pace[l] * stride);
+                let nearest = Nearest::to(&[node[0], node[1]], &due, &self.corners, &self.circles, view);
                 for l in 0..L {
-                    // Lanes that are not due stay as they are, whatever their neighbours do.
-                    let due = slack[l] < pace[l] * stride;
                     let outside = nearest.outwards[l] > T::ZERO;
                     for (value, off) in node.iter_mut().zip(&nearest.off) {
-                        value[l] = if due & outside { value[l] - off[l] } else { value[l] };
+                        value[l] = if due[l] & outside { value[l] - off[l] } else { value[l] };
                     }
                     let gap = if outside { T::ZERO } else { nearest.away[l].sqrt() };
-                    slack[l] = if due { gap } else { slack[l] };
+                    slack[l] = if due[l] { gap } else { slack[l] };
                 }
             }
         }
@@ -131,8 +199,18 @@ impl<T: Real, const L: usize> Ring<T, L> {
             previous = own;
         }
         self.corners[count] = self.corners[0];
+        for (group, circle) in self.circles.iter_mut().enumerate() {
+            *circle = Circle::round(group_of(&self.corners, group));
+        }
         Lane(fastest.0.map(|square| square.sqrt() * T::of(HASTE.0) + T::of(HASTE.1)))
     }
+}
+
+/// The corners of a group's sides, and the one after.
+#[inline(always)]
+fn group_of<C>(corners: &[C], group: usize) -> &[C] {
+    let first = group * GROUP;
+    &corners[first..=(first + GROUP).min(corners.len() - 1)]
 }
 
 /// The nearest point of the outline found so far.
@@ -147,17 +225,26 @@ struct Nearest<T, const L: usize> {
 }
 
 impl<T: Real, const L: usize> Nearest<T, L> {
-    /// Looks at the sides in view of a vertex at `p`.
+    /// Looks at the sides in view of a vertex at `p`, in the lanes where that is `due`; the others hold anything.
     #[inline(always)]
-    fn to(p: &[Lane<T, L>; 2], corners: &[Corner<T, L>], view: &View) -> Nearest<T, L> {
-        let zero = Lane([T::ZERO; L]);
-        let mut nearest = Nearest { away: Lane([T::of(f64::from(f32::MAX)); L]), off: [zero; 2], outwards: zero };
-        let sides = corners.len() - 1;
-        let (start, end) = (view.first as usize, (view.first + view.count) as usize);
-        let (head, tail) = (&corners[start..=end.min(sides)], &corners[..=end.saturating_sub(sides)]);
-        for pairs in [head.windows(2), tail.windows(2)] {
-            for pair in pairs {
-                nearest.meet(p, &pair[0], &pair[1]);
+    fn to(
+        p: &[Lane<T, L>; 2],
+        due: &[bool; L],
+        corners: &[Corner<T, L>],
+        circles: &[Circle<T, L>],
+        view: &View,
+    ) -> Nearest<T, L> {
+        let (zero, far) = (Lane([T::ZERO; L]), T::of(f64::from(f32::MAX)));
+        let mut nearest = Nearest { away: Lane([far; L]), off: [zero; 2], outwards: zero };
+        let mut limit = Lane(due.map(|due| if due { far } else { -far }));
+        for group in view.groups(circles.len()) {
+            if circles[group].reaches(p, &limit) {
+                for pair in group_of(corners, group).windows(2) {
+                    nearest.meet(p, &pair[0], &pair[1]);
+                }
+                for l in 0..L {
+                    limit[l] = if due[l] { nearest.away[l].sqrt() } else { -far };
+                }
             }
         }
         nearest
@@ -180,6 +267,86 @@ impl<T: Real, const L: usize> Nearest<T, L> {
             self.off[0][l] = new * ex + old * self.off[0][l];
             self.off[1][l] = new * ey + old * self.off[1][l];
             self.outwards[l] = new * (ex * nx + ey * ny) + old * self.outwards[l];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::rng;
+    use rand_core::Rng;
+
+    /// Every side of the groups in view, in the view's order.
+    fn slow<const L: usize>(p: &[Lane<f32, L>; 2], ring: &Ring<f32, L>, view: &View) -> Nearest<f32, L> {
+        let zero = Lane([0.0; L]);
+        let mut nearest = Nearest { away: Lane([f32::MAX; L]), off: [zero; 2], outwards: zero };
+        for group in view.groups(ring.circles.len()) {
+            for pair in group_of(&ring.corners, group).windows(2) {
+                nearest.meet(p, &pair[0], &pair[1]);
+            }
+        }
+        nearest
+    }
+
+    /// Rings with notches, and points in and around them and on their corners; lanes that are due or not.
+    fn agree<const L: usize>(sides: usize, seed: u64) {
+        let mut rng = rng(seed);
+        let mut value = || f64::from(rng.next_u32()) / f64::from(u32::MAX);
+        let curve: Curve<f32, L> = (0..sides)
+            .map(|k| {
+                #[expect(clippy::cast_precision_loss, reason = "a small count")]
+                let angle = TAU * k as f64 / sides as f64;
+                let radii: [f64; L] = std::array::from_fn(|_| 0.8 + 0.2 * libm::cos(3.0 * angle) + 0.1 * value());
+                [libm::cos(angle), libm::sin(angle)].map(|c| Lane(radii.map(|r| f32::of(r * c))))
+            })
+            .collect();
+        let mut ring = Ring::new(curve, 0);
+        ring.measure();
+        for k in 0..400 {
+            let place = [0, 1].map(|_| 2.4 * value() - 1.2);
+            let p = if k % 4 == 0 {
+                ring.corners[k % sides].at
+            } else {
+                place.map(|c| Lane(std::array::from_fn(|_| f32::of(c + 0.1 * value()))))
+            };
+            let due: [bool; L] = std::array::from_fn(|_| value() < 0.7);
+            let view = View::from(place, sides);
+            let quick = Nearest::to(&p, &due, &ring.corners, &ring.circles, &view);
+            let wanted = slow(&p, &ring, &view);
+            for l in (0..L).filter(|&l| due[l]) {
+                // All but the sign of zero, which nothing depends on.
+                let found = |n: &Nearest<f32, L>| [n.away[l], n.off[0][l], n.off[1][l], n.outwards[l]];
+                assert_eq!(found(&quick), found(&wanted), "{sides} sides, point {k}, lane {l}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_passed_over_is_not_nearest() {
+        for (seed, sides) in [8, 9, 75, 112, 330].into_iter().enumerate() {
+            agree::<16>(sides, seed as u64);
+            agree::<1>(sides, seed as u64);
+        }
+    }
+
+    #[test]
+    fn a_view_holds_its_part_of_the_outline_once() {
+        for sides in [8_usize, 13, 75, 112, 330] {
+            let all = sides.div_ceil(GROUP);
+            for k in 0..100 {
+                let (angle, radius) = (f64::from(k), f64::from(k) / 99.0);
+                let view = View::from([radius * libm::cos(angle), radius * libm::sin(angle)], sides);
+                let mut groups: Vec<usize> = view.groups(all).collect();
+                let seen = groups.len() * GROUP;
+                groups.sort_unstable();
+                groups.dedup();
+                assert_eq!(groups.len(), view.count as usize);
+                assert!(groups.iter().all(|&g| g < all));
+                #[expect(clippy::cast_precision_loss, reason = "small counts")]
+                let part = seen as f64 / sides as f64;
+                assert!(part >= (2.0 * HALF_VIEW / radius.max(WIDEST)).min(1.0), "{sides} {k}: {part}");
+            }
         }
     }
 }

@@ -2,6 +2,7 @@ use crate::mesh::cross;
 use crate::outline::distance;
 use crate::refine::Parts;
 use crate::{Point, Vertex};
+use std::sync::Arc;
 
 /// Stands for the outside where an edge has a triangle on one side only.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
@@ -11,9 +12,10 @@ pub(crate) const OUTSIDE: u32 = u32::MAX;
 pub struct Sheet {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) rest: Vec<Point>,
-    pub(crate) radius: Vec<f64>,
-    pub(crate) triangles: Vec<[u32; 3]>,
-    pub(crate) edges: Vec<Edge>,
+    /// What sheets of one mesh have in common belongs to all of them, until one of them is folded.
+    pub(crate) radius: Arc<Vec<f64>>,
+    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
+    pub(crate) edges: Arc<Vec<Edge>>,
 }
 
 /// An edge from `ends[0]` to `ends[1]` with the triangles on its left and right, or [`OUTSIDE`].
@@ -24,9 +26,10 @@ pub(crate) struct Edge {
 }
 
 impl Sheet {
-    pub(crate) fn new(parts: Parts) -> Sheet {
+    /// Pairs up the sides of the triangles unless their `edges` are known.
+    pub(crate) fn new(parts: Parts, known: Option<Arc<Vec<Edge>>>) -> Sheet {
         let Parts { vertices, rest, radius, triangles } = parts;
-        let edges = edges(&triangles, vertices.len());
+        let edges = known.unwrap_or_else(|| Arc::new(edges(&triangles, vertices.len())));
         Sheet { vertices, rest, radius, triangles, edges }
     }
 
@@ -77,7 +80,7 @@ impl Sheet {
     #[must_use]
     pub fn edge_strain_rms(&self) -> f64 {
         let mut sum = 0.0;
-        for &Edge { ends: [a, b], .. } in &self.edges {
+        for &Edge { ends: [a, b], .. } in self.edges.iter() {
             let (p, q) = (self.vertices[a as usize], self.vertices[b as usize]);
             let flat = distance([p[0], p[1]], [q[0], q[1]]);
             let rest = distance(self.rest[a as usize], self.rest[b as usize]);

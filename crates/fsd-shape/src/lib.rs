@@ -20,7 +20,7 @@ pub use descriptors::Descriptors;
 pub use error::Error;
 pub use fit::{ShapeModelParams, Spread};
 pub use model::{Draw, ShapeModel};
-pub use outline::{Point, centroid, circularity, perimeter, resample, signed_area};
+pub use outline::{Point, centroid, circularity, perimeter, resample, resample_along, signed_area};
 pub use rand_core::Rng;
 pub use statistics::{PrincipalComponent, Residual, ShapeStatistics};
 pub use trace::trace;

@@ -5,7 +5,9 @@ mod support;
 
 use std::f64::consts::{PI, TAU};
 
-use fsd_shape::{Error, Point, Rng, centroid, circularity, perimeter, resample, self_intersects, signed_area, trace};
+use fsd_shape::{
+    Error, Point, Rng, centroid, circularity, perimeter, resample, resample_along, self_intersects, signed_area, trace,
+};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
@@ -182,8 +184,29 @@ fn resampling_makes_equal_steps() {
 }
 
 #[test]
+fn points_along_an_outline_lie_as_far_apart_as_it_is_long() {
+    let mut rng = rng(0x5EA);
+    for count in [180, 600] {
+        let outline = support::polygon(100.0, &support::CELL, &mut rng);
+        let points = resample_along(&outline, count);
+        assert_eq!((points.len(), points[0]), (count, outline[0]));
+        let step = perimeter(&outline) / count as f64;
+        let chord = |i: usize| {
+            let (p, q) = (points[i], points[(i + 1) % count]);
+            ((q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1])).sqrt()
+        };
+        // A chord is the way itself, or shorter where it cuts a corner.
+        assert!((0..count).all(|i| chord(i) <= step * (1.0 + 1e-9)));
+        assert!((signed_area(&points) / signed_area(&outline) - 1.0).abs() < 0.02);
+    }
+}
+
+#[test]
 fn resampling_takes_any_outline() {
     assert!(resample(&[], 5).is_empty());
+    assert!(resample_along(&[], 5).is_empty());
+    assert_eq!(resample_along(&[[2.0, 3.0]], 3), [[2.0, 3.0]; 3]);
+    assert!(resample_along(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0).is_empty());
     assert!(resample(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0).is_empty());
     assert_eq!(resample(&[[2.0, 3.0]], 3), [[2.0, 3.0]; 3]);
     let doubled = [[0.0, 0.0], [0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [2.0, 2.0], [0.0, 2.0]];

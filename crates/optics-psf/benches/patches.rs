@@ -4,7 +4,7 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use optics_psf::{
-    BrightField, BrightFieldParams, Factor, Fft, Light, Microscope, MicroscopeParams, Padding, Patch, PatchImager,
+    BrightField, BrightFieldParams, Factor, Light, Microscope, MicroscopeParams, Padding, Patch, PatchImager,
     PatchScratch, fast_length,
 };
 use realfft::RealFftPlanner;
@@ -74,7 +74,7 @@ impl Patches {
         Self {
             lights: vec![Light::new(&microscope, WIDTH, HEIGHT); stages_um.len()],
             stages_um,
-            imager: PatchImager::new(&microscope, Fft::Fastest),
+            imager: PatchImager::new(&microscope),
             patch: Patch::default(),
             scratch: PatchScratch::default(),
             factor: Factor::default(),

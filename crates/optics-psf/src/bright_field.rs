@@ -2,8 +2,9 @@ use core::fmt;
 
 use crate::canvas::Canvas;
 use crate::error::{Error, require_count};
-use crate::fft::{Fft, LONGEST_SIDE, Plans, fast_length};
+use crate::fft::{LONGEST_SIDE, fast_length};
 use crate::filter::Filter;
+use crate::lane_fft::LanePlans;
 use crate::microscope::distance;
 use crate::{Microscope, Specimen, Transfer};
 
@@ -27,8 +28,6 @@ pub struct BrightFieldParams {
     pub stages_um: Vec<f64>,
     /// Where slabs far from focus are computed. Default [`Defocused::OnCamera`], ours.
     pub defocused: Defocused,
-    /// Which FFT runs. Default [`Fft::Fastest`], ours.
-    pub fft: Fft,
 }
 
 impl Default for BrightFieldParams {
@@ -40,7 +39,6 @@ impl Default for BrightFieldParams {
             depths_um: vec![0.0],
             stages_um: vec![0.0],
             defocused: Defocused::OnCamera,
-            fft: Fft::Fastest,
         }
     }
 }
@@ -151,7 +149,7 @@ impl BrightField {
         Ok(Self {
             microscope: microscope.clone(),
             size,
-            canvas: Canvas::new(microscope, grid, &Plans::new(params.fft)),
+            canvas: Canvas::new(microscope, grid, &LanePlans::default()),
             in_focus: Filter::in_focus(microscope),
             planes: params.stages_um.iter().map(plane).collect(),
         })

@@ -46,15 +46,18 @@ impl Plans {
 /// Longest side of a grid, samples.
 pub(crate) const LONGEST_SIDE: usize = 32_768;
 
-/// The next length whose FFT is fast, 2ᵃ 3ᵇ with an even number of samples.
+/// The next length whose FFT is fast, 2ᵃ 3ᵇ 5ᶜ with an even number of samples.
 #[must_use]
 pub fn fast_length(least: usize) -> usize {
     let mut best = least.next_power_of_two().max(2);
-    let mut threes = 3;
-    while 2 * threes < best {
-        let twos = least.div_ceil(threes).next_power_of_two().max(2);
-        best = best.min(threes * twos);
-        threes *= 3;
+    let mut fives = 1;
+    while 2 * fives < best {
+        let mut odd = fives;
+        while 2 * odd < best {
+            best = best.min(odd * least.div_ceil(odd).next_power_of_two().max(2));
+            odd *= 3;
+        }
+        fives *= 5;
     }
     best
 }
@@ -88,7 +91,7 @@ mod tests {
     fn fast_lengths_are_the_next_ones() {
         let fast = |n: usize| {
             let mut rest = n;
-            for prime in [2, 3] {
+            for prime in [2, 3, 5] {
                 while rest.is_multiple_of(prime) {
                     rest /= prime;
                 }

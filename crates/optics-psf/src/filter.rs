@@ -4,6 +4,7 @@ use multiversion::multiversion;
 use rustfft::num_complex::Complex32;
 
 use crate::Microscope;
+use crate::lane_fft::{LANES, Lanes};
 use crate::transfer::{SIDED_SAMPLES, Shape, Transfer, corners};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the
@@ -71,14 +72,16 @@ pub(crate) enum Part {
     Correction,
 }
 
-/// Frequencies fx, and fy = 0, ±step, ±2 step …, in steps of the filter's table, and what the mean over a pixel leaves
-/// of them.
+/// Frequencies of a block of a spectrum, in steps of the filter's table, and what the mean over a pixel leaves of them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Column<'a> {
-    pub(crate) x: f32,
-    pub(crate) step: f32,
-    pub(crate) pixel_x: f32,
-    pub(crate) pixel_y: &'a [f32],
+pub(crate) struct Block<'a> {
+    /// From one frequency along x to the next.
+    pub(crate) step_x: f32,
+    /// Of the lanes.
+    pub(crate) y: &'a [f32; LANES],
+    /// From frequency 0 on.
+    pub(crate) pixel_x: &'a [f32],
+    pub(crate) pixel_y: &'a [f32; LANES],
 }
 
 impl Filter {
@@ -123,83 +126,102 @@ impl Filter {
         Self { is_corrected: false, restores: true, ..self }
     }
 
-    /// Adds part of a spectrum, times a response, to `sum`: both frequencies 0 … and … −1 along y, of which the
-    /// spectrum may have fewer.
-    pub(crate) fn add(
-        &self,
-        part: Part,
-        at: Column<'_>,
-        [above, below]: [&[Complex32]; 2],
-        [sum_above, sum_below]: [&mut [Complex32]; 2],
-        weights: &mut Vec<f32>,
-    ) {
-        let skipped = sum_below.len() - below.len();
-        let sum_below = &mut sum_below[skipped..];
+    /// Adds a block of a spectrum, times a response, to `sum`: kx up to `reach`, of both signs, the negative ones at
+    /// the end of either.
+    pub(crate) fn add(&self, part: Part, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
         match &self.response {
-            Response::Round(tables) => {
-                weights.resize(above.len().max(weights.len()), 0.0);
-                let weights = &mut weights[..above.len()];
-                weigh(&tables[part as usize], at, weights);
-                if self.restores {
-                    divide(&tables[2], at, weights);
-                }
-                accumulate(sum_above, above, weights.iter());
-                accumulate(sum_below, below, weights.iter().skip(1).rev());
+            Response::Round(tables) if self.restores => {
+                add_restored(&tables[part as usize], &tables[2], at, spectrum, reach, sum);
             }
+            Response::Round(tables) => add_round(&tables[part as usize], at, spectrum, reach, sum),
             Response::Sided(table) => {
-                let one = |sum: &mut Complex32, value: Complex32, y: f32, pixel_y: f32| {
-                    let entry = sided(table, at.x, y);
-                    let mut weight = entry[part as usize];
-                    if self.restores {
-                        let seen = entry[2] * (at.pixel_x * pixel_y);
-                        let size = seen.norm_sqr().sqrt();
-                        weight = weight * seen.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
+                let [from_end, to_end] = [spectrum.len(), sum.len()];
+                let mut one = |from: usize, to: usize, x: f32, pixel_x: f32| {
+                    for l in 0..LANES {
+                        let entry = sided(table, x, at.y[l]);
+                        let mut weight = entry[part as usize];
+                        if self.restores {
+                            let seen = entry[2] * (pixel_x * at.pixel_y[l]);
+                            let size = seen.norm_sqr().sqrt();
+                            weight = weight * seen.conj() / (size * size.max(LEAST_TRANSFER)).max(f32::MIN_POSITIVE);
+                        }
+                        let value = Complex32::new(spectrum[from][0][l], spectrum[from][1][l]) * weight;
+                        sum[to][0][l] += value.re;
+                        sum[to][1][l] += value.im;
                     }
-                    *sum += value * weight;
                 };
-                for (k, (sum, &value)) in sum_above.iter_mut().zip(above).enumerate() {
-                    one(sum, value, k as f32 * at.step, at.pixel_y[k]);
-                }
-                for (k, (sum, &value)) in (1..).zip(sum_below.iter_mut().zip(below).rev()) {
-                    one(sum, value, -(k as f32) * at.step, at.pixel_y[k]);
+                for k in 0..=reach {
+                    let (x, pixel_x) = (k as f32 * at.step_x, at.pixel_x[k]);
+                    one(k, k, x, pixel_x);
+                    if k > 0 {
+                        one(from_end - k, to_end - k, -x, pixel_x);
+                    }
                 }
             }
         }
     }
 }
 
-fn accumulate<'a>(sum: &mut [Complex32], values: &[Complex32], weights: impl Iterator<Item = &'a f32>) {
-    for ((sum, value), weight) in sum.iter_mut().zip(values).zip(weights) {
-        *sum += value * weight;
+#[multiversion(targets = "simd")]
+fn add_round(table: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
+    let y2 = at.y.map(|y| y * y);
+    for k in 0..=reach {
+        accumulate(&entries(table, k, at.step_x, &y2), k, spectrum, sum);
     }
 }
 
-/// Values of a table along a column, linear between its entries.
+/// Divided by what the lens and the pixels left in focus.
 #[multiversion(targets = "simd")]
-fn weigh(table: &Table, at: Column<'_>, weights: &mut [f32]) {
-    let x2 = at.x * at.x;
-    for (k, weight) in weights.iter_mut().enumerate() {
-        *weight = entry(table, x2, k, at.step);
-    }
-}
-
-/// Divides by what the lens and the pixels left in focus.
-#[multiversion(targets = "simd")]
-fn divide(focused: &Table, at: Column<'_>, weights: &mut [f32]) {
-    let x2 = at.x * at.x;
-    for ((k, weight), pixel_y) in weights.iter_mut().enumerate().zip(at.pixel_y) {
-        *weight /= (entry(focused, x2, k, at.step) * at.pixel_x * pixel_y).max(LEAST_TRANSFER);
+fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes], reach: usize, sum: &mut [Lanes]) {
+    let y2 = at.y.map(|y| y * y);
+    for k in 0..=reach {
+        let mut weights = entries(table, k, at.step_x, &y2);
+        let seen = entries(focused, k, at.step_x, &y2);
+        for ((weight, seen), pixel_y) in weights.iter_mut().zip(&seen).zip(at.pixel_y) {
+            *weight /= (seen * at.pixel_x[k] * pixel_y).max(LEAST_TRANSFER);
+        }
+        accumulate(&weights, k, spectrum, sum);
     }
 }
 
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the table")]
-fn entry(table: &Table, x2: f32, k: usize, step: f32) -> f32 {
-    let y = k as u32 as f32 * step;
-    let position = (x2 + y * y).sqrt();
-    let place = position as u32;
-    let [value, rise] = table[place as usize % ENTRIES];
-    value + (position - place as f32) * rise
+fn accumulate(weights: &[f32; LANES], k: usize, spectrum: &[Lanes], sum: &mut [Lanes]) {
+    let [last_from, last_to] = [spectrum.len() - k, sum.len() - k];
+    weigh(weights, &spectrum[k], &mut sum[k]);
+    if k > 0 {
+        weigh(weights, &spectrum[last_from], &mut sum[last_to]);
+    }
+}
+
+#[inline(always)]
+fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
+    for (to, from) in to.iter_mut().zip(from) {
+        for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
+            *to += from * weight;
+        }
+    }
+}
+
+/// Values of a table in a block, linear between its entries.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in the table")]
+fn entries(table: &Table, k: usize, step_x: f32, y2: &[f32; LANES]) -> [f32; LANES] {
+    let x = k as u32 as f32 * step_x;
+    let x2 = x * x;
+    // Both are small whole numbers: signed ones are converted faster.
+    let mut places = [0_i32; LANES];
+    let mut parts = [0.0; LANES];
+    for ((place, part), y2) in places.iter_mut().zip(&mut parts).zip(y2) {
+        let position = (x2 + y2).sqrt().min((ENTRIES - 1) as f32);
+        *place = position as i32;
+        *part = position - *place as f32;
+    }
+    let mut values = [0.0; LANES];
+    for ((value, place), part) in values.iter_mut().zip(&places).zip(&parts) {
+        let [from, rise] = table[*place as usize % ENTRIES];
+        *value = from + part * rise;
+    }
+    values
 }
 
 /// The responses at a frequency.

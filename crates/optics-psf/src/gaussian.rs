@@ -16,10 +16,10 @@ pub enum Method {
     /// Every tap, in single precision: the definition, and the oracle of the others. The time
     /// grows with the width.
     Direct,
-    /// Halved as often as the width allows, at all from 3.5 pixels on, blurred and doubled again.
+    /// Halved as often as the width allows, at all from 2.8 pixels on, blurred and doubled again.
     /// The error is below 1e-3 of the range of the image; the time hardly depends on the width.
     Decimated,
-    /// Decimated where that costs less than 2e-4 of the range, which is from 4.7 pixels on; direct
+    /// Decimated where that costs less than 2e-4 of the range, which is from 3.5 pixels on; direct
     /// below.
     #[default]
     Auto,

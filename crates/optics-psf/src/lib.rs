@@ -17,6 +17,8 @@ mod gaussian;
 mod gibson_lanni;
 mod kernel;
 mod ladder;
+mod lane_fft;
+mod lane_plane;
 mod layer;
 mod lens;
 mod light;

@@ -1,3 +1,5 @@
+use multiversion::multiversion;
+
 use crate::{Factor, Lattice, Microscope};
 
 /// The light of a picture, as the product of what many things let through.
@@ -60,9 +62,7 @@ impl Light {
         for row in 0..rows {
             let values = &factor.values[(from_y + row) * factor.width + from_x..][..columns];
             let light = &mut light[(to_y + row) * width + to_x..][..columns];
-            for (light, value) in light.iter_mut().zip(values) {
-                *light *= value;
-            }
+            times(light, values);
         }
     }
 
@@ -80,6 +80,11 @@ impl Light {
     }
 }
 
+#[multiversion(targets = "simd")]
+fn times(light: &mut [f32], values: &[f32]) {
+    light.iter_mut().zip(values).for_each(|(light, value)| *light *= value);
+}
+
 /// Of `len` places from `at` on, which may be negative, those among `side`: the first, its place, and how many.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and a side")]
 fn overlap(at: i64, len: usize, side: usize) -> (usize, usize, usize) {
@@ -89,6 +94,7 @@ fn overlap(at: i64, len: usize, side: usize) -> (usize, usize, usize) {
 }
 
 /// Multiplies `out` by the mean over the samples of each pixel.
+#[multiversion(targets = "simd")]
 pub(crate) fn mean_of_pixels(samples: &[f32], width: usize, oversampling: usize, out: &mut [f32]) {
     let n = oversampling;
     #[expect(clippy::cast_possible_truncation, reason = "at most 256 samples")]

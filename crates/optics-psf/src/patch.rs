@@ -2,10 +2,11 @@ use core::fmt;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::canvas::{Canvas, Memory, Spectra, absorbed_of, amplitude};
-use crate::fft::{Fft, Plans, fast_length};
+use crate::canvas::{Canvas, Memory, Samples, Spectra, absorbed_of, amplitude_of, is_lit};
+use crate::fft::fast_length;
 use crate::filter::{Filter, Lattice, incoherence};
 use crate::ladder::Ladder;
+use crate::lane_fft::LanePlans;
 use crate::microscope::distance;
 use crate::{Error, Microscope};
 
@@ -13,7 +14,7 @@ use crate::{Error, Microscope};
 /// it.
 pub struct PatchImager {
     ladder: Ladder,
-    plans: Arc<Plans>,
+    plans: Arc<LanePlans>,
     canvases: Mutex<BTreeMap<[usize; 2], Arc<Canvas>>>,
     in_focus: Filter,
 }
@@ -30,7 +31,7 @@ pub struct Focus {
     filter: Arc<Filter>,
     margin_px: usize,
     defocus_um: f64,
-    plans: Arc<Plans>,
+    plans: Arc<LanePlans>,
 }
 
 impl fmt::Debug for Focus {
@@ -68,7 +69,7 @@ pub struct Patch {
     width: usize,
     transmittance: Vec<f32>,
     phase_rad: Vec<f32>,
-    plans: Option<Arc<Plans>>,
+    plans: Option<Arc<LanePlans>>,
     sheets: Vec<Sheet>,
     /// How many sheets are of this patch and not of earlier ones.
     fresh: usize,
@@ -127,10 +128,10 @@ const OPEN_FRINGES: f64 = 2.25;
 impl PatchImager {
     /// Computes what all depths have in common.
     #[must_use]
-    pub fn new(microscope: &Microscope, fft: Fft) -> Self {
+    pub fn new(microscope: &Microscope) -> Self {
         Self {
             ladder: Ladder::new(microscope),
-            plans: Arc::new(Plans::new(fft)),
+            plans: Arc::default(),
             canvases: Mutex::default(),
             in_focus: Filter::in_focus(microscope),
         }
@@ -215,7 +216,7 @@ impl PatchImager {
     ///
     /// If nothing was loaded, or the patch or the focus are of another imager.
     pub fn expose(&self, patch: &mut Patch, focus: &Focus, scratch: &mut PatchScratch, factor: &mut Factor) {
-        let own = |plans: &Arc<Plans>| Arc::ptr_eq(plans, &self.plans);
+        let own = |plans: &Arc<LanePlans>| Arc::ptr_eq(plans, &self.plans);
         assert!(patch.plans.as_ref().is_some_and(own) && own(&focus.plans), "a patch or a focus of another imager");
         let memory = &mut scratch.memory;
         let filter = &*focus.filter;
@@ -234,10 +235,11 @@ impl PatchImager {
             margin_px: focus.margin_px,
             floored: 0,
         };
-        factor.values.clear();
         factor.values.resize(outer(width) * outer(height), 1.0);
-        if !spectra.absorbed.is_empty() {
-            factor.floored = canvas.transmit(filter, spectra, memory, &mut factor.values, factor.width);
+        if spectra.absorbed.is_empty() {
+            factor.values.fill(1.0);
+        } else {
+            factor.floored = canvas.transmit_into(filter, spectra, memory, &mut factor.values, factor.width);
         }
         if !spectra.phase.is_empty() {
             let part = core::iter::once((filter, &*spectra));
@@ -251,14 +253,8 @@ impl PatchImager {
         let width = *width;
         let height = transmittance.len() / width;
         let offset = focus.margin_px * self.microscope().params().oversampling;
-        let fill = |samples: &'a [f32], row: fn(&[f32], &mut [f32]) -> bool| {
-            move |y: usize, line: &mut [f32]| {
-                line[..offset].fill(0.0);
-                line[offset + width..].fill(0.0);
-                row(&samples[(y - offset) * width..(y - offset + 1) * width], &mut line[offset..offset + width])
-            }
-        };
-        let rows = offset..offset + height;
+        let absorbing = Samples { samples: transmittance, width, offset, background: 1.0 };
+        let late = Samples { samples: phase_rad, width, offset, background: 0.0 };
         let known = sheets[..*fresh].iter().position(|sheet| sheet.margin_px == focus.margin_px);
         let index = known.unwrap_or_else(|| {
             let canvas = self.canvas([width, height], focus.margin_px);
@@ -270,16 +266,16 @@ impl PatchImager {
             sheet.canvas = canvas;
             sheet.spectra.clear();
             *fresh += 1;
-            sheet.canvas.transform(rows.clone(), fill(transmittance, absorbed_of), &mut sheet.spectra.absorbed, memory);
+            sheet.canvas.transform(absorbing, absorbed_of, &mut sheet.spectra.absorbed, memory);
             if !phase_rad.is_empty() {
-                sheet.canvas.transform(rows.clone(), fill(phase_rad, copied), &mut sheet.spectra.phase, memory);
+                sheet.canvas.transform(late, is_lit, &mut sheet.spectra.phase, memory);
             }
             *fresh - 1
         });
         let sheet = &mut sheets[index];
         if focus.filter.is_corrected {
             if sheet.spectra.amplitude.is_empty() {
-                sheet.canvas.transform(rows, fill(transmittance, amplitude_of), &mut sheet.spectra.amplitude, memory);
+                sheet.canvas.transform(absorbing, amplitude_of, &mut sheet.spectra.amplitude, memory);
             }
             sheet.canvas.correct(&self.in_focus, &mut sheet.spectra, memory);
         }
@@ -301,17 +297,4 @@ impl PatchImager {
 fn margin_class(pixels: usize) -> usize {
     let twos = pixels.next_power_of_two();
     if 4 * pixels <= 3 * twos { 3 * twos / 4 } else { twos }
-}
-
-fn copied(row: &[f32], line: &mut [f32]) -> bool {
-    line.copy_from_slice(row);
-    row.iter().any(|v| *v != 0.0)
-}
-
-fn amplitude_of(row: &[f32], line: &mut [f32]) -> bool {
-    let lit = absorbed_of(row, line);
-    if lit {
-        amplitude(line);
-    }
-    lit
 }

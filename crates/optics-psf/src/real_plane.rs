@@ -72,13 +72,6 @@ impl Support {
         let reach = reach.min(own);
         [&spectrum[up.start..=up.start + reach], &spectrum[down.end - reach..down.end]]
     }
-
-    /// All of a column, likewise.
-    pub(crate) fn column_mut<'a>(&self, spectrum: &'a mut [Complex32], column: usize) -> [&'a mut [Complex32]; 2] {
-        let [up, down] = self.places(column);
-        let (above, below) = spectrum[up.start..down.end].split_at_mut(up.len());
-        [above, below]
-    }
 }
 
 /// Real images of one size and their spectra, in single precision, by complex FFTs of two rows at a

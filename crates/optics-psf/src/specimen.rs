@@ -1,9 +1,8 @@
-use rustfft::num_complex::Complex32;
-
 use crate::BrightField;
-use crate::canvas::{Memory, Spectra, absorbed_of, amplitude};
+use crate::canvas::{Memory, Samples, Spectra, absorbed_of, amplitude, is_lit};
 use crate::exp::absorbed;
 use crate::filter::{Filter, Lattice};
+use crate::lane_fft::Lanes;
 use crate::light::{lift, mean_of_pixels};
 
 /// What is on the slide, slab by slab, as the spectra of what it absorbs and delays. It is made by
@@ -34,10 +33,10 @@ impl BrightField {
     ///
     /// If there is no such slab, or the slice has not as many samples as the object.
     pub fn set_absorbance(&self, specimen: &mut Specimen, slab: usize, absorbance: &[f32]) {
-        self.set_absorbed(specimen, slab, absorbance, |row, line| {
-            let lit = row.iter().any(|a| *a != 0.0);
+        self.set_absorbed(specimen, slab, absorbance, 0.0, |values| {
+            let lit = is_lit(values);
             if lit {
-                absorbed(row, line);
+                absorbed(values);
             }
             lit
         });
@@ -49,7 +48,7 @@ impl BrightField {
     ///
     /// As [`BrightField::set_absorbance`].
     pub fn set_transmittance(&self, specimen: &mut Specimen, slab: usize, transmittance: &[f32]) {
-        self.set_absorbed(specimen, slab, transmittance, absorbed_of);
+        self.set_absorbed(specimen, slab, transmittance, 1.0, absorbed_of);
     }
 
     /// Puts phases, by how many radians light is late, into a slab in place of those that were
@@ -60,10 +59,7 @@ impl BrightField {
     /// As [`BrightField::set_absorbance`].
     pub fn set_phase(&self, specimen: &mut Specimen, slab: usize, phase_rad: &[f32]) {
         let Specimen { slabs, memory, .. } = specimen;
-        self.transform(phase_rad, &mut slabs[slab].phase, memory, |row, line| {
-            line.copy_from_slice(row);
-            row.iter().any(|v| *v != 0.0)
-        });
+        self.transform(phase_rad, 0.0, &mut slabs[slab].phase, memory, is_lit);
     }
 
     fn set_absorbed(
@@ -71,38 +67,36 @@ impl BrightField {
         specimen: &mut Specimen,
         slab: usize,
         samples: &[f32],
-        row: impl Fn(&[f32], &mut [f32]) -> bool,
+        background: f32,
+        map: impl Fn(&mut [f32]) -> bool,
     ) {
         let Specimen { slabs, memory, .. } = specimen;
         let spectra = &mut slabs[slab];
         spectra.clear_absorbed();
-        self.transform(samples, &mut spectra.absorbed, memory, &row);
+        self.transform(samples, background, &mut spectra.absorbed, memory, &map);
         if self.is_corrected(slab) {
-            self.transform(samples, &mut spectra.amplitude, memory, |samples, line| {
-                let lit = row(samples, line);
+            self.transform(samples, background, &mut spectra.amplitude, memory, |values| {
+                let lit = map(values);
                 if lit {
-                    amplitude(line);
+                    amplitude(values);
                 }
                 lit
             });
         }
     }
 
-    /// The spectrum of what `row` makes of each row of samples; none if all are empty.
+    /// The spectrum of what `map` makes of samples; none if all are empty, as the background is.
     fn transform(
         &self,
         samples: &[f32],
-        spectrum: &mut Vec<Complex32>,
+        background: f32,
+        spectrum: &mut Vec<Lanes>,
         memory: &mut Memory,
-        row: impl Fn(&[f32], &mut [f32]) -> bool,
+        map: impl Fn(&mut [f32]) -> bool,
     ) {
         let [width, height] = self.size;
         assert_eq!(samples.len(), width * height, "a slab has other samples than the object");
-        let fill = |y: usize, line: &mut [f32]| {
-            line[width..].fill(0.0);
-            row(&samples[y * width..(y + 1) * width], &mut line[..width])
-        };
-        self.canvas.transform(0..height, fill, spectrum, memory);
+        self.canvas.transform(Samples { samples, width, offset: 0, background }, map, spectrum, memory);
     }
 
     /// The picture of a plane: the light of each pixel of the camera relative to that of empty slide, stray

@@ -209,7 +209,7 @@ fn profile(
         let t = ((f / faint - FADES_FROM) / (1.0 - FADES_FROM)).clamp(0.0, 1.0);
         if faint < cutoff { weight * (1.0 - t * t * (3.0 - 2.0 * t)) } else { weight }
     };
-    let mut next = 0;
+    let (mut next, mut values) = (0, Vec::new());
     for [from, to] in [[0.0, bend.min(faint)], [bend, cutoff.min(faint)]] {
         if to < from {
             break;
@@ -228,9 +228,10 @@ fn profile(
             }
         } else {
             let curve = Curve::new([from, to], nodes, |f| lens.integral(pupil, f, direction));
-            for (i, sum) in entries {
-                let f = step * i as f64;
-                let ([re, im], weight) = (curve.at(f), fade(f));
+            values.resize(end - next, [0.0; 2]);
+            curve.values_into(step, next, &mut values);
+            for ((i, sum), &[re, im]) in entries.zip(&values) {
+                let weight = fade(step * i as f64);
                 *sum = [sum[0] + weight * re, sum[1] + weight * im];
             }
         }

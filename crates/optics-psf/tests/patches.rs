@@ -5,8 +5,8 @@
 mod support;
 
 use optics_psf::{
-    Abbe, AbbeParams, BrightField, BrightFieldParams, Defocused, Error, Factor, Fft, Focus, LEAST_LIGHT, Lattice,
-    Layer, Light, Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, Zernike,
+    Abbe, AbbeParams, BrightField, BrightFieldParams, Defocused, Error, Factor, Focus, LEAST_LIGHT, Lattice, Layer,
+    Light, Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, Zernike,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -30,7 +30,7 @@ impl Thing {
 }
 
 fn imager(params: &MicroscopeParams) -> PatchImager {
-    PatchImager::new(&Microscope::new(params).unwrap(), Fft::Fastest)
+    PatchImager::new(&Microscope::new(params).unwrap())
 }
 
 /// Samples are pixels: the arrays' 0.125 µm.
@@ -131,8 +131,9 @@ fn one_patch_is_the_whole_picture() {
             }
             let expected = double(&whole.image(&mut specimen, 0));
             let error = worst(&seen(&imager, &[thing], SIDE / 2), &expected);
-            // Rounding; with aberrations that have a side, the coarser table leaves faint echoes around.
-            let bound = if zernike == coma { 5e-4 } else { 1e-5 };
+            // Rounding of two grids of other sizes; with aberrations that have a side, the coarser table leaves faint echoes
+            // around.
+            let bound = if zernike == coma { 5e-4 } else { 2e-5 };
             assert!(error < bound, "{depth}: {error}");
         }
     }
@@ -380,14 +381,13 @@ fn floors_are_counted_and_empty_patches_are_light() {
 }
 
 #[test]
-fn portable_ffts_give_the_same_factor_and_stray_light_lifts_the_dark() {
+fn stray_light_lifts_the_dark() {
     let params = MicroscopeParams { stray_light: 0.1, ..MicroscopeParams::default() };
     let microscope = Microscope::new(&params).unwrap();
-    let [a, b] = [Fft::Fastest, Fft::Portable].map(|fft| PatchImager::new(&microscope, fft));
+    let glaring = PatchImager::new(&microscope);
     let things = scene(9, 96);
-    assert!(worst(&seen(&a, &things, 96), &seen(&b, &things, 96)) < 1e-5);
     let clean = imager(&MicroscopeParams::default());
-    let (lit, dark) = (seen(&a, &things, 96), seen(&clean, &things, 96));
+    let (lit, dark) = (seen(&glaring, &things, 96), seen(&clean, &things, 96));
     assert!(lit.iter().zip(&dark).all(|(l, d)| (l - (0.1 + 0.9 * d)).abs() < 1e-6));
 }
 

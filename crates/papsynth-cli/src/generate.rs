@@ -2,14 +2,15 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Progress as Step, Run};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Progress as Step, Run, Share};
 
-use crate::args::Generate;
+use crate::args::{Generate, LayoutArgs};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::profile::Account;
 use crate::report::{self, Progress, Start};
 use crate::setup::Setup;
+use crate::share;
 
 pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let account = args.profile.then(Account::open);
@@ -21,17 +22,30 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     // A slide that cannot be drawn is found out before anything is written.
     setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
 
+    let share = match args.share.shard {
+        Some(shards) => share::of(shards)?,
+        None => Share::ALL,
+    };
+    let (layout, chosen) = args.layout.layout(frames.end);
+    if chosen {
+        let most = LayoutArgs::MOST_IN_FOLDERS;
+        exit::note(&format!(
+            "more than {most} frames are written as webdataset, in tar files; --format folder forces single files"
+        ));
+    }
     let interrupt = Interrupt::watch()?;
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map: setup.map.as_ref() };
+    let map = setup.map.as_ref();
+    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
     let dataset = Dataset::create_or_resume(&args.out, &info)?;
     // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
-    let (at_once, threads) = match usize::try_from(count) {
-        Ok(count) if count < setup.threads => (1, setup.threads_of_a_frame()),
+    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
+    let (at_once, threads) = match usize::try_from(shards) {
+        Ok(shards) if shards < setup.threads => (1, setup.threads_of_a_frame()),
         _ => (setup.threads, Threads::One),
     };
     let progress = Progress::start(args, Start { dir: args.out.clone(), seed, frames: count, threads: setup.threads })?;
     let check = if args.verify { Check::Hashes } else { Check::Sizes };
-    let run = Run { frames, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
+    let run = Run { frames, share, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
     let step = |step: Step| {
         account.iter().for_each(|account| account.step(step));
         progress.step(step);
@@ -44,14 +58,15 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     })?;
     if outcome.stopped {
         let whole = outcome.kept + outcome.made;
-        let message = format!("stopped after {whole} of {count} frames; every file in {} is whole", args.out.display());
+        let message = format!("stopped with {whole} frames whole; every file in {} is whole", args.out.display());
         return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
     }
     // What is whole is left alone, which a disk that cannot be written allows too.
-    if outcome.made > 0 || !dataset.is_finished()? {
+    // What others are still making is merged by whoever comes last.
+    if share == Share::ALL && (outcome.made > 0 || args.verify || !dataset.is_finished()?) {
         dataset.finish().map_err(|error| damaged(&error))?;
     }
-    progress.done(&outcome)?;
+    progress.done(&outcome, share)?;
     match account {
         Some(account) if args.json => report::event(&account.event(setup.threads)),
         Some(account) => exit::print(&account.table(setup.threads)),

@@ -26,7 +26,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
         _ => format!("{count} {what}s"),
     };
     let message =
-        format!("{}: {} and {} are damaged", args.dir.display(), counted(frames, "frame"), counted(files, "file"));
+        format!("{}: {} and {} are damaged", args.dir.display(), counted(frames, "shard"), counted(files, "file"));
     let help = "the command that made the data set, with --verify, makes them again";
     Err(Failure::input(Complaint::new(message).help(help)))
 }
@@ -60,7 +60,7 @@ fn table(dir: &str, overview: &Overview) -> String {
         row("merged", &format!("{known} frames are in objects.csv and coco.json; `papsynth generate` merges the rest"));
     }
     for defect in overview.defects.iter().take(MOST) {
-        row("damaged", &format!("frame {}: {}", defect.index, defect.message));
+        row("damaged", &format!("shard {}: {}", defect.shard, defect.message));
     }
     for flaw in &overview.flaws {
         row("damaged", flaw);

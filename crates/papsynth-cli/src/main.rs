@@ -2,6 +2,7 @@
 
 mod args;
 mod calibrate;
+mod convert;
 mod diagnose;
 mod exit;
 mod generate;
@@ -12,14 +13,21 @@ mod judge;
 mod learn;
 mod match_fields;
 mod nearest;
+mod plan;
 mod preview;
 mod profile;
 mod recipe_file;
 mod report;
+mod rerender;
 mod schema;
 mod setup;
+mod share;
+mod status;
 mod study;
+mod submit;
+mod sweep;
 mod text_file;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -64,6 +72,15 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Judge(args) => judge::run(&args),
         Verb::Match(args) => match_fields::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
+        Verb::Verify(args) => verify::run(&args),
+        Verb::Convert(args) => convert::run(&args),
+        Verb::Rerender(args) => rerender::run(&args),
+        Verb::Sweep(args) => sweep::run(&args),
+        Verb::Plan(args) => plan::run(&args),
+        Verb::Submit(args) => submit::run(&args),
+        Verb::Status(args) => status::run(&args),
+        Verb::Merge(args) => status::merge(&args),
+        Verb::Clean(args) => verify::clean(&args),
         Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();

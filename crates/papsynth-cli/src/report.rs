@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use papsynth_dataset::{Outcome, Progress as Step};
+use papsynth_dataset::{Outcome, Progress as Step, Share};
 use serde_json::json;
 
 use crate::args::Generate;
@@ -106,7 +106,7 @@ impl Progress {
     }
 
     /// Everything is done.
-    pub(crate) fn done(&self, outcome: &Outcome) -> Result<(), Failure> {
+    pub(crate) fn done(&self, outcome: &Outcome, share: Share) -> Result<(), Failure> {
         let (dir, Outcome { made, kept, .. }) = (&self.start.dir, outcome);
         match self.style {
             Style::Json => event(&json!({ "event": "done", "dir": dir, "made": made, "kept": kept })),
@@ -114,11 +114,13 @@ impl Progress {
             Style::Bar | Style::Lines => {
                 let (dir, frames) = (dir.display(), if *made == 1 { "frame" } else { "frames" });
                 let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
-                exit::print(&format!(
-                    "{dir}: {made} {frames} made{there}
-Look at: {dir}/contact-sheet.png
-"
-                ))
+                let next = match share {
+                    Share::ALL => format!("Look at: {dir}/contact-sheet.png"),
+                    Share { index, of } => {
+                        format!("That was share {index} of {of}; when all are done: papsynth merge {dir} --frames …")
+                    }
+                };
+                exit::print(&format!("{dir}: {made} {frames} made{there}\n{next}\n"))
             }
         }
     }

@@ -1,5 +1,6 @@
 //! The program from outside: exit codes, messages, files.
 
+#[allow(dead_code, reason = "each test uses its part")]
 mod support;
 
 use std::collections::BTreeMap;
@@ -365,7 +366,7 @@ fn inspect_shows_what_is_there_and_what_is_damaged() {
     let run = bench.run("inspect out --verify");
     assert_eq!(run.code, 2);
     assert!(
-        run.out.contains("damaged     frame 2") && run.err.contains("1 frame and 0 files are damaged"),
+        run.out.contains("damaged     shard 2") && run.err.contains("1 shard and 0 files are damaged"),
         "{}{}",
         run.out,
         run.err

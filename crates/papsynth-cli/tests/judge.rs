@@ -175,7 +175,7 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
         ("judge grades good --pixel-um 0.3 --group H", "grades: no field is of group H"),
         ("judge good good --pixel-um 0.3 --group Z", "good: no field is of group Z"),
         ("judge points good --pixel-um 0.3", "2 of 2 points lie outside the image of 64 x 48 pixels"),
-        ("judge good damaged --pixel-um 0.3", "damaged: frame 1 is not whole"),
+        ("judge good damaged --pixel-um 0.3", "damaged: shard 1 is not whole"),
         ("judge good good --pixel-um 0.3 --nuclei masks", "--nuclei masks: "),
         ("judge good good --pixel-um 0", "expected 0.05 to 4 micrometres"),
     ] {

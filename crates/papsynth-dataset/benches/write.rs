@@ -8,7 +8,7 @@ use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::Preset;
 use papsynth::{Engine, Frame, Inputs};
-use papsynth_dataset::{Dataset, DatasetInfo, rle};
+use papsynth_dataset::{Dataset, DatasetInfo, Layout, rle};
 
 const SEED: u64 = 1;
 
@@ -22,9 +22,11 @@ impl Drop for Scratch {
 }
 
 fn write(dataset: &Dataset, frame: &Frame) {
-    let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
+    let mut writer = dataset.shard_writer(frame.finished.scene.key.index).unwrap();
+    writer.begin(&frame.finished.scene).unwrap();
     frame.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
-    writer.finish(&frame.finished).unwrap();
+    writer.end(&frame.finished).unwrap();
+    writer.commit().unwrap();
 }
 
 fn bench(criterion: &mut Criterion) {
@@ -37,7 +39,7 @@ fn bench(criterion: &mut Criterion) {
         let frame = engine.frame(Key { seed: SEED, index: 0 }).unwrap();
         let pixels = frame.finished.scene.view.width * frame.finished.scene.view.height;
         let scratch = Scratch(std::env::temp_dir().join(format!("papsynth-bench-{}-{planes}", std::process::id())));
-        let info = DatasetInfo { recipe: &recipe, model: &model, seed: SEED, map: None };
+        let info = DatasetInfo { recipe: &recipe, model: &model, seed: SEED, map: None, layout: &Layout::default() };
         let dataset = Dataset::create_or_resume(&scratch.0, &info).unwrap();
         group.throughput(Throughput::Elements((pixels * frame.planes.len()) as u64));
         group.bench_function(format!("{planes} planes"), |b| b.iter(|| write(&dataset, &frame)));

@@ -5,16 +5,19 @@ use papsynth::scene::Kind;
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Truth};
 use serde::{Deserialize, Serialize};
 
-use crate::layout::{self, Form};
+use crate::error::Problem;
 use crate::record::FrameSummary;
 use crate::rle;
 
 /// A kind of annotation: of cells one for each class and part, of everything else one for each kind.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Category {
-    pub(crate) id: u32,
-    pub(crate) name: String,
-    pub(crate) supercategory: String,
+pub struct Category {
+    /// From 1.
+    pub id: u32,
+    /// Such as "superficial nucleus" or "bacillus".
+    pub name: String,
+    /// "cytoplasm", "nucleus" or "debris".
+    pub supercategory: String,
 }
 
 /// The categories of a recipe, the same whatever frames are made of it.
@@ -58,6 +61,11 @@ impl Rle {
     fn new(mask: &Mask, width: usize, height: usize) -> Self {
         Self { size: [height, width], counts: rle::encode(mask, width, height) }
     }
+
+    fn mask(&self) -> Result<Mask, Problem> {
+        let [height, width] = self.size;
+        rle::decode(&self.counts, width, height)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,9 +73,9 @@ pub(crate) struct Image {
     id: u64,
     width: usize,
     height: usize,
-    file_name: String,
+    pub(crate) file_name: String,
     #[serde(skip_serializing_if = "Option::is_none", default)]
-    all_in_focus: Option<String>,
+    pub(crate) all_in_focus: Option<String>,
     pixel_um: f64,
     /// The pixels of each plane that are saturated, if some are.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
@@ -75,14 +83,13 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    pub(crate) fn new(frame: &FrameSummary, saturated: &[Mask]) -> Self {
-        let form = Form::of(frame.planes_um.len());
+    fn new(frame: &FrameSummary, saturated: &[Mask], [file_name, all_in_focus]: [Option<String>; 2]) -> Self {
         Self {
             id: frame.index,
             width: frame.width,
             height: frame.height,
-            file_name: layout::image(frame.index, form),
-            all_in_focus: (form == Form::Stack).then(|| layout::all_in_focus(frame.index)),
+            file_name: file_name.unwrap_or_default(),
+            all_in_focus,
             pixel_um: frame.pixel_um,
             saturated: if saturated.iter().all(Mask::is_empty) {
                 Vec::new()
@@ -93,16 +100,24 @@ impl Image {
     }
 }
 
-/// One object or part of a cell.
+impl Image {
+    pub(crate) fn index(&self) -> u64 {
+        self.id
+    }
+
+    /// The pixels of each plane that are saturated; none if none is in any.
+    pub(crate) fn saturated(&self) -> Result<Vec<Mask>, Problem> {
+        self.saturated.iter().map(Rle::mask).collect()
+    }
+}
+
+/// One object or part of a cell: COCO's fields, and everything else that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Annotation {
-    /// From 1; within the frame in its own document, over all frames in the joint one.
-    id: u64,
+    /// From 1; within the shard in its own document, over all frames in the joint one.
+    pub(crate) id: u64,
     image_id: u64,
-    category_id: u32,
-    /// The id of the object in label images and tables; nucleus and cytoplasm of a cell share it.
-    cell_id: u32,
-    part: Part,
+    pub(crate) category_id: u32,
     bbox: [u32; 4],
     area: u64,
     iscrowd: u8,
@@ -111,35 +126,127 @@ pub(crate) struct Annotation {
     /// The pixels where the object is the front-most of its group.
     front: Rle,
     front_area: u64,
+    /// The id of the object in label images and tables; nucleus and cytoplasm of a cell share it.
+    object_id: u32,
+    /// Of a nucleus: the annotation of its cytoplasm, if that is in the image.
+    parent_id: Option<u64>,
+    part: Part,
+    kind: String,
+    class: String,
+    bethesda: String,
+    traits: String,
+    cluster: u32,
+    centre_um: [f64; 2],
+    depth_um: f64,
+    stain: f64,
+    tint: String,
+    rotation_deg: f64,
+    area_um2: f64,
+    centroid: Option<[f64; 2]>,
+    truncated: bool,
+    defocus_um: Vec<f64>,
+    detectability: Vec<f64>,
 }
 
 impl Annotation {
-    fn new(id: u64, object: &ObjectTruth, frame: &FrameSummary, category_id: u32) -> Self {
+    fn new(id: u64, parent_id: Option<u64>, object: &ObjectTruth, frame: &FrameSummary, category_id: u32) -> Self {
         let (width, height) = (frame.width, frame.height);
         Self {
             id,
             image_id: frame.index,
             category_id,
-            cell_id: object.id,
-            part: object.part,
-            bbox: object.amodal.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height]),
+            bbox: box_of(&object.amodal),
             area: object.amodal.area(),
             iscrowd: 0,
             segmentation: Rle::new(&object.amodal, width, height),
             front: Rle::new(&object.front, width, height),
             front_area: object.front.area(),
+            object_id: object.id,
+            parent_id,
+            part: object.part,
+            kind: object.kind.name().to_owned(),
+            class: object.class.clone(),
+            bethesda: object.bethesda.clone(),
+            traits: object.traits.clone(),
+            cluster: object.cluster,
+            centre_um: object.centre_um,
+            depth_um: object.depth_um,
+            stain: object.stain,
+            tint: object.tint.to_owned(),
+            rotation_deg: object.rotation_deg,
+            area_um2: object.area_um2,
+            centroid: object.amodal.centroid(),
+            truncated: object.truncated,
+            defocus_um: object.defocus_um.clone(),
+            detectability: object.detectability.clone(),
         }
     }
 
-    pub(crate) fn renumbered(self, id: u64) -> Self {
-        Self { id, ..self }
+    /// With `ids` more before it.
+    pub(crate) fn renumbered(self, ids: u64) -> Self {
+        Self { id: self.id + ids, parent_id: self.parent_id.map(|parent| parent + ids), ..self }
+    }
+
+    /// The frame that it is in.
+    pub(crate) fn image(&self) -> u64 {
+        self.image_id
     }
 
     /// The complete mask and the group it belongs to.
-    pub(crate) fn amodal(&self) -> Result<(Group, Mask), crate::Problem> {
-        let [height, width] = self.segmentation.size;
-        Ok((group(self.part), rle::decode(&self.segmentation.counts, width, height)?))
+    pub(crate) fn amodal(&self) -> Result<(Group, Mask), Problem> {
+        Ok((group(self.part), self.segmentation.mask()?))
     }
+
+    /// The truth it was written from.
+    ///
+    /// # Errors
+    /// If a mask is none, or is not as box and areas say.
+    pub(crate) fn object(&self) -> Result<ObjectTruth, Problem> {
+        let (amodal, front) = (self.segmentation.mask()?, self.front.mask()?);
+        let wrong = |what: &str| Problem::Broken {
+            format: "COCO",
+            message: format!("annotation {}: {what} is not that of its mask", self.id),
+        };
+        let claims: [(&str, bool); 4] = [
+            ("area", self.area == amodal.area()),
+            ("bbox", self.bbox == box_of(&amodal)),
+            ("front_area", self.front_area == front.area()),
+            ("centroid", self.centroid == amodal.centroid()),
+        ];
+        if let Some((what, _)) = claims.into_iter().find(|(_, holds)| !holds) {
+            return Err(wrong(what));
+        }
+        let unknown = |what: &str, found: &str| Problem::Broken {
+            format: "COCO",
+            message: format!("annotation {}: there is no {what} `{}`", self.id, found.escape_default()),
+        };
+        let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
+        let tint = ["", "cyanophilic", "eosinophilic", "orangeophilic"].into_iter().find(|tint| *tint == self.tint);
+        Ok(ObjectTruth {
+            id: self.object_id,
+            part: self.part,
+            kind: kind.ok_or_else(|| unknown("kind", &self.kind))?,
+            class: self.class.clone(),
+            bethesda: self.bethesda.clone(),
+            traits: self.traits.clone(),
+            cluster: self.cluster,
+            centre_um: self.centre_um,
+            depth_um: self.depth_um,
+            stain: self.stain,
+            tint: tint.ok_or_else(|| unknown("tint", &self.tint))?,
+            rotation_deg: self.rotation_deg,
+            area_um2: self.area_um2,
+            truncated: self.truncated,
+            amodal,
+            front,
+            defocus_um: self.defocus_um.clone(),
+            detectability: self.detectability.clone(),
+        })
+    }
+}
+
+fn box_of(mask: &Mask) -> [u32; 4] {
+    mask.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height])
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -160,8 +267,9 @@ pub(crate) struct Document {
     pub(crate) info: Info,
     pub(crate) licenses: Vec<String>,
     pub(crate) categories: Vec<Category>,
-    pub(crate) images: Vec<Image>,
+    /// Before the images, which are written when all are known.
     pub(crate) annotations: Vec<Annotation>,
+    pub(crate) images: Vec<Image>,
 }
 
 impl Document {
@@ -174,18 +282,46 @@ impl Document {
         frame: &FrameSummary,
         saturated: &[Mask],
         categories: &[Category],
+        files: [Option<String>; 2],
     ) -> Result<Self, String> {
+        let parent = |object: &ObjectTruth| {
+            let is_cell = |other: &ObjectTruth| other.part == Part::Cytoplasm && other.id == object.id;
+            (object.part == Part::Nucleus).then(|| (1..).zip(&truth.objects).find(|(_, o)| is_cell(o))).flatten()
+        };
         let annotation = |(id, object): (u64, &ObjectTruth)| {
             let name = category_name(&object.class, object.part);
             let category = categories.iter().find(|c| c.name == name).ok_or(name)?;
-            Ok(Annotation::new(id, object, frame, category.id))
+            Ok(Annotation::new(id, parent(object).map(|(id, _)| id), object, frame, category.id))
         };
         Ok(Self {
             info: Info::default(),
             licenses: Vec::new(),
             categories: categories.to_vec(),
-            images: vec![Image::new(frame, saturated)],
             annotations: (1..).zip(&truth.objects).map(annotation).collect::<Result<_, String>>()?,
+            images: vec![Image::new(frame, saturated, files)],
         })
+    }
+
+    /// The truth of a frame among those of the document.
+    ///
+    /// # Errors
+    /// If it has no such frame, or what it says of it does not fit together.
+    pub(crate) fn truth(&self, index: u64) -> Result<Truth, Problem> {
+        let image = self.images.iter().find(|image| image.id == index);
+        let image =
+            image.ok_or_else(|| Problem::Broken { format: "COCO", message: format!("it has no image {index}") })?;
+        let of_frame = self.annotations.iter().filter(|annotation| annotation.image_id == index);
+        let objects: Vec<ObjectTruth> = of_frame.map(Annotation::object).collect::<Result<_, _>>()?;
+        let outside = |mask: &Mask| {
+            mask.bounds()
+                .is_some_and(|b| (b.x + b.width) as usize > image.width || (b.y + b.height) as usize > image.height)
+        };
+        match objects.iter().find(|object| outside(&object.amodal) || outside(&object.front)) {
+            Some(object) => Err(Problem::Broken {
+                format: "COCO",
+                message: format!("the mask of object {} of image {index} leaves the image", object.id),
+            }),
+            None => Ok(Truth { width: image.width, height: image.height, objects }),
+        }
     }
 }

@@ -1,27 +1,29 @@
 //! The folder of a data set: begun, resumed, completed.
 
-use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::fmt::{self, Formatter};
+use std::fs;
+use std::io;
+use std::ops::Range;
 use std::path::Path;
 
 use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
-use papsynth::scene::Scene;
 
 use crate::coco::{Category, categories};
+use crate::contents;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, is_temporary, sha256};
-use crate::frame_writer::FrameWriter;
-use crate::layout;
+use crate::layout::{self, Layout};
 use crate::merge;
 use crate::read::{self, InputFile};
-use crate::record::{Check, FrameRecord, Identity, Manifest};
+use crate::record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
+use crate::shard_writer::ShardWriter;
 
 pub use crate::merge::Summary;
 
-/// Largest record of a frame that is read back.
-const RECORD_BYTES: u64 = 1 << 26;
+/// Largest record of a shard that is read back.
+const RECORD_BYTES: u64 = 1 << 28;
 
 /// What a data set is made from.
 #[derive(Debug, Clone, Copy)]
@@ -34,16 +36,19 @@ pub struct DatasetInfo<'a> {
     pub seed: u64,
     /// The map that the recipe names, if it names one: kept in the data set, so that it can be made again from there.
     pub map: Option<&'a InputFile>,
+    /// How it lies in files.
+    pub layout: &'a Layout,
 }
 
 /// A data set in a folder.
 ///
-/// Frames may be written in any order, by several threads, and by several processes; each is whole when its record
-/// (`frames/N.json`) is there. Nothing outside the folder is touched.
+/// Shards may be written in any order, by several threads, and by several processes; each is whole when its record
+/// (`shards/N.json`) is there. Nothing outside the folder is touched.
 #[derive(Debug)]
 pub struct Dataset {
     pub(crate) folder: Folder,
     pub(crate) identity: Identity,
+    pub(crate) layout: Layout,
     pub(crate) categories: Vec<Category>,
     /// Name of the map that it keeps.
     pub(crate) map: Option<String>,
@@ -65,12 +70,31 @@ impl Dataset {
             recipe_sha256: sha256(recipe.as_bytes()),
             model_sha256: sha256(model.as_bytes()),
         };
-        let folder = Folder::new(path);
         let map = info.map.map(|file| file.name.clone());
-        let dataset = Self { folder, identity, categories: categories(info.recipe), map };
+        let kept = info.map.map(|file| (file.name.clone(), file.bytes.to_vec()));
+        let given = [(layout::RECIPE, recipe.into_bytes()), (layout::MODEL, model.into_bytes())];
+        let given = given.map(|(name, bytes)| (name.to_owned(), bytes)).into_iter().chain(kept).collect::<Vec<_>>();
+        Self::begin(path, identity, info.layout.clone(), categories(info.recipe), map, &given)
+    }
+
+    /// The same of what is decided already; `given` is kept in the folder, the recipe first.
+    pub(crate) fn begin(
+        path: &Path,
+        identity: Identity,
+        layout: Layout,
+        categories: Vec<Category>,
+        map: Option<String>,
+        given: &[(String, Vec<u8>)],
+    ) -> Result<Self, Error> {
+        if layout.formats.is_empty() || layout.frames_per_shard == 0 {
+            let message = "a data set wants at least one format, and one frame a shard".to_owned();
+            return Err(Error::Folder { path: path.to_owned(), message });
+        }
+        let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
+        let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
         match stranger(path)? {
-            None => merge::write_manifest(&dataset, &[], &[]).map(|_| ())?,
-            Some(_) if dataset.folder.path(layout::MANIFEST).exists() => dataset.compare(&recipe)?,
+            None => merge::write_manifest(&dataset, &[], &[], 0).map(|_| ())?,
+            Some(_) if dataset.folder.path(layout::MANIFEST).exists() => dataset.compare_or_restore(&recipe)?,
             Some(name) => {
                 return Err(Error::Folder {
                     path: path.to_owned(),
@@ -80,13 +104,8 @@ impl Dataset {
                 });
             }
         }
-        for name in layout::FOLDERS.into_iter().chain([""]) {
-            dataset.folder.sweep(name)?;
-        }
-        let kept = info.map.map(|file| (file.name.as_str(), &file.bytes[..]));
-        for (name, bytes) in
-            [(layout::RECIPE, recipe.as_bytes()), (layout::MODEL, model.as_bytes())].into_iter().chain(kept)
-        {
+        dataset.folder.sweep()?;
+        for (name, bytes) in given {
             dataset.folder.keep(name, bytes)?;
         }
         Ok(dataset)
@@ -104,12 +123,30 @@ impl Dataset {
         &self.identity
     }
 
-    /// Whether a frame is whole: its record is there, is of this data set, and all its files are as it says.
+    /// How it lies in files.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Indices of the frames that a shard has room for.
+    #[must_use]
+    pub fn frames_of_shard(&self, shard: u64) -> Range<u64> {
+        let frames = self.layout.frames_per_shard;
+        shard.saturating_mul(frames)..shard.saturating_add(1).saturating_mul(frames)
+    }
+
+    /// The record of a shard if it is whole: its record is there, is of this data set, and all its files are as it says.
     ///
     /// # Errors
     /// If the system refuses to tell.
-    pub fn is_whole(&self, index: u64, check: Check) -> Result<bool, Error> {
-        Ok(whole_record(&self.folder, &self.identity, index, check)?.is_ok())
+    pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
+        Ok(whole_record(&self.folder, &self.identity, &self.layout, shard, check)?.ok())
+    }
+
+    /// Where the image of a frame lies and, of a stack, the one with everything in focus.
+    pub(crate) fn images_of(&self, frame: &FrameSummary, shard: u64) -> [Option<String>; 2] {
+        self.layout.images_of(self.identity.seed, shard, frame)
     }
 
     /// Whether [`finish`](Self::finish) has merged all frames that are recorded, and its files are still there.
@@ -117,8 +154,8 @@ impl Dataset {
     /// # Errors
     /// If the system refuses to tell.
     pub fn is_finished(&self) -> Result<bool, Error> {
-        let manifest = read_manifest(&self.folder)?;
-        if manifest.frames == 0 || manifest.frames != recorded_frames(&self.folder)?.len() as u64 {
+        let manifest = Manifest::read(&self.folder)?;
+        if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
             return Ok(false);
         }
         for file in &manifest.files {
@@ -129,27 +166,58 @@ impl Dataset {
         Ok(true)
     }
 
-    /// Writes the frame of a scene, whose planes will follow one by one.
+    /// Writes a shard, whose frames will follow one by one.
     ///
     /// # Errors
-    /// If the scene is not one of this data set, or the system refuses.
-    pub fn frame_writer(&self, scene: &Scene) -> Result<FrameWriter<'_>, Error> {
-        FrameWriter::new(self, scene)
+    /// If the system refuses.
+    pub fn shard_writer(&self, shard: u64) -> Result<ShardWriter<'_>, Error> {
+        ShardWriter::new(self, shard)
     }
 
-    /// Merges what is known of all whole frames into `objects.csv`, `coco.json`, `contact-sheet.png` and
-    /// `manifest.json`, one frame at a time in the order of their indices. What is there already and the same is left untouched.
+    /// Merges what is known of all whole shards into `manifest.json`, the data card, `croissant.json` and `splits.csv`, `contact-sheet.png` and, where every frame
+    /// is a shard, `objects.csv` and `coco.json`; one shard at a time in their order. What is there already and the same is left untouched.
     ///
     /// # Errors
-    /// If a file of a frame cannot be read any more, or the system refuses.
+    /// If a file of a shard cannot be read any more, or the system refuses.
     pub fn finish(&self) -> Result<Summary, Error> {
         merge::merge(self)
     }
 
+    /// The data set that lies in a folder.
+    ///
+    /// # Errors
+    /// If there is none, or the system refuses to read.
+    pub fn open(path: &Path) -> Result<Self, Error> {
+        let folder = Folder::new(path);
+        let manifest = Manifest::read(&folder)?;
+        let own = [layout::RECIPE, layout::MODEL, layout::TABLE, layout::COCO, layout::SPLITS, layout::SHEET];
+        let own = [own.as_slice(), &[layout::CARD, layout::CROISSANT]].concat();
+        let is_map = |file: &&FileRecord| !file.path.contains('/') && !own.contains(&file.path.as_str());
+        let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());
+        let Manifest { identity, layout, categories, .. } = manifest;
+        Ok(Self { folder, identity, layout, categories, map })
+    }
+
+    /// As [`compare`](Self::compare); where the manifest was damaged, the shards say what the data set is.
+    fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
+        match self.compare(recipe) {
+            Err(damaged @ Error::Input { .. }) => {
+                for shard in recorded_shards(&self.folder)? {
+                    let Ok(record) = read_record(&self.folder, shard) else { continue };
+                    if record.identity == self.identity && record.layout == self.layout {
+                        return merge::write_manifest(self, &[], &[], 0).map(|_| ());
+                    }
+                }
+                Err(damaged)
+            }
+            compared => compared,
+        }
+    }
+
     /// The data set that lies in the folder must be this one.
     fn compare(&self, recipe: &str) -> Result<(), Error> {
-        let there = read_manifest(&self.folder)?.identity;
-        let here = &self.identity;
+        let manifest = Manifest::read(&self.folder)?;
+        let (there, here) = (manifest.identity, &self.identity);
         let difference = if there.stream_version != here.stream_version {
             Some(format!("is of stream version {}, this program writes {}", there.stream_version, here.stream_version))
         } else if there.recipe_sha256 != here.recipe_sha256 {
@@ -158,6 +226,8 @@ impl Dataset {
             Some("is of another model".to_owned())
         } else if there.seed != here.seed {
             Some(format!("is of seed {}, not {}", there.seed, here.seed))
+        } else if manifest.layout != self.layout {
+            Some(format!("lies in files in another way ({}, not {})", manifest.layout, self.layout))
         } else {
             None
         };
@@ -209,56 +279,63 @@ fn stranger(path: &Path) -> Result<Option<String>, Error> {
     Ok(None)
 }
 
-/// The manifest in a folder.
-pub(crate) fn read_manifest(folder: &Folder) -> Result<Manifest, Error> {
-    let path = folder.path(layout::MANIFEST);
-    let file = File::open(&path).map_err(|e| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::Folder {
-            path: folder.root().to_owned(),
-            message: "holds no data set: there is no manifest.json".to_owned(),
-        },
-        _ => Error::io("read", &path)(e),
-    })?;
-    Manifest::from_reader(BufReader::new(file)).map_err(|problem| Error::Input { path, problem })
-}
-
-/// The record of a frame; a missing one is an [`Problem::Missing`].
-pub(crate) fn read_record(folder: &Folder, index: u64) -> Result<FrameRecord, Error> {
-    let path = folder.path(&layout::record(index));
-    let record = FrameRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
-    if record.summary.index != index {
-        let message = format!("is the record of frame {}", record.summary.index);
+/// The record of a shard; a missing one is an [`Problem::Missing`].
+pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
+    let path = folder.path(&layout::record(shard));
+    let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
+    if record.shard != shard {
+        let message = format!("is the record of shard {}", record.shard);
         return Err(Error::input(&path)(Problem::Broken { format: "JSON", message }));
     }
     Ok(record)
 }
 
-/// The record of a frame that is whole, or what it lacks.
+/// What is wrong with a file of a shard.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Flaw {
+    pub(crate) path: String,
+    pub(crate) message: String,
+}
+
+impl fmt::Display for Flaw {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.path, self.message)
+    }
+}
+
+/// The record of a shard that is whole, or what it lacks.
 pub(crate) fn whole_record(
     folder: &Folder,
     identity: &Identity,
-    index: u64,
+    layout: &Layout,
+    shard: u64,
     check: Check,
-) -> Result<Result<FrameRecord, String>, Error> {
-    let record = match read_record(folder, index) {
+) -> Result<Result<ShardRecord, Flaw>, Error> {
+    let flaw = |message: String| Ok(Err(Flaw { path: layout::record(shard), message }));
+    let record = match read_record(folder, shard) {
         Ok(record) => record,
-        Err(Error::Input { problem, .. }) => return Ok(Err(format!("{}: {problem}", layout::record(index)))),
+        Err(Error::Input { problem, .. }) => return flaw(problem.to_string()),
         Err(failure) => return Err(failure),
     };
-    if record.identity != *identity {
-        return Ok(Err(format!("{} is of another data set", layout::record(index))));
+    if record.identity != *identity || record.layout != *layout {
+        return flaw("is of another data set".to_owned());
     }
     for file in &record.files {
-        if let Some(flaw) = folder.flaw(file, check)? {
-            return Ok(Err(flaw));
+        if let Some(message) = folder.flaw(file, check)? {
+            return Ok(Err(Flaw { path: file.path.clone(), message }));
         }
+    }
+    if check == Check::Hashes
+        && let Some(flaw) = contents::flaw(folder, layout, &record)?
+    {
+        return Ok(Err(flaw));
     }
     Ok(Ok(record))
 }
 
-/// Indices of all frames with a record, in order.
-pub(crate) fn recorded_frames(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let path = folder.path(layout::FRAMES);
+/// Numbers of all shards with a record, in order.
+pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
+    let path = folder.path(layout::SHARDS);
     let entries = match fs::read_dir(&path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -267,7 +344,7 @@ pub(crate) fn recorded_frames(folder: &Folder) -> Result<Vec<u64>, Error> {
     let mut found = Vec::new();
     for entry in entries {
         let name = entry.map_err(Error::io("read", &path))?.file_name();
-        found.extend(name.to_str().and_then(layout::index_of_record));
+        found.extend(name.to_str().and_then(layout::number_of_record));
     }
     found.sort_unstable();
     Ok(found)

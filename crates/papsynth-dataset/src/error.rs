@@ -210,6 +210,12 @@ pub enum Problem {
         /// The other.
         other: String,
     },
+    /// A file says something else than others of its data set.
+    #[error("{what}")]
+    Differs {
+        /// What it says, and what the others say.
+        what: String,
+    },
     /// A folder without anything to read.
     #[error("holds no PNG or TIFF file")]
     NoImages,

@@ -49,7 +49,7 @@ impl Folder {
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         let pending = self.pending(name)?;
         pending.handle()?.write_all(bytes).map_err(Error::io("write", &pending.path))?;
-        pending.commit()
+        pending.commit_as(FileRecord { path: name.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
     }
 
     /// Writes a whole file, unless there is one of the same content.
@@ -64,11 +64,9 @@ impl Folder {
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<FileRecord, Error> {
-        let pending = self.pending(name)?;
-        let mut output = Output { writer: BufWriter::new(pending.handle()?), path: pending.path.clone() };
+        let mut output = Output::new(self.pending(name)?)?;
         fill(&mut output)?;
-        output.flush()?;
-        pending.commit_if_new(self)
+        output.into_pending()?.commit_if_new(self)
     }
 
     /// Opens a file that will have this name once it is committed.
@@ -95,19 +93,19 @@ impl Folder {
 
     /// What is wrong with a file, if anything is.
     pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
-        let (path, name) = (self.path(&record.path), &record.path);
+        let path = self.path(&record.path);
         let size = match fs::metadata(&path) {
             Ok(found) if found.is_file() => found.len(),
-            Ok(_) => return Ok(Some(format!("{name} is no file"))),
+            Ok(_) => return Ok(Some("is no file".to_owned())),
             Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-                return Ok(Some(format!("{name} is missing")));
+                return Ok(Some("is missing".to_owned()));
             }
             Err(e) => return Err(Error::io("read", &path)(e)),
         };
         Ok(if size != record.bytes {
-            Some(format!("{name} has {size} bytes, not {}", record.bytes))
-        } else if check == Check::Hashes && self.record(name)?.sha256 != record.sha256 {
-            Some(format!("{name} has another content than it was written with"))
+            Some(format!("has {size} bytes, not {}", record.bytes))
+        } else if check == Check::Hashes && self.record(&record.path)?.sha256 != record.sha256 {
+            Some("has another content than it was written with".to_owned())
         } else {
             None
         })
@@ -121,33 +119,63 @@ impl Folder {
         Ok(FileRecord { path: name.to_owned(), bytes, sha256 })
     }
 
-    /// Removes what killed processes left behind. A temporary file that somebody works on is locked, and stays.
-    pub(crate) fn sweep(&self, folder: &str) -> Result<(), Error> {
-        let path = self.path(folder);
-        let entries = match fs::read_dir(&path) {
-            Ok(entries) => entries,
-            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return Ok(()),
-            Err(e) => return Err(Error::io("read", &path)(e)),
-        };
-        for entry in entries {
-            let entry = entry.map_err(Error::io("read", &path))?;
-            if !is_temporary(&entry.file_name().to_string_lossy()) {
-                continue;
-            }
-            let abandoned = File::options().write(true).open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
-            if abandoned {
-                // Gone already is as good.
-                let _ = fs::remove_file(entry.path());
+    /// Every folder from the root down, but none that a link leads to.
+    pub(crate) fn folders(&self) -> Result<Vec<PathBuf>, Error> {
+        let mut found = vec![self.root.clone()];
+        let mut next = 0;
+        while let Some(path) = found.get(next).cloned() {
+            next += 1;
+            let entries = match fs::read_dir(&path) {
+                Ok(entries) => entries,
+                Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => continue,
+                Err(e) => return Err(Error::io("read", &path)(e)),
+            };
+            for entry in entries {
+                let entry = entry.map_err(Error::io("read", &path))?;
+                if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
+                    found.push(entry.path());
+                }
             }
         }
-        Ok(())
+        Ok(found)
     }
 
-    /// Brings the names in a folder to the disk. Losing one to a power failure loses no more than its file, which is
-    /// then made again; so this is done once at the end.
-    pub(crate) fn sync_names(&self, folder: &str) {
-        // Not every system can do this to a folder.
-        let _ = File::open(self.path(folder)).and_then(|f| f.sync_all());
+    /// Removes what killed processes left behind and says how many files it was. A temporary file that somebody works on is
+    /// locked, and stays.
+    pub(crate) fn sweep(&self) -> Result<u64, Error> {
+        let mut removed = 0;
+        for path in self.folders()? {
+            let entries = match fs::read_dir(&path) {
+                Ok(entries) => entries,
+                Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => continue,
+                Err(e) => return Err(Error::io("read", &path)(e)),
+            };
+            for entry in entries {
+                let entry = entry.map_err(Error::io("read", &path))?;
+                if !is_temporary(&entry.file_name().to_string_lossy()) {
+                    continue;
+                }
+                let abandoned = File::options().write(true).open(entry.path()).is_ok_and(|f| f.try_lock().is_ok());
+                // Gone already is as good.
+                removed += u64::from(abandoned && fs::remove_file(entry.path()).is_ok());
+            }
+        }
+        Ok(removed)
+    }
+
+    /// Brings the names of these files to the disk: what is recorded afterwards is there even if the power fails.
+    pub(crate) fn sync_names<'f>(&self, files: impl IntoIterator<Item = &'f FileRecord>) -> Result<(), Error> {
+        let mut folders: Vec<PathBuf> =
+            files.into_iter().filter_map(|file| self.path(&file.path).parent().map(Path::to_owned)).collect();
+        folders.sort_unstable();
+        folders.dedup();
+        folders.iter().try_for_each(|folder| {
+            // Not every system opens a folder; one that does must bring it to the disk.
+            match File::open(folder) {
+                Ok(opened) => fault::sync(&opened).map_err(Error::io("write", folder)),
+                Err(_) => Ok(()),
+            }
+        })
     }
 }
 
@@ -180,6 +208,13 @@ impl Pending {
     /// Brings the file to the disk and gives it its name.
     pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
         let record = self.seal().map_err(Error::io("write", &self.path))?;
+        self.rename()?;
+        Ok(record)
+    }
+
+    /// The same of a file whose content is known.
+    fn commit_as(mut self, record: FileRecord) -> Result<FileRecord, Error> {
+        fault::sync(&self.file).map_err(Error::io("write", &self.path))?;
         self.rename()?;
         Ok(record)
     }
@@ -221,16 +256,20 @@ impl Drop for Pending {
 /// A file that is written piece by piece.
 pub(crate) struct Output {
     writer: BufWriter<Handle>,
-    path: PathBuf,
+    pending: Pending,
 }
 
 impl Output {
+    pub(crate) fn new(pending: Pending) -> Result<Self, Error> {
+        Ok(Self { writer: BufWriter::new(pending.handle()?), pending })
+    }
+
     pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        self.writer.write_all(bytes).map_err(Error::io("write", &self.path))
+        self.writer.write_all(bytes).map_err(Error::io("write", &self.pending.path))
     }
 
     pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
-        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.path)(e.into()))
+        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.pending.path)(e.into()))
     }
 
     /// The elements of a JSON array between its brackets, one a line.
@@ -245,8 +284,10 @@ impl Output {
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), Error> {
-        self.writer.flush().map_err(Error::io("write", &self.path))
+    /// Everything is written.
+    pub(crate) fn into_pending(mut self) -> Result<Pending, Error> {
+        self.writer.flush().map_err(Error::io("write", &self.pending.path))?;
+        Ok(self.pending)
     }
 }
 
@@ -292,7 +333,7 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
@@ -302,6 +343,8 @@ pub(crate) mod fault {
     thread_local! {
         /// Points that are still passed without harm; none set, all are.
         pub(crate) static LEFT: std::cell::Cell<Option<usize>> = const { std::cell::Cell::new(None) };
+        /// How the next one fails: full disk, refused, broken.
+        pub(crate) static KIND: std::cell::Cell<std::io::ErrorKind> = const { std::cell::Cell::new(std::io::ErrorKind::StorageFull) };
     }
 
     #[cfg(not(test))]
@@ -325,7 +368,7 @@ pub(crate) mod fault {
     pub(crate) fn point() -> std::io::Result<()> {
         LEFT.with(|left| match left.get() {
             None => Ok(()),
-            Some(0) => Err(std::io::Error::new(std::io::ErrorKind::StorageFull, "no space left (on purpose)")),
+            Some(0) => Err(std::io::Error::new(KIND.get(), "on purpose")),
             Some(n) => {
                 left.set(Some(n - 1));
                 Ok(())
@@ -340,17 +383,25 @@ mod tests {
 
     use super::*;
     use crate::support::{SEED, Scratch, contents, frame, recipe};
-    use crate::{Dataset, DatasetInfo};
+    use crate::{Dataset, DatasetInfo, Layout};
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {
-        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
+        let info = DatasetInfo {
+            recipe: &recipe(),
+            model: &Model::builtin(),
+            seed: SEED,
+            map: None,
+            layout: &Layout::default(),
+        };
         let dataset = Dataset::create_or_resume(path, &info)?;
-        if !dataset.is_whole(0, Check::Sizes)? {
+        if dataset.whole(0, Check::Sizes)?.is_none() {
             let frame = frame(0, 2, 8, 1);
-            let mut writer = dataset.frame_writer(&frame.finished.scene)?;
+            let mut writer = dataset.shard_writer(0)?;
+            writer.begin(&frame.finished.scene)?;
             frame.planes.iter().try_for_each(|plane| writer.write_plane(plane))?;
-            writer.finish(&frame.finished)?;
+            writer.end(&frame.finished)?;
+            writer.commit()?;
         }
         dataset.finish().map(|_| ())
     }
@@ -364,6 +415,8 @@ mod tests {
         // Every call of the beginning, then a choice.
         for passed in (0..40).chain((40..).step_by(7)) {
             let scratch = Scratch::new("faults");
+            let kinds = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied, io::ErrorKind::Other];
+            fault::KIND.set(kinds[failures % 3]);
             fault::LEFT.set(Some(passed));
             let result = make(scratch.path());
             fault::LEFT.set(None);

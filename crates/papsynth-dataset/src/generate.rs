@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
@@ -18,16 +18,32 @@ use crate::record::{Check, FrameSummary};
 pub struct Run<'a> {
     /// Indices of the frames.
     pub frames: Range<u64>,
-    /// How many frames are worked on side by side, each on a thread of its own; with 1, all are made on the calling thread.
+    /// Which of the shards: all, or every so many.
+    pub share: Share,
+    /// How many shards are worked on side by side, each on a thread of its own; with 1, all are made on the calling thread.
     pub at_once: usize,
     /// How many threads work on one frame. The bytes are the same.
     pub threads: Threads,
-    /// How carefully frames that are there are looked at, before they are kept.
+    /// How carefully shards that are there are looked at, before they are kept.
     pub check: Check,
-    /// Set to end early: frames that are being made are completed, no other is begun.
+    /// Set to end early: frames that are being made are completed, no other is begun; shards that lack frames are given up.
     pub stop: &'a AtomicBool,
     /// What adds up how long writing takes.
     pub profile: Option<&'a Profile>,
+}
+
+/// The shards of one of several runs that share the work: those whose number divided by `of` leaves `index`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Share {
+    /// Which, from 0.
+    pub index: u64,
+    /// Of how many, at least 1.
+    pub of: u64,
+}
+
+impl Share {
+    /// All shards.
+    pub const ALL: Self = Self { index: 0, of: 1 };
 }
 
 /// A frame is done.
@@ -51,30 +67,30 @@ pub struct Outcome {
 }
 
 impl Dataset {
-    /// Makes the frames of a range that are not whole, and reports each as it is done, in any order.
+    /// Makes the shards of a range of frames that are not whole, and reports each frame as it is done, in any order.
     ///
     /// The merged files are not touched: see [`finish`](Self::finish).
     ///
     /// # Errors
-    /// The first failure of the engine or the system; frames that are being made are completed, no other is begun.
+    /// If the range begins within a shard; else the first failure of the engine or the system: frames that are being made are
+    /// completed, no other is begun.
     pub fn generate(&self, engine: &Engine, run: &Run, report: &(dyn Fn(Progress) + Sync)) -> Result<Outcome, Error> {
         if sha256(engine.recipe().to_toml().as_bytes()) != self.identity.recipe_sha256 {
             let message = "the engine is of another recipe than the data set".to_owned();
             return Err(Error::Folder { path: self.path().to_owned(), message });
         }
-        let count = run.frames.end.saturating_sub(run.frames.start);
-        let (begun, kept, made) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+        let shards = self.shards_of(run)?;
+        let wanted = shards.iter().map(|shard| range_len(&self.frames_of(*shard, run))).sum::<u64>();
+        let (next, kept, made) = (AtomicUsize::new(0), AtomicU64::new(0), AtomicU64::new(0));
         let failure = Mutex::new(None);
         let failed = AtomicBool::new(false);
         let work = || {
             while !run.stop.load(Ordering::Relaxed) && !failed.load(Ordering::Relaxed) {
-                let number = begun.fetch_add(1, Ordering::Relaxed);
-                if number >= count {
-                    return;
-                }
-                match self.make(engine, run.frames.start + number, run, report) {
-                    Ok(Made::Now) => made.fetch_add(1, Ordering::Relaxed),
-                    Ok(Made::Before) => kept.fetch_add(1, Ordering::Relaxed),
+                let Some(&shard) = shards.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+                match self.make(engine, shard, run, report) {
+                    Ok(Made::Now(frames)) => made.fetch_add(frames, Ordering::Relaxed),
+                    Ok(Made::Before(frames)) => kept.fetch_add(frames, Ordering::Relaxed),
+                    Ok(Made::Stopped) => return,
                     Err(error) => {
                         failed.store(true, Ordering::Relaxed);
                         failure.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error);
@@ -83,7 +99,7 @@ impl Dataset {
                 };
             }
         };
-        let workers = run.at_once.min(usize::try_from(count).unwrap_or(usize::MAX));
+        let workers = run.at_once.min(shards.len());
         if workers <= 1 {
             work();
         } else {
@@ -93,21 +109,57 @@ impl Dataset {
             return Err(error);
         }
         let (kept, made) = (kept.into_inner(), made.into_inner());
-        Ok(Outcome { kept, made, stopped: kept + made < count })
+        Ok(Outcome { kept, made, stopped: kept + made < wanted })
     }
 
-    fn make(&self, engine: &Engine, index: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Made, Error> {
-        if self.is_whole(index, run.check)? {
-            report(Progress::Kept(index));
-            return Ok(Made::Before);
+    /// Numbers of the shards that a run makes.
+    ///
+    /// # Errors
+    /// If the run begins within a shard.
+    pub fn shards_of(&self, run: &Run) -> Result<Vec<u64>, Error> {
+        let (frames, each, Share { index, of }) = (&run.frames, self.layout.frames_per_shard, run.share);
+        if frames.start % each != 0 && !frames.is_empty() {
+            let message = format!(
+                "frames {}..{} begin within a shard; with {each} frames a shard a range begins at a multiple of {each}",
+                frames.start, frames.end
+            );
+            return Err(Error::Folder { path: self.path().to_owned(), message });
         }
-        let key = Key { seed: self.identity.seed, index };
-        let scene = engine.scene(key)?;
-        let mut writer = run.files(|| self.frame_writer(&scene))?;
-        let finished = engine.image::<Error>(scene, run.threads, |plane| run.files(|| writer.write_plane(plane)))?;
-        report(Progress::Made(&run.files(|| writer.finish(&finished))?));
-        Ok(Made::Now)
+        let shards = frames.start / each..frames.end.div_ceil(each).max(frames.start / each);
+        Ok(shards.filter(|shard| shard % of.max(1) == index).collect())
     }
+
+    /// The frames of a shard that a run makes.
+    fn frames_of(&self, shard: u64, run: &Run) -> Range<u64> {
+        let room = self.frames_of_shard(shard);
+        room.start.max(run.frames.start)..room.end.min(run.frames.end)
+    }
+
+    fn make(&self, engine: &Engine, shard: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Made, Error> {
+        let frames = self.frames_of(shard, run);
+        if self.whole(shard, run.check)?.is_some_and(|record| record.covers(&frames)) {
+            frames.clone().for_each(|index| report(Progress::Kept(index)));
+            return Ok(Made::Before(range_len(&frames)));
+        }
+        let mut writer = run.files(|| self.shard_writer(shard))?;
+        for index in frames.clone() {
+            // A shard may take minutes: it is given up, and made again from its beginning.
+            if index > frames.start && run.stop.load(Ordering::Relaxed) {
+                return Ok(Made::Stopped);
+            }
+            let scene = engine.scene(Key { seed: self.identity.seed, index })?;
+            run.files(|| writer.begin(&scene))?;
+            let finished =
+                engine.image::<Error>(scene, run.threads, |plane| run.files(|| writer.write_plane(plane)))?;
+            report(Progress::Made(run.files(|| writer.end(&finished))?));
+        }
+        run.files(|| writer.commit())?;
+        Ok(Made::Now(range_len(&frames)))
+    }
+}
+
+fn range_len(range: &Range<u64>) -> u64 {
+    range.end.saturating_sub(range.start)
 }
 
 impl Run<'_> {
@@ -120,7 +172,9 @@ impl Run<'_> {
     }
 }
 
+/// Frames of a shard.
 enum Made {
-    Before,
-    Now,
+    Before(u64),
+    Now(u64),
+    Stopped,
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::dataset::{read_manifest, recorded_frames, whole_record};
+use crate::dataset::{Dataset, recorded_shards, whole_record};
 use crate::error::Error;
 use crate::files::Folder;
 use crate::record::{Check, Manifest};
@@ -21,7 +21,7 @@ pub struct Overview {
     pub frames: u64,
     /// Ranges of indices without a whole frame, below the largest index there is.
     pub missing: Vec<Range<u64>>,
-    /// Frames of which something is wrong; they are among the missing.
+    /// Shards of which something is wrong; their frames are among the missing.
     pub defects: Vec<Defect>,
     /// What is wrong with the files of the whole data set, such as `coco.json`.
     pub flaws: Vec<String>,
@@ -41,11 +41,11 @@ pub struct Overview {
     pub bytes: u64,
 }
 
-/// Why a frame is not whole.
+/// Why a shard is not whole.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Defect {
-    /// Index of the frame.
-    pub index: u64,
+    /// Number of the shard.
+    pub shard: u64,
     /// What is wrong.
     pub message: String,
 }
@@ -56,7 +56,7 @@ pub struct Defect {
 /// If there is none, or the system refuses to read.
 pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     let folder = Folder::new(path);
-    let manifest = read_manifest(&folder)?;
+    let manifest = Manifest::read(&folder)?;
     let identity = manifest.identity.clone();
     let mut overview = Overview {
         manifest,
@@ -73,36 +73,58 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         bytes: 0,
     };
     for file in &overview.manifest.files {
-        overview.flaws.extend(folder.flaw(file, check)?);
+        overview.flaws.extend(folder.flaw(file, check)?.map(|message| format!("{} {message}", file.path)));
     }
     let mut next = 0;
-    for index in recorded_frames(&folder)? {
-        let record = match whole_record(&folder, &identity, index, check)? {
+    for shard in recorded_shards(&folder)? {
+        let record = match whole_record(&folder, &identity, &overview.manifest.layout, shard, check)? {
             Ok(record) => record,
-            Err(message) => {
-                overview.defects.push(Defect { index, message });
+            Err(flaw) => {
+                overview.defects.push(Defect { shard, message: flaw.to_string() });
                 continue;
             }
         };
-        if next < index {
-            overview.missing.push(next..index);
-        }
-        next = index + 1;
-        overview.frames += 1;
         overview.bytes += record.files.iter().map(|f| f.bytes).sum::<u64>();
-        let frame = record.summary;
-        for (category, count) in frame.objects {
-            *overview.objects.entry(category).or_insert(0) += count;
+        for frame in record.frames {
+            if next < frame.index {
+                overview.missing.push(next..frame.index);
+            }
+            next = frame.index + 1;
+            overview.frames += 1;
+            for (category, count) in frame.objects {
+                *overview.objects.entry(category).or_insert(0) += count;
+            }
+            overview.truncated += frame.truncated;
+            overview.sizes.insert([frame.width, frame.height]);
+            let [least, most] = overview.pixel_um;
+            overview.pixel_um = [least.min(frame.pixel_um), most.max(frame.pixel_um)];
+            overview.planes.insert(frame.planes_um.len());
+            overview.bits.insert(frame.bits);
         }
-        overview.truncated += frame.truncated;
-        overview.sizes.insert([frame.width, frame.height]);
-        let [least, most] = overview.pixel_um;
-        overview.pixel_um = [least.min(frame.pixel_um), most.max(frame.pixel_um)];
-        overview.planes.insert(frame.planes_um.len());
-        overview.bits.insert(frame.bits);
     }
-    if let Some(last) = overview.defects.last().filter(|d| d.index >= next) {
-        overview.missing.push(next..last.index + 1);
+    // What a damaged shard at the end had is not known; it has room for these.
+    let each = overview.manifest.layout.frames_per_shard;
+    let last = overview.defects.last().map(|d| d.shard.saturating_add(1).saturating_mul(each));
+    if let Some(last) = last.filter(|last| *last > next) {
+        overview.missing.push(next..last);
     }
     Ok(overview)
+}
+
+/// Numbers of the shards that lack a frame of a range, or that are not whole by the sizes of their files: from their records alone, so that it can be asked
+/// while others write.
+///
+/// # Errors
+/// If the system refuses to read.
+pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<u64>, Error> {
+    let each = dataset.layout.frames_per_shard;
+    let mut missing = Vec::new();
+    for shard in frames.start / each..frames.end.div_ceil(each) {
+        let room = dataset.frames_of_shard(shard);
+        let wanted = room.start.max(frames.start)..room.end.min(frames.end);
+        if !dataset.whole(shard, Check::Sizes)?.is_some_and(|record| record.covers(&wanted)) {
+            missing.push(shard);
+        }
+    }
+    Ok(missing)
 }

@@ -1,6 +1,13 @@
-//! Which file lies where.
+//! How a data set lies in files, and which file lies where.
+
+use std::fmt::{self, Formatter};
 
 use papsynth::truth::Group;
+use serde::{Deserialize, Serialize};
+
+use crate::flatten::Flatten;
+use crate::formats::Format;
+use crate::record::FrameSummary;
 
 pub(crate) const MANIFEST: &str = "manifest.json";
 pub(crate) const RECIPE: &str = "recipe.toml";
@@ -8,20 +15,75 @@ pub(crate) const MODEL: &str = "model.json";
 pub(crate) const TABLE: &str = "objects.csv";
 pub(crate) const COCO: &str = "coco.json";
 pub(crate) const SHEET: &str = "contact-sheet.png";
-pub(crate) const FRAMES: &str = "frames";
+pub(crate) const CARD: &str = "README.md";
+pub(crate) const CROISSANT: &str = "croissant.json";
+pub(crate) const SPLITS: &str = "splits.csv";
 
-/// Every folder that files of frames are written to.
-pub(crate) const FOLDERS: [&str; 9] = [
-    "images",
-    "noise-free",
-    "all-in-focus",
-    "labels/cytoplasm",
-    "labels/nucleus",
-    "labels/debris",
-    "labels/layers",
-    "objects",
-    FRAMES,
-];
+/// Records and truth of all shards.
+pub(crate) const SHARDS: &str = "shards";
+
+/// Tables of all shards.
+pub(crate) const TABLES: &str = "objects";
+
+/// How a data set lies in files: decided when it is begun, and kept in its manifest.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// The formats it is written in, in the order of [`Format::ALL`], each once; at least one.
+    pub formats: Vec<Format>,
+    /// Frames that are written, made again and recorded together, at least 1: shard *n* holds those with an index from
+    /// *n* times this number on.
+    pub frames_per_shard: u64,
+    /// What pixels show that belong to several objects, in formats that have one label a pixel.
+    pub flatten: Flatten,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self::new([Format::Folder])
+    }
+}
+
+impl Layout {
+    /// Frames of a shard of formats that keep many in a file: some hundred megabytes.
+    pub const FRAMES_PER_SHARD: u64 = 256;
+
+    /// The usual layout of these formats.
+    #[must_use]
+    pub fn new(formats: impl IntoIterator<Item = Format>) -> Self {
+        let mut formats: Vec<Format> = formats.into_iter().collect();
+        formats.sort_unstable();
+        formats.dedup();
+        let many = formats.iter().any(|format| format.is_sharded());
+        let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
+        Self { formats, frames_per_shard, flatten: Flatten::Top }
+    }
+
+    /// Whether every frame is a shard of its own.
+    pub(crate) fn is_by_frame(&self) -> bool {
+        self.frames_per_shard == 1
+    }
+
+    /// Where the image of a frame lies and, of a stack, the one with everything in focus.
+    pub(crate) fn images_of(&self, seed: u64, shard: u64, frame: &FrameSummary) -> [Option<String>; 2] {
+        let image = self.formats.first().map(|format| format.image(seed, shard, frame));
+        let mut sharp = self.formats.iter().filter_map(|format| format.all_in_focus(shard, frame.index));
+        [image, (Form::of(frame.planes_um.len()) == Form::Stack).then(|| sharp.next()).flatten()]
+    }
+
+    /// Whether a format is among the data set's.
+    #[must_use]
+    pub fn has(&self, format: Format) -> bool {
+        self.formats.contains(&format)
+    }
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = self.formats.iter().map(|format| format.name()).collect();
+        write!(f, "{} with {} a shard, {}", names.join(","), self.frames_per_shard, self.flatten.name())
+    }
+}
 
 /// Whether a frame is a single image or a focus stack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,9 +98,9 @@ impl Form {
     }
 }
 
-/// The name of a frame: its index in at least six digits.
-pub(crate) fn frame_name(index: u64) -> String {
-    format!("{index:06}")
+/// The name of a frame or shard: its number in at least six digits.
+pub(crate) fn numbered(number: u64) -> String {
+    format!("{number:06}")
 }
 
 pub(crate) fn image(index: u64, form: Form) -> String {
@@ -65,21 +127,21 @@ pub(crate) fn layers(index: u64) -> String {
     format!("labels/layers/{index:06}.tif")
 }
 
-pub(crate) fn table(index: u64) -> String {
-    format!("objects/{index:06}.csv")
+pub(crate) fn table(shard: u64) -> String {
+    format!("{TABLES}/{shard:06}.csv")
 }
 
-pub(crate) fn coco(index: u64) -> String {
-    format!("{FRAMES}/{index:06}.coco.json")
+pub(crate) fn coco(shard: u64) -> String {
+    format!("{SHARDS}/{shard:06}.coco.json")
 }
 
-pub(crate) fn record(index: u64) -> String {
-    format!("{FRAMES}/{index:06}.json")
+pub(crate) fn record(shard: u64) -> String {
+    format!("{SHARDS}/{shard:06}.json")
 }
 
-/// The index of the frame whose record has this file name.
-pub(crate) fn index_of_record(file_name: &str) -> Option<u64> {
+/// The number of the shard whose record has this file name.
+pub(crate) fn number_of_record(file_name: &str) -> Option<u64> {
     let digits = file_name.strip_suffix(".json")?;
-    let index = digits.parse().ok()?;
-    (frame_name(index) == digits).then_some(index)
+    let number = digits.parse().ok()?;
+    (numbered(number) == digits).then_some(number)
 }

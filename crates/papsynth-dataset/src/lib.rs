@@ -1,29 +1,47 @@
 #![doc = include_str!("../README.md")]
 
+mod card;
 mod coco;
+mod compare;
+mod contents;
+mod convert;
 mod dataset;
 mod error;
 mod files;
-mod frame_writer;
+mod flatten;
+mod formats;
 mod generate;
+mod image_of;
 mod inspect;
+mod layers;
 mod layout;
 mod merge;
 mod picture;
+mod polygon;
 pub mod read;
 mod record;
 pub mod rle;
+mod shard_writer;
+mod splits;
 #[cfg(test)]
 #[path = "../tests/support/mod.rs"]
 mod support;
 mod table;
+mod verify;
 mod write;
 
+pub use coco::Category;
+pub use compare::{frames_of, images_of, truth_differs};
+pub use convert::convert;
 pub use dataset::{Dataset, DatasetInfo, Summary};
 pub use error::{Error, Problem};
 pub use files::write_file;
-pub use frame_writer::FrameWriter;
-pub use generate::{Outcome, Progress, Run};
-pub use inspect::{Defect, Overview, inspect};
+pub use flatten::Flatten;
+pub use formats::Format;
+pub use generate::{Outcome, Progress, Run, Share};
+pub use inspect::{Defect, Overview, inspect, shards_to_make};
+pub use layout::Layout;
 pub use picture::Picture;
-pub use record::{Check, FileRecord, FrameRecord, FrameSummary, Identity, Manifest};
+pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
+pub use shard_writer::ShardWriter;
+pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};

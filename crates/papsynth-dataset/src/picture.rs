@@ -5,8 +5,8 @@ use std::io;
 use papsynth::truth::{Group, Mask};
 use papsynth::{Finished, Plane};
 
-use crate::frame_writer::white;
 use crate::read::LevelImage;
+use crate::shard_writer::white;
 use crate::write::rgb_png;
 
 /// A picture in colour.

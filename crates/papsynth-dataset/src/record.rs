@@ -2,6 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Formatter};
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::ops::Range;
 use std::path::{Component, Path};
 
 use papsynth::key::Key;
@@ -9,10 +12,13 @@ use papsynth::scene::{Scene, View};
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::error::Problem;
+use crate::coco::Category;
+use crate::error::{Error, Problem};
+use crate::files::{Folder, sha256};
+use crate::layout::{self, Layout};
 
 /// Version of the layout of data sets.
-pub(crate) const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 2;
 
 /// What says that a folder is one of ours.
 pub(crate) const FORMAT: &str = "papsynth-dataset";
@@ -91,6 +97,9 @@ pub struct FrameSummary {
     pub truncated: u64,
     /// The largest number of cytoplasms that lie over each other.
     pub most_layers: u16,
+    /// Pixels of the complete masks of each group that are not shown where there is room for one object a pixel
+    /// ([`Layout::flatten`]).
+    pub lost_px: BTreeMap<String, u64>,
 }
 
 /// What must be known of a frame before its first plane is written.
@@ -116,8 +125,25 @@ impl Geometry {
         }
     }
 
+    /// That of a frame of a data set of this seed.
+    pub(crate) fn of_summary(frame: &FrameSummary, seed: u64) -> Self {
+        Self {
+            key: Key { seed, index: frame.index },
+            view: View { width: frame.width, height: frame.height, pixel_um: frame.pixel_um },
+            planes_um: frame.planes_um.clone(),
+            bits: frame.bits,
+            channels: frame.channels,
+            slide: frame.slide,
+        }
+    }
+
     pub(crate) fn pixels(&self) -> usize {
         self.view.width * self.view.height
+    }
+
+    /// What does not fit of what was handed over.
+    pub(crate) fn wrong(&self, message: String) -> Error {
+        Error::Frame { index: self.key.index, message }
     }
 
     /// Numbers of a plane: channels of pixels.
@@ -126,32 +152,56 @@ impl Geometry {
     }
 }
 
-/// Says that a frame is whole: written after all its files.
+/// Says that a shard is whole: written after all its files.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FrameRecord {
+pub struct ShardRecord {
     /// Version of the layout.
     pub version: u32,
     /// What wrote the files.
     pub writer: String,
-    /// What the frame was made from.
+    /// What the frames were made from.
     pub identity: Identity,
-    /// The frame in a few numbers.
-    pub summary: FrameSummary,
-    /// Its files.
+    /// How they lie in files.
+    pub layout: Layout,
+    /// Number of the shard.
+    pub shard: u64,
+    /// Its frames in a few numbers each, by index.
+    pub frames: Vec<FrameSummary>,
+    /// Its files, by path.
     pub files: Vec<FileRecord>,
+    /// SHA-256 of the record as compact JSON in which this is empty: a bit that turns over does not go unnoticed.
+    pub sha256: String,
 }
 
-impl FrameRecord {
+impl ShardRecord {
     /// Parses a record.
     ///
     /// # Errors
-    /// If it is none, is of another version, or names a file outside the data set.
+    /// If it is none, is of another version, was changed after it was written, or names a file outside the data set.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let record: Self = serde_json::from_slice(bytes).map_err(broken)?;
         version(record.version)?;
         inside(&record.files)?;
+        if record.sealed().sha256 != record.sha256 {
+            return Err(json("is not as it was written: its own SHA-256 is another".to_owned()));
+        }
         Ok(record)
+    }
+
+    /// The record with its own hash.
+    pub(crate) fn sealed(&self) -> Self {
+        let open = Self { sha256: String::new(), ..self.clone() };
+        // A number that has no JSON is in no record that was written.
+        let text = serde_json::to_vec(&open).unwrap_or_default();
+        Self { sha256: sha256(&text), ..open }
+    }
+
+    /// Whether it has all frames with an index in a range.
+    #[must_use]
+    pub fn covers(&self, frames: &Range<u64>) -> bool {
+        let has = |index| self.frames.binary_search_by_key(&index, |frame| frame.index).is_ok();
+        frames.clone().all(has)
     }
 }
 
@@ -165,16 +215,22 @@ fn inside(files: &[FileRecord]) -> Result<(), Problem> {
     }
 }
 
-/// The head of `manifest.json`, and of its list of files those of the whole data set; those of frames are in their records.
+/// The head of `manifest.json`, and of its list of files those of the whole data set; those of shards are in their records.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Manifest {
     /// What wrote it.
     pub writer: String,
     /// What the data set is made from.
     pub identity: Identity,
+    /// How it lies in files.
+    pub layout: Layout,
+    /// What there may be in its images.
+    pub categories: Vec<Category>,
     /// Number of frames when it was written; the files of later ones are not in it.
     pub frames: u64,
-    /// The files that are no frame's.
+    /// Number of shards that they lie in.
+    pub shards: u64,
+    /// The files that are no shard's.
     pub files: Vec<FileRecord>,
 }
 
@@ -186,13 +242,17 @@ struct RawManifest {
     version: u32,
     writer: String,
     identity: Identity,
+    layout: Layout,
     frames: u64,
-    #[serde(deserialize_with = "at_the_top")]
+    shards: u64,
+    categories: Vec<Category>,
+    head_sha256: String,
+    #[serde(deserialize_with = "of_no_shard")]
     files: Vec<FileRecord>,
 }
 
-/// Of a list of files, which may be longer than memory, those that lie in no folder.
-fn at_the_top<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRecord>, D::Error> {
+/// Of a list of files, which may be longer than memory, those that belong to no shard: they come first, before the first record.
+fn of_no_shard<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRecord>, D::Error> {
     struct Top;
 
     impl<'de> Visitor<'de> for Top {
@@ -204,9 +264,9 @@ fn at_the_top<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileReco
 
         fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
             let mut found = Vec::new();
-            while let Some(file) = list.next_element::<FileRecord>()? {
-                if !file.path.contains('/') {
-                    found.push(file);
+            while let Some(entry) = list.next_element::<Entry>()? {
+                if entry.shard.is_none() {
+                    found.push(FileRecord { path: entry.path, bytes: entry.bytes, sha256: entry.sha256 });
                 }
             }
             Ok(found)
@@ -216,6 +276,18 @@ fn at_the_top<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileReco
     deserializer.deserialize_seq(Top)
 }
 
+/// A file as the manifest lists it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Entry {
+    pub(crate) path: String,
+    pub(crate) bytes: u64,
+    pub(crate) sha256: String,
+    /// The shard it is of, if it is of one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub(crate) shard: Option<u64>,
+}
+
 /// The head of the file, as it is written.
 #[derive(Serialize)]
 pub(crate) struct ManifestHead<'a> {
@@ -223,7 +295,20 @@ pub(crate) struct ManifestHead<'a> {
     pub(crate) version: u32,
     pub(crate) writer: &'a str,
     pub(crate) identity: &'a Identity,
+    pub(crate) layout: &'a Layout,
     pub(crate) frames: u64,
+    pub(crate) shards: u64,
+    pub(crate) categories: &'a [Category],
+    /// SHA-256 of the head as compact JSON in which this is empty.
+    pub(crate) head_sha256: String,
+}
+
+impl ManifestHead<'_> {
+    pub(crate) fn sealed(self) -> Self {
+        let open = Self { head_sha256: String::new(), ..self };
+        let text = serde_json::to_vec(&open).unwrap_or_default();
+        Self { head_sha256: sha256(&text), ..open }
+    }
 }
 
 impl Manifest {
@@ -235,6 +320,19 @@ impl Manifest {
         Self::from_reader(bytes)
     }
 
+    /// The manifest in a folder.
+    pub(crate) fn read(folder: &Folder) -> Result<Self, Error> {
+        let path = folder.path(layout::MANIFEST);
+        let file = File::open(&path).map_err(|e| match e.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::Folder {
+                path: folder.root().to_owned(),
+                message: "holds no data set: there is no manifest.json".to_owned(),
+            },
+            _ => Error::io("read", &path)(e),
+        })?;
+        Self::from_reader(BufReader::new(file)).map_err(Error::input(&path))
+    }
+
     pub(crate) fn from_reader(reader: impl std::io::Read) -> Result<Self, Problem> {
         let raw: RawManifest = serde_json::from_reader(reader).map_err(broken)?;
         if raw.format != FORMAT {
@@ -242,7 +340,29 @@ impl Manifest {
         }
         version(raw.version)?;
         inside(&raw.files)?;
-        Ok(Self { writer: raw.writer, identity: raw.identity, frames: raw.frames, files: raw.files })
+        let head = ManifestHead {
+            format: &raw.format,
+            version: raw.version,
+            writer: &raw.writer,
+            identity: &raw.identity,
+            layout: &raw.layout,
+            frames: raw.frames,
+            shards: raw.shards,
+            categories: &raw.categories,
+            head_sha256: String::new(),
+        };
+        if head.sealed().head_sha256 != raw.head_sha256 {
+            return Err(json("is not as it was written: the SHA-256 of its head is another".to_owned()));
+        }
+        Ok(Self {
+            writer: raw.writer,
+            identity: raw.identity,
+            layout: raw.layout,
+            frames: raw.frames,
+            shards: raw.shards,
+            categories: raw.categories,
+            files: raw.files,
+        })
     }
 }
 

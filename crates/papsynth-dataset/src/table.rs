@@ -44,10 +44,12 @@ const COLUMNS: [Column; 28] = [
     ("detectability", |e| list(&e.object.detectability)),
 ];
 
-/// The table of one frame, with a header even if it has no object.
-pub(crate) fn table(truth: &Truth, image: u64) -> Result<Vec<u8>, csv::Error> {
+/// The rows of one frame, if wanted below a header, which stands even if there is no object.
+pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS.map(|(name, _)| name))?;
+    if header {
+        writer.write_record(COLUMNS.map(|(name, _)| name))?;
+    }
     for object in &truth.objects {
         let entry = Entry { image, object };
         writer.write_record(COLUMNS.map(|(_, print)| print(&entry)))?;

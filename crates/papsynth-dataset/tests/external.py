@@ -9,6 +9,7 @@ ends with status 1 at the first that fails.
 import csv
 import hashlib
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -45,13 +46,22 @@ def read_json(path):
     return json.loads(path.read_text())
 
 
+def own_sha256(text, key):
+    """SHA-256 of a JSON document without white space in which the value of `key`, its own SHA-256, is empty."""
+    compact = re.sub(r'("(?:[^"\\]|\\.)*")|\s+', lambda match: match[1] or "", text)
+    return hashlib.sha256(re.sub(rf'"{key}":"[0-9a-f]*"}}$', f'"{key}":""}}', compact).encode()).hexdigest()
+
+
 def check_manifest(folder):
-    """Every file is listed, and is as listed."""
-    manifest = read_json(folder / "manifest.json")
+    """Every file is listed, and is as listed; returns manifest and records."""
+    text = (folder / "manifest.json").read_text()
+    manifest = json.loads(text)
     equal("manifest format", manifest["format"], "papsynth-dataset")
+    head = text.partition(',"files":[')[0] + "}"
+    equal("SHA-256 of the manifest's head", own_sha256(head, "head_sha256"), manifest["head_sha256"])
     listed = {entry["path"]: entry for entry in manifest["files"]}
     equal("number of listed files", len(listed), len(manifest["files"]))
-    found = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()} - {"manifest.json"}
+    found = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()} - {"manifest.json"}
     equal("files that are not listed", sorted(found - listed.keys()), [])
     equal("listed files that are missing", sorted(listed.keys() - found), [])
     for name, entry in listed.items():
@@ -61,8 +71,27 @@ def check_manifest(folder):
     for name in ["recipe", "model"]:
         path = {"recipe": "recipe.toml", "model": "model.json"}[name]
         equal(f"identity of {path}", manifest["identity"][f"{name}_sha256"], listed[path]["sha256"])
+    records = []
+    for path in sorted((folder / "shards").glob("*.json")):
+        if path.name.endswith(".coco.json"):
+            continue
+        record = read_json(path)
+        number = record["shard"]
+        equal(f"number of {path}", f"{number:06}.json", path.name)
+        equal(f"SHA-256 in {path}", own_sha256(path.read_text(), "sha256"), record["sha256"])
+        for key in ["identity", "layout"]:
+            equal(f"{key} in {path}", record[key], manifest[key])
+        own = [entry for entry in listed.values() if entry.get("shard") == number]
+        own = [{k: v for k, v in e.items() if k != "shard"} for e in own if e["path"] != f"shards/{path.name}"]
+        equal(f"files of shard {number}", own, record["files"])
+        records.append(record)
+    equal("number of shards", len(records), manifest["shards"])
+    equal("number of frames", sum(len(record["frames"]) for record in records), manifest["frames"])
+    shared = {name for name, entry in listed.items() if "shard" not in entry}
+    for name in ["README.md", "croissant.json", "splits.csv", "contact-sheet.png", "recipe.toml", "model.json"]:
+        check(name in shared, f"{name} is not among the files of the whole data set")
     passed(f"manifest: {len(listed)} files of the right size and SHA-256, none beside them")
-    return manifest
+    return manifest, records
 
 
 def check_stack(path, frame):
@@ -139,7 +168,7 @@ def check_objects(coco, rows, frame, labels):
     counts = {}
     for annotation, row in zip(annotations, rows):
         name = f"object {row['id']} ({row['part']}) of frame {index}"
-        equal(f"id of {name}", annotation["cell_id"], int(row["id"]))
+        equal(f"id of {name}", annotation["object_id"], int(row["id"]))
         equal(f"part of {name}", annotation["part"], row["part"])
         category = coco.cats[annotation["category_id"]]
         counts[category["name"]] = counts.get(category["name"], 0) + 1
@@ -165,7 +194,7 @@ def check_objects(coco, rows, frame, labels):
         equal(f"best_plane of {name}", int(row["best_plane"]), int(np.argmax(values)))
         group = GROUPS[row["part"]]
         check(not drawn[group][front > 0].any(), f"front of {name} overlaps another of its group")
-        drawn[group][front > 0] = annotation["cell_id"]
+        drawn[group][front > 0] = annotation["object_id"]
         if row["part"] == "cytoplasm":
             layers += whole
     for kind, picture in drawn.items():
@@ -175,20 +204,16 @@ def check_objects(coco, rows, frame, labels):
 
 
 def main(folder):
-    manifest = check_manifest(folder)
+    manifest, records = check_manifest(folder)
     coco = COCO(folder / "coco.json")
     check(all(i > 0 for i in coco.anns), "annotation ids begin at 1")
+    equal("categories of coco.json", list(coco.cats.values()), manifest["categories"])
     passed(f"coco.json: pycocotools reads {len(coco.imgs)} images and {len(coco.anns)} annotations")
     with open(folder / "objects.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     equal("rows of objects.csv", len(rows), len(coco.anns))
-    records = sorted(p for p in (folder / "frames").glob("*.json") if not p.name.endswith(".coco.json"))
-    equal("number of frames", len(records), manifest["frames"])
     equal("number of images", len(coco.imgs), manifest["frames"])
-    for path in records:
-        record = read_json(path)
-        equal(f"identity in {path}", record["identity"], manifest["identity"])
-        frame = record["summary"]
+    for frame in (frame for record in records for frame in record["frames"]):
         image = coco.imgs[frame["index"]]
         saturated = [int(rle.area(mask)) for mask in image.get("saturated", [])]
         equal(f"saturated pixels of frame {frame['index']}", saturated or [0] * len(frame["planes_um"]), frame["saturated"])

@@ -6,7 +6,7 @@ mod support;
 
 use papsynth::model::Model;
 use papsynth_dataset::read::{GreyImage, Limits, label_map, outlines};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameRecord, Manifest, inspect};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Manifest, ShardRecord, inspect};
 use proptest::prelude::*;
 use std::fs;
 use std::sync::LazyLock;
@@ -15,12 +15,15 @@ use support::{SEED, Scratch, contents, frame, recipe};
 /// A data set of one small stack and one small image, as good seeds of bad files.
 static FILES: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
     let scratch = Scratch::new("hostile");
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
+    let info =
+        DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     for frame in [frame(0, 1, 8, 1), frame(1, 2, 12, 70_000)] {
-        let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
+        let mut writer = dataset.shard_writer(frame.finished.scene.key.index).unwrap();
+        writer.begin(&frame.finished.scene).unwrap();
         frame.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
-        writer.finish(&frame.finished).unwrap();
+        writer.end(&frame.finished).unwrap();
+        writer.commit().unwrap();
     }
     dataset.finish().unwrap();
     contents(scratch.path())
@@ -32,7 +35,7 @@ fn parse(bytes: &[u8]) {
     let _ = GreyImage::decode(bytes, &limits);
     let _ = label_map(bytes, &limits);
     let _ = outlines(bytes);
-    let _ = FrameRecord::from_json(bytes);
+    let _ = ShardRecord::from_json(bytes);
     let _ = Manifest::from_json(bytes);
 }
 
@@ -64,16 +67,16 @@ proptest! {
 
 #[test]
 fn records_that_point_outside_the_folder_are_refused() {
-    let (_, record) = FILES.iter().find(|(name, _)| name == "frames/000000.json").unwrap();
+    let (_, record) = FILES.iter().find(|(name, _)| name == "shards/000000.json").unwrap();
     let text = String::from_utf8(record.clone()).unwrap();
-    assert!(FrameRecord::from_json(text.as_bytes()).is_ok());
+    assert!(ShardRecord::from_json(text.as_bytes()).is_ok());
     for path in ["../secret", "/etc/passwd", "images/../../x", "", "./x/.."] {
         let bad = text.replace("images/000000.png", path);
-        let problem = FrameRecord::from_json(bad.as_bytes()).unwrap_err().to_string();
+        let problem = ShardRecord::from_json(bad.as_bytes()).unwrap_err().to_string();
         assert!(problem.contains("outside"), "{path}: {problem}");
     }
-    let newer = text.replacen("\"version\": 1", "\"version\": 2", 1);
-    assert!(FrameRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version is 2"));
+    let newer = text.replacen("\"version\": 2", "\"version\": 3", 1);
+    assert!(ShardRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version is 3"));
 }
 
 #[test]
@@ -84,11 +87,12 @@ fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
+    let info =
+        DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     assert_eq!(inspect(scratch.path(), Check::Hashes).unwrap().frames, 2);
     // A change of content that leaves the size alone is found by its hash; merging says which file is wrong.
-    let coco = scratch.join("frames/000000.coco.json");
+    let coco = scratch.join("shards/000000.coco.json");
     let mut bytes = fs::read(&coco).unwrap();
     bytes[0] = b'[';
     fs::write(&coco, &bytes).unwrap();

@@ -12,11 +12,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Engine, Inputs, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Outcome, Progress, Run, inspect};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Outcome, Progress, Run, Share, inspect, verify};
 use support::{SEED, Scratch, contents, frame, recipe};
 
 fn open_with(path: &Path, recipe: &Recipe, model: &Model, seed: u64) -> Result<Dataset, Error> {
-    Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed, map: None })
+    Dataset::create_or_resume(path, &DatasetInfo { recipe, model, seed, map: None, layout: &Layout::default() })
 }
 
 fn open(path: &Path) -> Result<Dataset, Error> {
@@ -25,9 +25,11 @@ fn open(path: &Path) -> Result<Dataset, Error> {
 
 fn write(dataset: &Dataset, index: u64) {
     let frame = frame(index, 1, 8, 1);
-    let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
+    let mut writer = dataset.shard_writer(frame.finished.scene.key.index).unwrap();
+    writer.begin(&frame.finished.scene).unwrap();
     writer.write_plane(&frame.planes[0]).unwrap();
-    writer.finish(&frame.finished).unwrap();
+    writer.end(&frame.finished).unwrap();
+    writer.commit().unwrap();
 }
 
 fn refused(result: Result<Dataset, Error>, what: &str) {
@@ -72,13 +74,13 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
     let mut count = 0;
     for (name, bytes) in of_frame {
         let path = scratch.join(name);
-        let whole = |check| dataset.is_whole(0, check).unwrap();
+        let whole = |check| dataset.whole(0, check).unwrap().is_some();
         assert!(whole(Check::Hashes));
         fs::remove_file(&path).unwrap();
         assert!(!whole(Check::Sizes), "{name} lost");
         fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
         assert!(!whole(Check::Sizes), "{name} cut");
-        if !name.ends_with("frames/000000.json") {
+        if !name.ends_with("shards/000000.json") {
             let mut changed = bytes.clone();
             changed[bytes.len() / 2] ^= 1;
             fs::write(&path, &changed).unwrap();
@@ -148,11 +150,13 @@ fn a_disk_that_refuses_is_an_error_of_input_and_output() {
     // A file where a folder is needed refuses everybody, also those who may do everything.
     fs::write(scratch.join("labels"), "in the way").unwrap();
     let frame = frame(0, 1, 8, 1);
-    let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
+    let mut writer = dataset.shard_writer(0).unwrap();
+    writer.begin(&frame.finished.scene).unwrap();
     writer.write_plane(&frame.planes[0]).unwrap();
-    let error = writer.finish(&frame.finished).unwrap_err();
+    let error = writer.end(&frame.finished).unwrap_err();
+    drop(writer);
     assert!(error.is_io() && error.to_string().contains("labels/cytoplasm/000000.tif"), "{error}");
-    assert!(!dataset.is_whole(0, Check::Sizes).unwrap());
+    assert!(dataset.whole(0, Check::Sizes).unwrap().is_none());
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }
 
@@ -176,7 +180,15 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     let stop = AtomicBool::new(false);
     let run = |dataset: &Dataset, frames, at_once| {
         let seen = Mutex::new(Vec::new());
-        let run = Run { frames, at_once, threads: Threads::One, check: Check::Sizes, stop: &stop, profile: None };
+        let run = Run {
+            frames,
+            share: Share::ALL,
+            at_once,
+            threads: Threads::One,
+            check: Check::Sizes,
+            stop: &stop,
+            profile: None,
+        };
         let outcome = dataset.generate(&engine, &run, &|progress| {
             seen.lock().unwrap().push(match progress {
                 Progress::Kept(index) => (index, false),
@@ -207,6 +219,7 @@ fn runs_give_the_same_bytes_however_they_are_split() {
     let stranger = open(other.path()).unwrap();
     let run = Run {
         frames: 0..1,
+        share: Share::ALL,
         at_once: 1,
         threads: Threads::One,
         check: Check::Sizes,
@@ -222,21 +235,28 @@ fn damage_that_keeps_the_size_is_found_and_mended() {
     let (recipe, engine) = small();
     let dataset = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
     let stop = AtomicBool::new(false);
-    let run = |check| Run { frames: 0..2, at_once: 1, threads: Threads::One, check, stop: &stop, profile: None };
+    let run = |check| Run {
+        frames: 0..2,
+        share: Share::ALL,
+        at_once: 1,
+        threads: Threads::One,
+        check,
+        stop: &stop,
+        profile: None,
+    };
     assert!(!dataset.is_finished().unwrap());
     dataset.generate(&engine, &run(Check::Sizes), &|_| ()).unwrap();
     assert!(!dataset.is_finished().unwrap());
     dataset.finish().unwrap();
     assert!(dataset.is_finished().unwrap());
     let good = contents(scratch.path());
-    for (name, _) in good.iter().filter(|(name, _)| name != "manifest.json" && !name.starts_with("frames/")) {
+    for (name, _) in &good {
         let path = scratch.join(name);
         let mut bytes = fs::read(&path).unwrap();
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         fs::write(&path, bytes).unwrap();
-        let overview = inspect(scratch.path(), Check::Hashes).unwrap();
-        assert_eq!(overview.flaws.len() + overview.defects.len(), 1, "{name}: {overview:?}");
+        assert!(verify(scratch.path(), None).unwrap().findings.iter().any(|f| f.path == *name), "{name}");
         let again = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
         let made = again.generate(&engine, &run(Check::Hashes), &|_| ()).unwrap().made;
         assert_eq!(made, u64::from(name.contains('/')), "{name}");

@@ -12,23 +12,27 @@ use papsynth::Frame;
 use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth_dataset::read::{GreyImage, Limits, read_label_map};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameRecord, FrameSummary, Picture, rle};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, Picture, ShardRecord, rle};
 use serde_json::Value;
 use support::{HEIGHT, SEED, Scratch, WIDTH, colour_frame, contents, frame, recipe};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 
 fn open(scratch: &Scratch) -> Dataset {
-    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None };
+    let info =
+        DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
     Dataset::create_or_resume(scratch.path(), &info).unwrap()
 }
 
 fn write(dataset: &Dataset, frame: &Frame) -> FrameSummary {
-    let mut writer = dataset.frame_writer(&frame.finished.scene).unwrap();
+    let mut writer = dataset.shard_writer(frame.finished.scene.key.index).unwrap();
+    writer.begin(&frame.finished.scene).unwrap();
     for plane in &frame.planes {
         writer.write_plane(plane).unwrap();
     }
-    writer.finish(&frame.finished).unwrap()
+    let summary = writer.end(&frame.finished).unwrap().clone();
+    writer.commit().unwrap();
+    summary
 }
 
 fn pages(scratch: &Scratch, name: &str) -> (Vec<DecodingResult>, Option<String>) {
@@ -76,8 +80,8 @@ fn a_single_plane_reads_back_in_8_and_in_12_bits() {
         check_labels(&scratch, &frame);
         assert_eq!((summary.most_layers, summary.truncated, summary.saturated), (2, 1, vec![0]));
         assert_eq!(summary.objects.values().sum::<u64>(), 6);
-        assert!(dataset.is_whole(3, Check::Hashes).unwrap());
-        let record = FrameRecord::from_json(&fs::read(scratch.join("frames/000003.json")).unwrap()).unwrap();
+        assert!(dataset.whole(3, Check::Hashes).unwrap().is_some());
+        let record = ShardRecord::from_json(&fs::read(scratch.join("shards/000003.json")).unwrap()).unwrap();
         assert_eq!(&record.identity, dataset.identity());
     }
 }
@@ -189,7 +193,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
     assert_eq!(annotations.len(), objects.len());
     for (i, (annotation, object)) in annotations.iter().zip(&objects).enumerate() {
         assert_eq!(annotation["id"], i + 1);
-        assert_eq!(annotation["cell_id"], object.id);
+        assert_eq!(annotation["object_id"], object.id);
         assert_eq!(annotation["area"], object.amodal.area());
         let mask = |name: &str| {
             let rle = &annotation[name];
@@ -309,7 +313,11 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     let refused = |error: papsynth_dataset::Error, what: &str| {
         assert!(!error.is_io() && error.to_string().contains(what), "{error}");
     };
-    let begin = || dataset.frame_writer(&good.finished.scene).unwrap();
+    let begin = || {
+        let mut writer = dataset.shard_writer(0).unwrap();
+        writer.begin(&good.finished.scene).unwrap();
+        writer
+    };
     let both = || {
         let mut writer = begin();
         good.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
@@ -317,8 +325,8 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     };
     refused(begin().write_plane(&good.planes[1]).unwrap_err(), "plane 1 came where plane 0 of 2 was due");
     refused(both().write_plane(&good.planes[1]).unwrap_err(), "plane 1 came where plane 2 of 2 was due");
-    refused(begin().finish(&good.finished).unwrap_err(), "0 of 2 planes");
-    refused(both().finish(&frame(1, 2, 8, 1).finished).unwrap_err(), "another scene");
+    refused(begin().end(&good.finished).unwrap_err(), "0 of 2 planes");
+    refused(both().end(&frame(1, 2, 8, 1).finished).unwrap_err(), "another scene");
     let mut plane = good.planes[0].clone();
     plane.grey[7] = 256;
     refused(begin().write_plane(&plane).unwrap_err(), "256 does not fit into 8 bits");
@@ -326,17 +334,19 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     refused(begin().write_plane(&plane).unwrap_err(), "3499 grey levels");
     let mut finished = good.finished.clone();
     finished.truth.objects[0].class = "unheard of".to_owned();
-    refused(both().finish(&finished).unwrap_err(), "unheard of cytoplasm");
+    refused(both().end(&finished).unwrap_err(), "unheard of cytoplasm");
     let mut finished = good.finished.clone();
     finished.truth.width += 1;
-    refused(both().finish(&finished).unwrap_err(), "the truth is that of 71 x 50 pixels");
+    refused(both().end(&finished).unwrap_err(), "the truth is that of 71 x 50 pixels");
     let mut scene = good.finished.scene.clone();
     scene.key.seed += 1;
-    refused(dataset.frame_writer(&scene).err().unwrap(), "seed");
+    refused(dataset.shard_writer(0).unwrap().begin(&scene).unwrap_err(), "seed");
     scene = good.finished.scene.clone();
     scene.planes_um.clear();
-    refused(dataset.frame_writer(&scene).err().unwrap(), "0 planes");
-    assert!(!dataset.is_whole(0, Check::Sizes).unwrap());
+    refused(dataset.shard_writer(0).unwrap().begin(&scene).unwrap_err(), "0 planes");
+    refused(dataset.shard_writer(1).unwrap().begin(&good.finished.scene).unwrap_err(), "shard 1 has the frames 1 to 1");
+    refused(begin().commit().unwrap_err(), "is not finished");
+    assert!(dataset.whole(0, Check::Sizes).unwrap().is_none());
     assert_eq!(dataset.finish().unwrap().frames, 0);
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }

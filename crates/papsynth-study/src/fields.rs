@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use papsynth_dataset::read::{Limits, image_files, natural_order};
-use papsynth_dataset::{FrameRecord, FrameSummary, Problem};
+use papsynth_dataset::{FrameSummary, Problem, ShardRecord};
 
 use crate::error::Error;
 
@@ -116,7 +116,7 @@ impl Root {
 
     /// The whole frames of one data set.
     fn add_frames(&self, root: &Path, prefix: &str, fields: &mut Vec<Field>) -> Result<(), Error> {
-        let folder = root.join("frames");
+        let folder = root.join("shards");
         let mut records = Vec::new();
         for entry in fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
             let path = entry.map_err(Error::io("read", &folder))?.path();
@@ -129,17 +129,20 @@ impl Root {
         records.sort_by(|(a, _), (b, _)| natural_order(a, b));
         let recipe = Arc::new(recipe(&self.text(&root.join("recipe.toml"))?));
         for (_, path) in records {
-            let record = FrameRecord::from_json(self.text(&path)?.as_bytes())
+            let record = ShardRecord::from_json(self.text(&path)?.as_bytes())
                 .map_err(|problem| papsynth_dataset::Error::Input { path: path.clone(), problem })?;
             // The record has looked that its paths stay below the data set; links are looked at here.
-            let Some(image) = record.files.iter().find(|file| file.path.starts_with("images/")) else {
-                return Err(Error::folder(&path, "names no image"));
-            };
-            fields.push(Field {
-                name: format!("{prefix}{}", image.path),
-                path: self.inside(&root.join(&image.path))?,
-                frame: Some(Frame { root: root.to_owned(), summary: record.summary, recipe: Arc::clone(&recipe) }),
-            });
+            for summary in record.frames {
+                let stem = format!("images/{:06}.", summary.index);
+                let Some(image) = record.files.iter().find(|file| file.path.starts_with(&stem)) else {
+                    return Err(Error::folder(&path, "names no image in the folder `images`"));
+                };
+                fields.push(Field {
+                    name: format!("{prefix}{}", image.path),
+                    path: self.inside(&root.join(&image.path))?,
+                    frame: Some(Frame { root: root.to_owned(), summary, recipe: Arc::clone(&recipe) }),
+                });
+            }
         }
         Ok(())
     }
@@ -227,11 +230,11 @@ mod tests {
         error(scratch.path());
         fs::write(scratch.join("file"), "").unwrap();
         assert!(error(&scratch.join("file")).to_string().contains("a folder of pictures"));
-        fs::create_dir_all(scratch.join("set/frames")).unwrap();
+        fs::create_dir_all(scratch.join("set/shards")).unwrap();
         fs::write(scratch.join("set/manifest.json"), "{}").unwrap();
         fs::write(scratch.join("set/recipe.toml"), "").unwrap();
         assert!(error(&scratch.join("set")).to_string().contains("no whole frame"));
-        fs::write(scratch.join("set/frames/000000.json"), "[1, 2").unwrap();
+        fs::write(scratch.join("set/shards/000000.json"), "[1, 2").unwrap();
         assert!(error(&scratch.join("set")).to_string().contains("000000.json"));
     }
 

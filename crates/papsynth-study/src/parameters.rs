@@ -142,6 +142,7 @@ mod tests {
                 objects: BTreeMap::new(),
                 truncated: 0,
                 most_layers: 3,
+                lost_px: BTreeMap::new(),
             },
             recipe: Arc::new(recipe.into_iter().collect()),
         }

@@ -126,7 +126,7 @@ impl Detector {
     pub(crate) fn electrons(&self, channel: usize, light: &mut [f32]) {
         let Channel { full_scale_e, glare, .. } = self.channels[channel];
         let (scale, glare) = ((full_scale_e * (1.0 - glare)) as f32, (full_scale_e * glare) as f32);
-        light.iter_mut().for_each(|v| *v = *v * scale + glare);
+        scaled(light, scale, glare);
     }
 
     /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
@@ -300,6 +300,11 @@ fn interleave<T: Copy>(channels: &[Vec<T>], out: &mut [T]) {
             *out = *value;
         }
     }
+}
+
+#[multiversion(targets = "simd")]
+fn scaled(values: &mut [f32], scale: f32, offset: f32) {
+    values.iter_mut().for_each(|value| *value = *value * scale + offset);
 }
 
 /// Sum of the pixels of these runs, as far as they lie in a tile of rows of `width` whose upper left pixel is pixel

@@ -257,8 +257,7 @@ fn masks(scene: &Scene, phantoms: &[Phantom], threads: Threads) -> (Vec<Vec<Mask
     let (view, n) = (scene.view, scene.oversampling());
     let both = threads::map(threads, phantoms, |phantom| {
         let mask = |piece: &phantom::Piece| {
-            let coarse = (n > 1).then(|| piece.coverage.coarsened(n));
-            let cover = coarse.as_ref().unwrap_or(&piece.coverage);
+            let cover = piece.cover_of_pixels(n);
             let inside = |share: f32| share >= COVERED;
             let mask = Mask::from_tile(&cover.values, cover.width, cover.origin, view.width, view.height, inside);
             (mask, cover.values.iter().filter(|share| inside(**share)).count() as u64)
@@ -312,8 +311,7 @@ impl<'a> Exposure<'a> {
             sums.add(electrons, width, first);
         }
         if let (true, Some(feathered)) = (late, &rendering.feathered) {
-            let clean = rendering.clean(sharp, noise_free, self.developing);
-            restore_finished(feathered, first * width, channels, &clean, grey, noise_free);
+            rendering.restore_finished(feathered, first * width, sharp, grey, noise_free, self.developing);
         }
     }
 
@@ -333,17 +331,41 @@ impl<'a> Exposure<'a> {
 }
 
 impl Rendering {
-    /// Rows as a camera without noise shows restored nuclei.
-    fn clean(&self, sharp: &[f32], noise_free: &[f32], developing: &mut Developing) -> Vec<f32> {
-        if sharp.is_empty() {
-            // They were restored on their way here.
-            return noise_free.to_vec();
+    /// Eq. 15 on finished grey levels of rows that start at pixel `first`: restored nuclei carry no noise of this camera.
+    fn restore_finished(
+        &self,
+        feathered: &Feathered,
+        first: usize,
+        sharp: &[f32],
+        grey: &mut [u16],
+        noise_free: &mut [f32],
+        developing: &mut Developing,
+    ) {
+        let channels = self.scene.channels();
+        let (mut electrons, mut clean) = (Vec::new(), Vec::new());
+        for (span, shares) in feathered.within(first, grey.len() / channels) {
+            let levels = span.start * channels..span.end * channels;
+            // As a camera without noise shows them.
+            clean.resize(levels.len(), 0.0);
+            if sharp.is_empty() {
+                // They were restored on their way here.
+                clean.copy_from_slice(&noise_free[levels.clone()]);
+            } else {
+                electrons.clear();
+                electrons.extend_from_slice(&sharp[span]);
+                self.detector.electrons(0, &mut electrons);
+                self.detector.mean_dn_into(&[&mut electrons], &mut clean, developing);
+            }
+            let shares = shares.iter().flat_map(|share| core::iter::repeat_n(*share, channels));
+            let seen = grey[levels.clone()].iter_mut().zip(&mut noise_free[levels]);
+            for (((grey, noise_free), clean), share) in seen.zip(&clean).zip(shares) {
+                let blend = |seen: f32| seen + share * (clean - seen);
+                *noise_free = blend(*noise_free);
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
+                let restored = (blend(f32::from(*grey)) + 0.5) as u16;
+                *grey = restored;
+            }
         }
-        let mut electrons = sharp.to_vec();
-        self.detector.electrons(0, &mut electrons);
-        let mut clean = vec![0.0; sharp.len()];
-        self.detector.mean_dn_into(&[&mut electrons], &mut clean, developing);
-        clean
     }
 }
 
@@ -371,27 +393,5 @@ impl<'a> MaskSums<'a> {
 
     fn sums(&self) -> Vec<f64> {
         self.masks.iter().map(|(_, sum)| *sum).collect()
-    }
-}
-
-/// Eq. 15 on finished grey levels of rows that start at pixel `first`: restored nuclei carry no noise of this camera.
-fn restore_finished(
-    feathered: &Feathered,
-    first: usize,
-    channels: usize,
-    clean: &[f32],
-    grey: &mut [u16],
-    noise_free: &mut [f32],
-) {
-    for (span, shares) in feathered.within(first, clean.len() / channels) {
-        for (pixel, share) in span.zip(shares) {
-            for at in pixel * channels..(pixel + 1) * channels {
-                let blend = |seen: f32| seen + share * (clean[at] - seen);
-                noise_free[at] = blend(noise_free[at]);
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between two grey levels")]
-                let restored = (blend(f32::from(grey[at])) + 0.5) as u16;
-                grey[at] = restored;
-            }
-        }
     }
 }

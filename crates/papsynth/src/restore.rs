@@ -30,9 +30,7 @@ impl Feathered {
             return Ok(None);
         }
         let pieces = phantoms.iter().flat_map(|p| &p.pieces).filter(|piece| piece.imaged);
-        let imaged: Vec<Cow<'_, Tile>> = pieces
-            .map(|piece| if n == 1 { Cow::Borrowed(&piece.coverage) } else { Cow::Owned(piece.coverage.coarsened(n)) })
-            .collect();
+        let imaged: Vec<Cow<'_, Tile>> = pieces.map(|piece| piece.cover_of_pixels(n)).collect();
         if imaged.is_empty() {
             return Ok(None);
         }

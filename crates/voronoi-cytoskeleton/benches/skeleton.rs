@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::hint::black_box;
-use voronoi_cytoskeleton::{Diagram, LineParams, Point, Skeleton, SkeletonParams, Window, draw_into};
+use voronoi_cytoskeleton::{Diagram, LineParams, Point, Skeleton, SkeletonParams, Torus, Window, draw_into};
 
 const SIDE: usize = 200;
 const SEED: u64 = 7;
@@ -42,6 +42,11 @@ fn bench(c: &mut Criterion) {
     });
     group.bench_function("skeleton, grown", |b| {
         b.iter(|| skeleton.grow(black_box(&outline), &mut rng()).unwrap());
+    });
+    let torus = Torus::new(4 * params.sites, params.lloyd_passes, &mut rng()).unwrap();
+    group.bench_function("skeleton, grown from a torus", |b| {
+        let mut rng = rng();
+        b.iter(|| skeleton.grow_from(&torus, black_box(&outline), &mut rng).unwrap());
     });
     group.bench_function("diagram", |b| {
         b.iter(|| Diagram::new(black_box(diagram.sites()), &window).unwrap());

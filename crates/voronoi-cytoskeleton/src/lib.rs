@@ -9,6 +9,7 @@ mod lloyd;
 mod outline;
 mod river;
 mod skeleton;
+mod torus;
 mod window;
 
 pub use diagram::{Diagram, Edge};
@@ -18,4 +19,5 @@ pub use geometry::Point;
 pub use rand_core::Rng;
 pub use river::{Mouth, River};
 pub use skeleton::{Skeleton, SkeletonParams};
+pub use torus::Torus;
 pub use window::Window;

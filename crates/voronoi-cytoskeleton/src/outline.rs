@@ -3,18 +3,33 @@ use crate::geometry::{Moments, Point, dot, length, sub};
 
 /// A closed polygon, ready for distances: the paper's "radial distance transform … from the edge".
 ///
-/// Its segments stand in blocks, each with the circle and the band of y around it, so that a point looks closely only at
-/// blocks that may hold the nearest segment or a crossing.
+/// Its segments stand in blocks. The chord from a block's start to its end, and how far the block bulges from it, bound
+/// the distance so closely that a point looks at a block or two only; how the blocks span y tells which may hold a crossing.
 #[derive(Debug)]
 pub(crate) struct Outline {
+    /// Distances to chords are taken in single precision, from this point and in units of this length: the middle and
+    /// the diagonal of the rectangle around.
+    centre: Point,
+    size: f64,
     blocks: Vec<Block>,
     groups: Vec<Group>,
 }
 
-/// Segments in a block, and blocks in a group: what is worked on side by side.
+/// Segments in a block, worked on side by side.
 const LANES: usize = 8;
 
 type Lanes = [f64; LANES];
+
+/// Blocks in a group, looked at side by side.
+const CHORDS: usize = 16;
+
+type Chords = [f32; CHORDS];
+
+/// Far more than single precision errs by, as a share of the lengths at hand.
+const SLACK: f64 = 1e-5;
+
+/// Where there is nothing, in sizes of the outline.
+const FAR: f32 = 1e15;
 
 /// Segments from a to b = a + d.
 #[derive(Debug)]
@@ -33,14 +48,15 @@ struct Block {
 /// What bounds each of some blocks.
 #[derive(Debug)]
 struct Group {
-    /// A point of the outline.
-    start: [Lanes; 2],
-    /// The circle around the block.
-    centre: [Lanes; 2],
-    radius: Lanes,
+    /// Start and direction of the chord, and 1 over its squared length, or 0.
+    start: [Chords; 2],
+    along: [Chords; 2],
+    inverse: Chords,
+    /// How far from the chord the block reaches.
+    bulge: Chords,
     /// The values of y that it spans.
-    low: Lanes,
-    high: Lanes,
+    low: Chords,
+    high: Chords,
 }
 
 impl Outline {
@@ -58,52 +74,69 @@ impl Outline {
                 core::array::from_fn(|i| points[(first + i).min(last) % points.len()])
             })
             .collect();
+        let [low, high] = [f64::min, f64::max]
+            .map(|of| points.iter().fold(points[0], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])]));
+        let centre = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
+        let size = length(sub(high, low));
         Ok(Self {
+            centre,
+            size,
             blocks: chains.iter().map(Block::new).collect(),
-            groups: chains.chunks(LANES).map(Group::new).collect(),
+            groups: chains.chunks(CHORDS).map(|chains| Group::new(chains, centre, size)).collect(),
         })
     }
 
     /// Distance to the polygon, positive inside (by the even-odd rule) and negative outside.
     pub(crate) fn height(&self, point: Point) -> f64 {
-        height(&self.groups, &self.blocks, point)
+        self.heights(&[point])[0]
+    }
+
+    /// The heights of some points.
+    pub(crate) fn heights(&self, points: &[Point]) -> Vec<f64> {
+        let mut heights = vec![0.0; points.len()];
+        measure(self, points, &mut heights);
+        heights
     }
 }
 
 #[multiversion::multiversion(targets = "simd")]
-fn height(groups: &[Group], blocks: &[Block], point: Point) -> f64 {
-    let mut bounds = [f64::INFINITY; LANES];
-    for group in groups {
-        bounds = smaller(bounds, squares(group.start, point));
-    }
-    let bound = smallest(bounds).sqrt();
+fn measure(outline: &Outline, points: &[Point], heights: &mut [f64]) {
+    let Outline { centre, size, blocks, groups } = outline;
+    let mut distances = vec![[0.0; CHORDS]; groups.len()];
+    for (&point, height) in points.iter().zip(heights) {
+        let [x, y] = sub(point, *centre).map(|way| way / size);
+        let place = [single(x), single(y)];
+        let mut bounds = [f32::INFINITY; CHORDS];
+        for (group, distance) in groups.iter().zip(&mut distances) {
+            *distance = group.distances(place);
+            for (i, bound) in bounds.iter_mut().enumerate() {
+                let most = distance[i] + group.bulge[i];
+                *bound = if most < *bound { most } else { *bound };
+            }
+        }
+        let slack = single(SLACK * (1.0 + x.abs() + y.abs()));
+        let bound = slack + bounds.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a });
 
-    let mut nearest = [f64::INFINITY; LANES];
-    let mut inside = false;
-    for (group, blocks) in groups.iter().zip(blocks.chunks(LANES)) {
-        let distance2 = squares(group.centre, point);
-        let near: [bool; LANES] = core::array::from_fn(|i| {
-            let reach = bound + group.radius[i];
-            distance2[i] <= reach * reach
-        });
-        let level: [bool; LANES] = core::array::from_fn(|i| (group.low[i] <= point[1]) & (point[1] < group.high[i]));
-        for i in set(near) {
-            nearest = smaller(nearest, blocks[i].distance2(point));
+        let mut nearest = [f64::INFINITY; LANES];
+        let mut inside = false;
+        for ((group, distance), blocks) in groups.iter().zip(&distances).zip(blocks.chunks(CHORDS)) {
+            let near = bits(|i| distance[i] - group.bulge[i] <= bound);
+            let level = bits(|i| (group.low[i] - slack <= place[1]) & (place[1] <= group.high[i] + slack));
+            for i in ones(near) {
+                nearest = smaller(nearest, blocks[i].distance2(point));
+            }
+            for i in ones(level) {
+                inside ^= blocks[i].crosses(point);
+            }
         }
-        for i in set(level) {
-            inside ^= blocks[i].crosses(point);
-        }
+        let distance = smallest(nearest).sqrt();
+        *height = if inside { distance } else { -distance };
     }
-    let distance = smallest(nearest).sqrt();
-    if inside { distance } else { -distance }
 }
 
-#[inline(always)]
-fn squares(places: [Lanes; 2], point: Point) -> Lanes {
-    core::array::from_fn(|i| {
-        let (dx, dy) = (places[0][i] - point[0], places[1][i] - point[1]);
-        dx * dx + dy * dy
-    })
+#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+fn single(value: f64) -> f32 {
+    value as f32
 }
 
 #[inline(always)]
@@ -116,17 +149,23 @@ fn smallest(lanes: Lanes) -> f64 {
     lanes.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
-/// The indices of flags that are set. Few are, and a walk over bits has no branch to guess for the others.
+/// Flags as the bits of a number.
 #[inline(always)]
-fn set(flags: [bool; LANES]) -> impl Iterator<Item = usize> {
-    let mut bits = 0u32;
-    for (i, flag) in flags.into_iter().enumerate() {
-        bits |= u32::from(flag) << i;
+fn bits(flag: impl Fn(usize) -> bool) -> u32 {
+    let mut bits = 0;
+    for i in 0..CHORDS {
+        bits |= u32::from(flag(i)) << i;
     }
+    bits
+}
+
+/// The indices of ones. There are few, and a walk over them has no branch to guess for the others.
+#[inline(always)]
+fn ones(mut bits: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let next = bits.trailing_zeros() as usize;
         bits &= bits.wrapping_sub(1);
-        (next < LANES).then_some(next)
+        (next < CHORDS).then_some(next)
     })
 }
 
@@ -162,39 +201,64 @@ impl Block {
     /// Whether an odd number of segments crosses the ray from `point` to the right.
     #[inline(always)]
     fn crosses(&self, point: Point) -> bool {
-        let crossed: [bool; LANES] = core::array::from_fn(|i| {
+        let mut crossings = 0;
+        for i in 0..LANES {
             let spans = (self.ay[i] <= point[1]) != (self.by[i] <= point[1]);
             let x = self.ax[i] + (point[1] - self.ay[i]) * self.slope[i];
-            spans & (point[0] < x)
-        });
-        crossed.into_iter().fold(false, |odd, crossed| odd ^ crossed)
+            crossings += u64::from(spans & (point[0] < x));
+        }
+        crossings % 2 == 1
     }
 }
 
 impl Group {
     /// A group that is not full ends in blocks that no point is near.
-    fn new(chains: &[[Point; LANES + 1]]) -> Self {
+    fn new(chains: &[[Point; LANES + 1]], centre: Point, size: f64) -> Self {
         let mut group = Self {
-            start: [[f64::INFINITY; LANES]; 2],
-            centre: [[f64::INFINITY; LANES]; 2],
-            radius: [0.0; LANES],
-            low: [f64::INFINITY; LANES],
-            high: [f64::NEG_INFINITY; LANES],
+            start: [[0.0; CHORDS]; 2],
+            along: [[0.0; CHORDS]; 2],
+            inverse: [0.0; CHORDS],
+            bulge: [0.0; CHORDS],
+            low: [f32::INFINITY; CHORDS],
+            high: [f32::NEG_INFINITY; CHORDS],
         };
+        group.start[0][chains.len()..].fill(FAR);
         for (i, chain) in chains.iter().enumerate() {
-            let [[left, right], [low, high]] = [0, 1].map(|axis| {
-                let values = chain.iter().map(|point| point[axis]);
-                [values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max)]
-            });
-            for (start, from) in group.start.iter_mut().zip(chain[0]) {
-                start[i] = from;
+            let chain = chain.map(|point| sub(point, centre).map(|way| way / size));
+            let chord = sub(chain[LANES], chain[0]);
+            let square = dot(chord, chord);
+            // A chord too short to be told from a point is one.
+            let inverse = if square > SLACK * SLACK { 1.0 / square } else { 0.0 };
+            let beside = |point: &Point| {
+                let way = sub(*point, chain[0]);
+                let t = (dot(way, chord) * inverse).clamp(0.0, 1.0);
+                length([way[0] - t * chord[0], way[1] - t * chord[1]])
+            };
+            let bulge = chain.iter().map(beside).fold(0.0, f64::max);
+            for axis in 0..2 {
+                group.start[axis][i] = single(chain[0][axis]);
+                group.along[axis][i] = single(chord[axis]);
             }
-            group.centre[0][i] = (left + right) / 2.0;
-            group.centre[1][i] = (low + high) / 2.0;
-            group.radius[i] = length([right - left, high - low]) / 2.0;
-            (group.low[i], group.high[i]) = (low, high);
+            group.inverse[i] = single(inverse);
+            group.bulge[i] = single(bulge);
+            let levels = chain.iter().map(|point| single(point[1]));
+            group.low[i] = levels.clone().fold(f32::INFINITY, f32::min);
+            group.high[i] = levels.fold(f32::NEG_INFINITY, f32::max);
         }
         group
+    }
+
+    /// Distances of a point from the chords.
+    #[inline(always)]
+    fn distances(&self, point: [f32; 2]) -> Chords {
+        let mut distances = [0.0; CHORDS];
+        for (i, distance) in distances.iter_mut().enumerate() {
+            let (x, y) = (point[0] - self.start[0][i], point[1] - self.start[1][i]);
+            let t = ((x * self.along[0][i] + y * self.along[1][i]) * self.inverse[i]).clamp(0.0, 1.0);
+            let (x, y) = (x - t * self.along[0][i], y - t * self.along[1][i]);
+            *distance = (x * x + y * y).sqrt();
+        }
+        distances
     }
 }
 

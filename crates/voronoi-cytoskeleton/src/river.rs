@@ -1,5 +1,6 @@
 use crate::diagram::Diagram;
 use crate::geometry::{Point, length, sub};
+use std::borrow::Cow;
 
 /// Where a river ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,31 +30,30 @@ impl River {
 }
 
 /// Edges that leave a vertex of the diagram: three cells meet in it.
-const DEGREE: usize = 3;
+pub(crate) const DEGREE: usize = 3;
 
 /// The landscape in which rivers run: heights at vertices, ways between them, and which tree holds which vertex.
 pub(crate) struct Landscape<'a, H> {
-    diagram: &'a Diagram,
+    net: Net<'a>,
     height: H,
-    pub(crate) heights: Vec<f64>,
-    pub(crate) highest: f64,
-    /// Neighbours of each vertex along the edges inside the window; filled from the front.
-    ways: Vec<[Option<u32>; DEGREE]>,
+    heights: Vec<f64>,
+    highest: f64,
     trees: Trees,
 }
 
-/// A way down that is not yet a river.
-struct Course {
-    vertices: Vec<usize>,
-    mouth: Mouth,
+/// The vertices of a diagram in a window, and which of them an edge joins.
+pub(crate) struct Net<'a> {
+    pub(crate) vertices: Cow<'a, [Point]>,
+    /// Number of vertices inside the window; those on its border, or beyond, follow.
+    pub(crate) inner: usize,
+    /// Neighbours of each vertex along the edges inside the window; filled from the front.
+    pub(crate) ways: Vec<[Option<u32>; DEGREE]>,
 }
 
-impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
-    pub(crate) fn new(diagram: &'a Diagram, height: H) -> Self {
-        let count = diagram.vertices().len();
-        let heights: Vec<f64> = diagram.vertices().iter().map(|&p| height(p)).collect();
-        let highest = heights.iter().copied().fold(0.0, f64::max);
-        let mut ways = vec![[None; DEGREE]; count];
+impl<'a> Net<'a> {
+    pub(crate) fn of(diagram: &'a Diagram) -> Self {
+        let vertices = diagram.vertices();
+        let mut ways = vec![[None; DEGREE]; vertices.len()];
         for edge in diagram.edges() {
             if edge.neighbour.is_none() {
                 continue;
@@ -65,7 +65,28 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
                 }
             }
         }
-        Self { diagram, height, heights, highest, ways, trees: Trees::new(count) }
+        Self { vertices: Cow::Borrowed(vertices), inner: diagram.inner, ways }
+    }
+}
+
+/// A way down that is not yet a river.
+struct Course {
+    vertices: Vec<usize>,
+    mouth: Mouth,
+}
+
+impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
+    /// A landscape on a net of the given height, which `heights` are at its vertices.
+    pub(crate) fn new(net: Net<'a>, height: H, heights: Vec<f64>) -> Self {
+        let highest = heights.iter().copied().fold(0.0, f64::max);
+        let trees = Trees::new(heights.len());
+        Self { net, height, heights, highest, trees }
+    }
+
+    /// The vertices inside the window that lie above zero, and at least at a share of the largest height.
+    pub(crate) fn springs(&self, share: f64) -> Vec<usize> {
+        let lowest = share * self.highest;
+        (0..self.net.inner).filter(|&vertex| self.heights[vertex] > 0.0 && self.heights[vertex] >= lowest).collect()
     }
 
     /// Runs a river from a spring, and its branches. `branches` is asked once for every vertex of a river but its last.
@@ -93,7 +114,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
 
     /// Neighbours lower than a vertex.
     fn below(&self, vertex: usize) -> impl Iterator<Item = usize> + '_ {
-        self.ways[vertex]
+        self.net.ways[vertex]
             .iter()
             .flatten()
             .map(|&way| way as usize)
@@ -118,7 +139,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
                     .max_by(|&a, &b| self.slope(vertex, a).total_cmp(&self.slope(vertex, b)))?,
             };
             vertices.push(way);
-            if self.heights[way] <= 0.0 || self.diagram.is_on_border(way) {
+            if self.heights[way] <= 0.0 || way >= self.net.inner {
                 let mouth = Mouth::Border;
                 return Some(Course { vertices, mouth });
             }
@@ -131,7 +152,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
     }
 
     fn slope(&self, from: usize, to: usize) -> f64 {
-        let [a, b] = [from, to].map(|vertex| self.diagram.vertices()[vertex]);
+        let [a, b] = [from, to].map(|vertex| self.net.vertices[vertex]);
         (self.heights[from] - self.heights[to]) / length(sub(b, a))
     }
 
@@ -139,7 +160,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
         let mut points: Vec<Point> = Vec::with_capacity(course.vertices.len());
         let mut heights: Vec<f64> = Vec::with_capacity(course.vertices.len());
         for &vertex in &course.vertices {
-            points.push(self.diagram.vertices()[vertex]);
+            points.push(self.net.vertices[vertex]);
             heights.push(self.heights[vertex] / self.highest);
         }
         // The last edge ends where the height does.

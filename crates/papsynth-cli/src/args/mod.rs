@@ -1,6 +1,7 @@
 //! What can be typed.
 
 mod real;
+mod sets;
 mod values;
 
 use std::ops::Range;
@@ -10,6 +11,9 @@ use clap::{ArgGroup, Args, Parser, Subcommand};
 use papsynth::recipe::{CameraPreset, Preset};
 
 pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
+pub(crate) use sets::{
+    Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
+};
 use values::{camera_parser, parse_range, preset_parser};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
@@ -45,6 +49,15 @@ pub(crate) enum Verb {
     Judge(Judge),
     Match(Match),
     Inspect(Inspect),
+    Verify(Verify),
+    Convert(Convert),
+    Rerender(Box<Rerender>),
+    Sweep(Box<Sweep>),
+    Plan(Plan),
+    Submit(Submit),
+    Status(Status),
+    Merge(Merge),
+    Clean(Clean),
     Study(Box<Study>),
     Schema(SchemaArgs),
     Completions(Completions),
@@ -130,6 +143,8 @@ Examples:
   papsynth generate --out fields --frames 8
   papsynth generate my.toml --out fields --frames 1000 --seed 7
   papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
+  papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
+  papsynth generate my.toml --out many --frames 100000 --shard 3/20   the fourth of twenty machines
   papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
   papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
@@ -145,7 +160,11 @@ pub(crate) struct Generate {
     /// Indices of the frames, from A up to but without B
     #[arg(long, value_name = "A..B", value_parser = parse_range)]
     pub(crate) range: Option<Range<u64>>,
-    /// Read every file of the frames that are there and make those anew whose SHA-256 is wrong, instead of comparing sizes
+    #[command(flatten)]
+    pub(crate) layout: LayoutArgs,
+    #[command(flatten)]
+    pub(crate) share: ShareArgs,
+    /// Read every file that is there, as `papsynth verify` does, and make anew what is wrong, instead of comparing sizes
     #[arg(long)]
     pub(crate) verify: bool,
     /// Say where the time went, stage by stage, and how many pixels and objects a second were made

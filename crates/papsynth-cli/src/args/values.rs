@@ -5,8 +5,11 @@ use std::ops::Range;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use optics_psf::calibrate::Window;
 use papsynth::recipe::{CameraPreset, Preset};
+use papsynth_dataset::{Flatten, Format, Share};
 use papsynth_judge::NucleiFrom;
 use papsynth_study::{Grey, Task};
+
+use super::sets::Shards;
 
 /// Names of presets, each with what it shows.
 pub(super) fn preset_parser() -> impl TypedValueParser<Value = Preset> {
@@ -38,6 +41,38 @@ pub(super) fn grey_parser() -> impl TypedValueParser<Value = Grey> {
     PossibleValuesParser::new(Grey::ALL.map(Grey::name)).try_map(|name| {
         Grey::ALL.into_iter().find(|grey| grey.name() == name).ok_or_else(|| format!("there is no scale `{name}`"))
     })
+}
+
+/// Names of formats, each with what it is.
+pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
+    let names = Format::ALL.map(|format| PossibleValue::new(format.name()).help(format.about()));
+    PossibleValuesParser::new(names).try_map(|name| {
+        Format::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| format!("there is no format `{name}`"))
+    })
+}
+
+pub(super) fn flatten_parser() -> impl TypedValueParser<Value = Flatten> {
+    PossibleValuesParser::new(Flatten::ALL.map(Flatten::name)).try_map(|name| {
+        Flatten::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| format!("there is no policy `{name}`"))
+    })
+}
+
+/// A share of the shards.
+pub(super) fn parse_share(text: &str) -> Result<Shards, String> {
+    let expected = "expected I/N with 0 ≤ I < N, such as 0/4, or `auto`, or `auto/N`";
+    let number = |part: &str| part.trim().parse::<u64>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    match text.split_once('/') {
+        None if text == "auto" => Ok(Shards::Environment(None)),
+        Some(("auto", of)) => match number(of)? {
+            0 => Err(expected.to_owned()),
+            of => Ok(Shards::Environment(Some(of))),
+        },
+        Some((index, of)) => {
+            let share = Share { index: number(index)?, of: number(of)? };
+            if share.index < share.of { Ok(Shards::Given(share)) } else { Err(expected.to_owned()) }
+        }
+        None => Err(expected.to_owned()),
+    }
 }
 
 pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {

@@ -40,6 +40,7 @@ impl Bench {
         let mut command = Command::new(env!("CARGO_BIN_EXE_papsynth"));
         command.args(words.split_whitespace()).current_dir(&self.root).stdin(Stdio::null());
         command.env_remove("NO_GRAPHICS").env_remove("FORCE_COLOR");
+        command.env_remove("SLURM_ARRAY_TASK_ID").env_remove("JOB_COMPLETION_INDEX");
         command
     }
 
@@ -47,6 +48,18 @@ impl Bench {
         let output = self.command(words).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// A run with variables of the environment.
+    pub(crate) fn run_with(&self, words: &str, variables: &[(&str, &str)]) -> Outcome {
+        let output = self.command(words).envs(variables.iter().copied()).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// A run that goes on beside the test.
+    pub(crate) fn spawn(&self, words: &str) -> std::process::Child {
+        self.command(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
     /// A run that must succeed.

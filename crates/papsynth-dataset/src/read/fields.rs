@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use papsynth::truth::LabelMap;
 
 use super::{LevelImage, Limits, bytes, components, image_files, parse, read_label_map};
-use crate::dataset::{read_manifest, recorded_frames, whole_record};
+use crate::dataset::{recorded_shards, whole_record};
 use crate::error::{Error, Problem};
 use crate::files::Folder;
-use crate::frame_writer::white;
+use crate::formats::Format;
 use crate::layout::{self, Form};
-use crate::record::Check;
+use crate::record::{Check, Manifest};
+use crate::shard_writer::white;
 
 /// The table that says which group each image of a folder belongs to.
 const GROUPS: &str = "frames.csv";
@@ -174,29 +175,38 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
 /// The frames of a data set, which must all be whole; of a stack, its image with everything in focus.
 fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let folder = Folder::new(path);
-    let identity = read_manifest(&folder)?.identity;
+    let manifest = Manifest::read(&folder)?;
+    if !manifest.layout.has(Format::Folder) {
+        let message = format!(
+            "the data set lies in files as {}; images and labels are read from the format `folder`",
+            manifest.layout
+        );
+        return Err(Error::Folder { path: path.to_owned(), message });
+    }
     let mut fields = Vec::new();
-    for index in recorded_frames(&folder)? {
-        let whole = whole_record(&folder, &identity, index, Check::Sizes)?;
+    for shard in recorded_shards(&folder)? {
+        let whole = whole_record(&folder, &manifest.identity, &manifest.layout, shard, Check::Sizes)?;
         let record = whole.map_err(|flaw| {
             let message =
-                format!("frame {index} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
+                format!("shard {shard} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
             Error::Folder { path: path.to_owned(), message }
         })?;
-        let frame = record.summary;
-        let image = match Form::of(frame.planes_um.len()) {
-            Form::Single => layout::image(index, Form::Single),
-            Form::Stack => layout::all_in_focus(index),
-        };
-        fields.push(FieldFile {
-            name: layout::frame_name(index),
-            group: String::new(),
-            pixel_um: Some(frame.pixel_um),
-            slide: Some(frame.slide),
-            image: folder.path(&image),
-            nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
-            white: Some(white(frame.bits)),
-        });
+        for frame in record.frames {
+            let index = frame.index;
+            let image = match Form::of(frame.planes_um.len()) {
+                Form::Single => layout::image(index, Form::Single),
+                Form::Stack => layout::all_in_focus(index),
+            };
+            fields.push(FieldFile {
+                name: layout::numbered(index),
+                group: String::new(),
+                pixel_um: Some(frame.pixel_um),
+                slide: Some(frame.slide),
+                image: folder.path(&image),
+                nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
+                white: Some(white(frame.bits)),
+            });
+        }
     }
     if fields.is_empty() {
         return Err(Error::Folder { path: path.to_owned(), message: "the data set has no whole frame".to_owned() });

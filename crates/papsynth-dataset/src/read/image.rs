@@ -82,7 +82,10 @@ impl LevelImage {
     /// # Errors
     /// If the bytes are not a whole image of opaque pixels within the limits.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Problem> {
-        let raster = decode(bytes, limits, Meaning::Brightness)?;
+        Self::of(decode(bytes, limits, Meaning::Brightness)?)
+    }
+
+    fn of(raster: Raster) -> Result<Self, Problem> {
         if raster.channels != Channels::Rgb {
             let GreyImage { width, grey: levels, white } = GreyImage::of(raster)?;
             return Ok(Self { width, channels: 1, levels, white });
@@ -90,6 +93,18 @@ impl LevelImage {
         let width = raster.width;
         let (levels, white) = levels(raster.samples)?;
         Ok(Self { width, channels: 3, levels, white })
+    }
+
+    /// Hands over the images of a file, one after the other: a PNG file has one, a TIFF file may have several.
+    pub(crate) fn pages(
+        bytes: &[u8],
+        limits: &Limits,
+        mut take: impl FnMut(Self) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        match is_tiff(bytes) {
+            true => tiff::pages(bytes, limits, |raster| take(Self::of(raster)?)),
+            false => take(Self::decode(bytes, limits)?),
+        }
     }
 
     /// Reads a PNG or TIFF file.
@@ -126,7 +141,20 @@ fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
 /// # Errors
 /// If the bytes are not a whole image of one channel within the limits.
 pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
-    let raster = decode(bytes, limits, Meaning::Labels)?;
+    labels(decode(bytes, limits, Meaning::Labels)?)
+}
+
+/// The label images of a TIFF file, one a page.
+pub(crate) fn label_pages(bytes: &[u8], limits: &Limits) -> Result<Vec<LabelMap>, Problem> {
+    let mut pages = Vec::new();
+    tiff::pages(bytes, limits, |raster| {
+        pages.push(labels(raster)?);
+        Ok(())
+    })?;
+    Ok(pages)
+}
+
+fn labels(raster: Raster) -> Result<LabelMap, Problem> {
     let width = raster.width;
     let ids = match raster.grey()? {
         Samples::U8(samples) => samples.into_iter().map(u32::from).collect(),

@@ -27,10 +27,12 @@ use std::path::Path;
 
 pub use components::{Component, components};
 pub use fields::{FieldFile, FieldImage, FieldNuclei, field_files};
+pub(crate) use image::label_pages;
 pub use image::{GreyImage, LevelImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
 pub use stack::{Stack, natural_order};
+pub(crate) use tiff::{description, float_pages};
 pub use weights::{InputFile, label_weights, read_inputs, weights};
 
 use crate::error::{Error, Problem};

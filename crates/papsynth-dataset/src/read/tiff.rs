@@ -53,6 +53,35 @@ pub(super) fn pages(
     }
 }
 
+/// The pages of a file of 32-bit floating-point numbers, whatever their channels.
+pub(crate) fn float_pages(bytes: &[u8], limits: &Limits) -> Result<Vec<Vec<f32>>, Problem> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
+    let mut pages = Vec::new();
+    loop {
+        let (width, height) = decoder.dimensions().map_err(problem)?;
+        limits.check(width, height)?;
+        let mut tiff_limits = tiff::decoder::Limits::default();
+        // Three channels of four bytes.
+        tiff_limits.decoding_buffer_size = (width as usize * height as usize).saturating_mul(12);
+        decoder = decoder.with_limits(tiff_limits);
+        let DecodingResult::F32(samples) = decoder.read_image().map_err(problem)? else {
+            return Err(Problem::Samples { found: "whole numbers".to_owned(), accepted: "floating-point samples" });
+        };
+        pages.push(samples);
+        if !decoder.more_images() {
+            return Ok(pages);
+        }
+        decoder.next_image().map_err(problem)?;
+    }
+}
+
+/// What the first page of a file says that it shows, if it says anything.
+pub(crate) fn description(bytes: &[u8]) -> Result<Option<String>, Problem> {
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
+    let Some(value) = decoder.find_tag(Tag::ImageDescription).map_err(problem)? else { return Ok(None) };
+    value.into_string().map(Some).map_err(problem)
+}
+
 /// Columns, pixels, and channels of the image that the decoder is at.
 fn shape(decoder: &mut Reader, limits: &Limits, accepted: &'static str) -> Result<(usize, usize, Channels), Problem> {
     let (width, height) = decoder.dimensions().map_err(problem)?;

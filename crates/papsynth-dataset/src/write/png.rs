@@ -26,6 +26,13 @@ pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixe
     Ok(out)
 }
 
+/// Labels, which must fit into 16 bits.
+pub(crate) fn label_png(ids: &[u32], width: usize, pixel_um: f64) -> io::Result<Vec<u8>> {
+    let levels: Vec<u16> =
+        ids.iter().map(|&id| u16::try_from(id)).collect::<Result<_, _>>().map_err(io::Error::other)?;
+    png(&levels, width, 1, 16, pixel_um)
+}
+
 /// An image in colour, three bytes a pixel.
 pub(crate) fn rgb_png(rgb: &[u8], width: usize) -> io::Result<Vec<u8>> {
     let mut out = Vec::new();

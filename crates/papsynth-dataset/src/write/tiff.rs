@@ -1,13 +1,15 @@
 //! TIFF: pages written one after the other, and label images.
 
-use std::io::{Cursor, Seek, Write};
+use std::io::{self, Cursor, Seek, Write};
 
-use tiff::TiffResult;
+use papsynth::truth::Group;
 use tiff::encoder::colortype::{ColorType, Gray8, Gray16, Gray32, Gray32Float, RGB8, RGB16, RGB32Float};
-use tiff::encoder::{
-    Compression, DeflateLevel, Predictor, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue,
-};
-use tiff::tags::{ResolutionUnit, Tag};
+use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
+use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, ResolutionUnit, SampleFormat, Tag};
+use tiff::{TiffError, TiffResult};
+
+use super::{ome, pyramid};
+use crate::record::Geometry;
 
 /// Pages of a file larger than this go into a BigTIFF. Offsets of a classic file end at 2³² bytes; the rest is for its directories.
 const CLASSIC_BYTES: u64 = 0xFF00_0000;
@@ -54,24 +56,220 @@ impl<W: Write + Seek> PageWriter<W> {
     }
 }
 
-/// A label image of 16 bits, or of 32 if a label needs them.
-pub(crate) fn label_tiff(ids: &[u32], width: usize, pixel_um: f64) -> TiffResult<Vec<u8>> {
-    if ids.iter().copied().max() > Some(u16::MAX.into()) {
-        return compressed(Pixels::U32(ids), width, pixel_um);
+impl<W: Write + Seek> PageWriter<W> {
+    /// A page in tiles with smaller versions, if it is large, else as it is. For formats whose readers expect that.
+    pub(crate) fn write_pyramid(
+        &mut self,
+        pixels: Pixels,
+        width: usize,
+        channels: usize,
+        pixel_um: f64,
+        description: Option<&str>,
+    ) -> TiffResult<()> {
+        let height = pixels.len() / (width * channels).max(1);
+        match (self, pixels) {
+            (writer, pixels) if width.max(height) < pyramid::LARGE => {
+                writer.write(pixels, width, channels, pixel_um, description)
+            }
+            (Self::Classic(e), Pixels::U8(data)) => pyramid::page(e, data, width, channels, pixel_um, description),
+            (Self::Classic(e), Pixels::U16(data)) => pyramid::page(e, data, width, channels, pixel_um, description),
+            (Self::Big(e), Pixels::U8(data)) => pyramid::page(e, data, width, channels, pixel_um, description),
+            (Self::Big(e), Pixels::U16(data)) => pyramid::page(e, data, width, channels, pixel_um, description),
+            (writer, pixels) => writer.write(pixels, width, channels, pixel_um, description),
+        }
     }
-    #[expect(clippy::cast_possible_truncation, reason = "the largest fits")]
-    let narrow: Vec<u16> = ids.iter().map(|&id| id as u16).collect();
-    compressed(Pixels::U16(&narrow), width, pixel_um)
 }
 
-/// One page of few different values, compressed: differences along a row are nearly all zero.
-pub(crate) fn compressed(pixels: Pixels, width: usize, pixel_um: f64) -> TiffResult<Vec<u8>> {
+impl Pixels<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::U8(data) => data.len(),
+            Self::U16(data) => data.len(),
+            Self::U32(data) => data.len(),
+            Self::F32(data) => data.len(),
+        }
+    }
+}
+
+/// The size of a pixel.
+pub(super) fn resolution<W: Write + Seek, K: TiffKind>(
+    directory: &mut DirectoryEncoder<W, K>,
+    pixel_um: f64,
+) -> TiffResult<()> {
+    directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter.to_u16())?;
+    directory.write_tag(Tag::XResolution, per_centimetre(pixel_um))?;
+    directory.write_tag(Tag::YResolution, per_centimetre(pixel_um))
+}
+
+/// A label image of 16 bits, or of 32 if a label needs them.
+pub(crate) fn label_tiff(ids: &[u32], width: usize, pixel_um: f64) -> io::Result<Vec<u8>> {
+    if !fits_16_bits(ids) {
+        return compressed(&[Pixels::U32(ids)], width, 1, pixel_um, None);
+    }
+    compressed(&[Pixels::U16(&labels_16(ids))], width, 1, pixel_um, None)
+}
+
+/// Grey levels or colours of a frame's picture.
+pub(crate) fn picture_tiff(picture: &[u16], geometry: &Geometry) -> io::Result<Vec<u8>> {
+    image_tiff(picture, geometry, None)
+}
+
+/// The same as OME-TIFF of one plane.
+pub(crate) fn ome_picture(picture: &[u16], geometry: &Geometry) -> io::Result<Vec<u8>> {
+    let (text, view) = (ome::of_picture(geometry), geometry.view);
+    if view.width.max(view.height) < pyramid::LARGE {
+        return image_tiff(picture, geometry, Some(&text));
+    }
     let mut out = Cursor::new(Vec::new());
-    let mut encoder = TiffEncoder::new(&mut out)?
-        .with_compression(Compression::Deflate(DeflateLevel::Fast))
-        .with_predictor(Predictor::Horizontal);
-    page(&mut encoder, pixels, width, 1, pixel_um, None)?;
+    let narrow = if geometry.bits <= 8 { narrow(picture) } else { Vec::new() };
+    let pixels = if geometry.bits <= 8 { Pixels::U8(&narrow) } else { Pixels::U16(picture) };
+    let bytes = 3 * picture.len() as u64;
+    PageWriter::new(&mut out, bytes)
+        .and_then(|mut w| w.write_pyramid(pixels, view.width, geometry.channels, view.pixel_um, Some(&text)))
+        .map_err(as_io)?;
     Ok(out.into_inner())
+}
+
+fn image_tiff(picture: &[u16], geometry: &Geometry, description: Option<&str>) -> io::Result<Vec<u8>> {
+    let Geometry { view, channels, bits, .. } = geometry;
+    match bits {
+        ..=8 => compressed(&[Pixels::U8(&narrow(picture))], view.width, *channels, view.pixel_um, description),
+        _ => compressed(&[Pixels::U16(picture)], view.width, *channels, view.pixel_um, description),
+    }
+}
+
+/// Layers of labels as channels of an OME-TIFF.
+pub(crate) fn ome_labels(layers: &[Vec<u32>], group: Group, geometry: &Geometry) -> io::Result<Vec<u8>> {
+    let view = geometry.view;
+    let small = layers.iter().all(|layer| fits_16_bits(layer));
+    let text = ome::of_labels(geometry, group, layers.len(), if small { "uint16" } else { "uint32" });
+    if !small {
+        let pages: Vec<Pixels> = layers.iter().map(|layer| Pixels::U32(layer)).collect();
+        return compressed(&pages, view.width, 1, view.pixel_um, Some(&text));
+    }
+    let narrow: Vec<Vec<u16>> = layers.iter().map(|layer| labels_16(layer)).collect();
+    let pages: Vec<Pixels> = narrow.iter().map(|layer| Pixels::U16(layer)).collect();
+    compressed(&pages, view.width, 1, view.pixel_um, Some(&text))
+}
+
+fn fits_16_bits(ids: &[u32]) -> bool {
+    ids.iter().all(|&id| id <= u16::MAX.into())
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "they fit")]
+fn labels_16(ids: &[u32]) -> Vec<u16> {
+    ids.iter().map(|&id| id as u16).collect()
+}
+
+/// Grey levels of at most 8 bits.
+#[expect(clippy::cast_possible_truncation, reason = "they fit")]
+pub(crate) fn narrow(levels: &[u16]) -> Vec<u8> {
+    levels.iter().map(|&g| g as u8).collect()
+}
+
+/// Pages of whole numbers, compressed: differences along a row of labels are nearly all zero, those of a picture are small. Made for speed:
+/// a tenth of the time that zlib takes at its fastest.
+pub(crate) fn compressed(
+    pages: &[Pixels],
+    width: usize,
+    channels: usize,
+    pixel_um: f64,
+    description: Option<&str>,
+) -> io::Result<Vec<u8>> {
+    let mut out = Cursor::new(Vec::new());
+    let mut write = || -> TiffResult<()> {
+        let mut encoder = TiffEncoder::new(&mut out)?;
+        for (number, &pixels) in pages.iter().enumerate() {
+            let description = description.filter(|_| number == 0);
+            compressed_page(&mut encoder, pixels, width, channels, pixel_um, description)?;
+        }
+        Ok(())
+    };
+    write().map_err(as_io)?;
+    Ok(out.into_inner())
+}
+
+/// Bytes of a strip, before it is compressed.
+const STRIP_BYTES: usize = 1 << 18;
+
+fn compressed_page<W: Write + Seek, K: TiffKind>(
+    encoder: &mut TiffEncoder<W, K>,
+    pixels: Pixels,
+    width: usize,
+    channels: usize,
+    pixel_um: f64,
+    description: Option<&str>,
+) -> TiffResult<()> {
+    let (values, bytes) = match pixels {
+        Pixels::U8(data) => (data.len(), 1),
+        Pixels::U16(data) => (data.len(), 2),
+        Pixels::U32(data) => (data.len(), 4),
+        Pixels::F32(_) => return Err(io::Error::other("floating-point pages are not compressed").into()),
+    };
+    let row = (width * channels).max(1);
+    let rows = (STRIP_BYTES / (row * bytes)).max(1);
+    let mut page = encoder.image_directory()?;
+    let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
+    for from in (0..values).step_by(rows * row) {
+        let to = values.min(from + rows * row);
+        let strip = match pixels {
+            Pixels::U8(data) => differences(&data[from..to], row, channels, |a, b| a.wrapping_sub(b).to_ne_bytes()),
+            Pixels::U16(data) => differences(&data[from..to], row, channels, |a, b| a.wrapping_sub(b).to_ne_bytes()),
+            Pixels::U32(data) => differences(&data[from..to], row, channels, |a, b| a.wrapping_sub(b).to_ne_bytes()),
+            Pixels::F32(_) => Vec::new(),
+        };
+        let strip = fdeflate::compress_to_vec(&strip);
+        offsets.push(u32::try_from(page.write_data(strip.as_slice())?)?);
+        sizes.push(u32::try_from(strip.len())?);
+    }
+    if let Some(text) = description {
+        page.write_tag(Tag::ImageDescription, text)?;
+    }
+    page.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;
+    page.write_tag(Tag::ImageLength, u32::try_from(values / row)?)?;
+    let bits = u16::try_from(8 * bytes)?;
+    page.write_tag(Tag::BitsPerSample, vec![bits; channels].as_slice())?;
+    page.write_tag(Tag::Compression, CompressionMethod::Deflate.to_u16())?;
+    let photometric =
+        if channels == 3 { PhotometricInterpretation::RGB } else { PhotometricInterpretation::BlackIsZero };
+    page.write_tag(Tag::PhotometricInterpretation, photometric.to_u16())?;
+    page.write_tag(Tag::StripOffsets, offsets.as_slice())?;
+    page.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;
+    page.write_tag(Tag::RowsPerStrip, u32::try_from(rows)?)?;
+    page.write_tag(Tag::StripByteCounts, sizes.as_slice())?;
+    page.write_tag(Tag::Predictor, Predictor::Horizontal.to_u16())?;
+    page.write_tag(Tag::SampleFormat, vec![SampleFormat::Uint.to_u16(); channels].as_slice())?;
+    resolution(&mut page, pixel_um)?;
+    page.finish()
+}
+
+/// Each value less that of the same channel before it in its row, as bytes.
+#[inline(always)]
+fn differences<T: Copy + Default, const N: usize>(
+    values: &[T],
+    row: usize,
+    channels: usize,
+    less: impl Fn(T, T) -> [u8; N],
+) -> Vec<u8> {
+    let mut bytes = vec![0; values.len() * N];
+    for (values, bytes) in values.chunks(row).zip(bytes.chunks_mut(row * N)) {
+        let (first, rest) = bytes.split_at_mut(channels.min(values.len()) * N);
+        for (out, &value) in first.chunks_exact_mut(N).zip(values) {
+            out.copy_from_slice(&less(value, T::default()));
+        }
+        for ((out, &value), &before) in rest.chunks_exact_mut(N).zip(values.iter().skip(channels)).zip(values) {
+            out.copy_from_slice(&less(value, before));
+        }
+    }
+    bytes
+}
+
+/// What goes wrong with a TIFF in the making is the making's fault.
+pub(crate) fn as_io(error: TiffError) -> io::Error {
+    match error {
+        TiffError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
 }
 
 fn page<W: Write + Seek, K: TiffKind>(
@@ -109,9 +307,7 @@ where
     if let Some(text) = description {
         tags.write_tag(Tag::ImageDescription, text)?;
     }
-    tags.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter.to_u16())?;
-    tags.write_tag(Tag::XResolution, per_centimetre(pixel_um))?;
-    tags.write_tag(Tag::YResolution, per_centimetre(pixel_um))?;
+    resolution(tags, pixel_um)?;
     image.write_data(data)
 }
 

@@ -118,10 +118,11 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
     let mut rng = scene.key.stream("cell", object.number, "coat.shape");
     let pixel_um = scene.grid().pixel_um;
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
-    let corner = cell.coverage.origin.map(|at| at as f64);
-    let opposite = [corner[0] + (cell.coverage.width - 1) as f64, corner[1] + (cell.coverage.height() - 1) as f64];
+    let whole = cell.coverage.clone().repeated(cell.cover_step);
+    let corner = whole.origin.map(|at| at as f64);
+    let opposite = [corner[0] + (whole.width - 1) as f64, corner[1] + (whole.height() - 1) as f64];
     let mut painting = Painting::around(&[corner, opposite], margin);
-    let inside = widened(&cell.coverage, &painting.coverage);
+    let inside = widened(&whole, &painting.coverage);
     let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
     let (rim, beyond) = (near(RIM_UM), near(coat.beyond_um));
     // Beyond the rim bacteria hang together in tufts.

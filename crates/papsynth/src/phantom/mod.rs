@@ -11,6 +11,8 @@ mod studio;
 pub(crate) mod tile;
 pub(crate) mod wobble;
 
+use std::borrow::Cow;
+
 use dye_spectra::Amounts;
 
 use crate::debris;
@@ -29,8 +31,9 @@ pub(crate) struct Piece {
     pub(crate) part: Part,
     /// What it absorbs along the light's path when it is in focus, decadic.
     pub(crate) absorbance: Tile,
-    /// Share of each pixel that its in-focus outline covers.
+    /// Share that its in-focus outline covers of each square of so many grid points a side.
     pub(crate) coverage: Tile,
+    pub(crate) cover_step: usize,
     /// Area within its outline, also outside the image, px².
     pub(crate) area_px: f64,
     /// Whether its absorbance was taken from an image, and has been through optics already.
@@ -39,6 +42,16 @@ pub(crate) struct Piece {
     pub(crate) dyes: Amounts,
     /// How late light comes, radians, where its absorbance is 1.
     pub(crate) phase_rad: f64,
+}
+
+impl Piece {
+    /// The share of each of the camera's pixels that its outline covers, with `n` grid points along a pixel.
+    pub(crate) fn cover_of_pixels(&self, n: usize) -> Cow<'_, Tile> {
+        match n / self.cover_step {
+            1 => Cow::Borrowed(&self.coverage),
+            finer => Cow::Owned(self.coverage.coarsened(finer)),
+        }
+    }
 }
 
 /// What an object absorbs.
@@ -87,7 +100,16 @@ pub(crate) const BATCH: usize = 16;
 impl Phantom {
     /// A phantom without parts of its own.
     pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
-        let piece = Piece { part: Part::Whole, absorbance, coverage, area_px, imaged: false, dyes, phase_rad: 0.0 };
+        let piece = Piece {
+            part: Part::Whole,
+            absorbance,
+            coverage,
+            cover_step: 1,
+            area_px,
+            imaged: false,
+            dyes,
+            phase_rad: 0.0,
+        };
         Self { pieces: vec![piece], traits: Vec::new() }
     }
 
@@ -102,8 +124,16 @@ impl Phantom {
     /// The same with something in it that other dyes stain: it counts as part of the whole.
     pub(crate) fn stained(mut self, absorbance: Tile, dyes: Amounts) -> Self {
         let coverage = Tile { origin: absorbance.origin, width: 1, values: vec![0.0] };
-        let part = Part::Whole;
-        self.pieces.push(Piece { part, absorbance, coverage, area_px: 0.0, imaged: false, dyes, phase_rad: 0.0 });
+        self.pieces.push(Piece {
+            part: Part::Whole,
+            absorbance,
+            coverage,
+            cover_step: 1,
+            area_px: 0.0,
+            imaged: false,
+            dyes,
+            phase_rad: 0.0,
+        });
         self
     }
 }

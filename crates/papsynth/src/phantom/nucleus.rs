@@ -99,6 +99,7 @@ pub(super) fn make(
         part: Part::Nucleus,
         absorbance,
         coverage,
+        cover_step: 1,
         area_px: area(&outline),
         imaged,
         dyes: nucleus.dyes,

@@ -157,7 +157,11 @@ impl Pool {
         let (ahead, around) = texels[..=count].split_at_mut((count + 1).min(SIDE - start));
         between(ahead, &upper[start..], &lower[start..], fraction(y));
         between(around, upper, lower, fraction(y));
-        sample(row, texels, x.wrapping_sub(start as u32 * ONE), step);
+        if step.cast_signed().unsigned_abs() == ONE && row.len() < SIDE {
+            even(row, &texels[..count], fraction(x), step != ONE);
+        } else {
+            sample(row, texels, x.wrapping_sub(start as u32 * ONE), step);
+        }
     }
 }
 
@@ -201,6 +205,14 @@ fn sample(row: &mut [f32], texels: &Texels, first: u32, step: u32) {
     }
 }
 
+/// The same from texel to texel, from the first one on, or to it.
+#[multiversion::multiversion(targets = "simd")]
+fn even(row: &mut [f32], texels: &[f32], share: f32, mirrored: bool) {
+    let blend = |(value, (left, right)): (&mut f32, (&f32, &f32))| *value = left + share * (right - left);
+    let pairs = texels.iter().zip(&texels[1..]);
+    if mirrored { row.iter_mut().rev().zip(pairs).for_each(blend) } else { row.iter_mut().zip(pairs).for_each(blend) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -232,8 +244,8 @@ mod tests {
     fn a_row_is_the_field_at_each_pixel_however_long_it_is() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
         let pool = Pool::new((0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect());
-        for texel_px in [0.3, 1.0, 1.17, 4.0] {
-            for length in [1, 2, 60, 511, 1400] {
+        for (texel_px, times) in [(0.3, 1), (1.0, 4), (1.17, 1), (4.0, 1)] {
+            for length in [1, 2, 60, 511, 512, 1400].repeat(times) {
                 let look = Look::new(texel_px, &mut rng);
                 let mut row = vec![0.0; length];
                 pool.row_into(&mut row, &look, [3.0, 5.0], &mut [0.0; SIDE + 1]);

@@ -1,17 +1,21 @@
 //! What all images of one recipe share: models, meshes, donors, plans.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::ShapeModel;
 use quilt_texture::QuiltParams;
 use spectral_field::Fft;
-use voronoi_cytoskeleton::{Skeleton, SkeletonParams};
+use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
 
 use super::chromatin::Donors;
 use super::pools::PoolMaker;
+use super::tile::Point;
+use crate::key::{Key, Stream};
 use crate::model::{CellClass, Model, Shapes};
 use crate::profile::Watch;
+use crate::random;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
 use crate::scene::unknown_class;
 
@@ -22,10 +26,26 @@ pub(crate) struct Studio {
     pub(crate) classes: BTreeMap<String, ClassStudio>,
     /// The mesh of all sheets, if cells have any.
     pub(crate) cloth: Option<Cloth>,
-    pub(crate) skeleton: Skeleton,
+    pub(crate) cytoskeletons: Cytoskeletons,
     pub(crate) pools: PoolMaker,
     pub(crate) watch: Watch,
 }
+
+/// What cytoskeletons are grown with: relaxed diagrams of which every cell takes a piece of its own, the same for every
+/// image. Each is made when a cell first asks for it.
+#[derive(Debug)]
+pub(crate) struct Cytoskeletons {
+    skeleton: Skeleton,
+    lloyd_passes: usize,
+    tori: [OnceLock<Torus>; TORI],
+}
+
+/// Number of diagrams. A cell's piece is a quarter of one, at any place and turned any way, and its springs are its own: no two
+/// look alike.
+const TORI: usize = 4;
+
+/// Sites of each: of 300 for a cell, enough for one three times as long as wide.
+const TORUS_SITES: usize = 1200;
 
 /// What cells of one class are made with.
 #[derive(Debug)]
@@ -48,10 +68,32 @@ impl Studio {
             recipe: recipe.clone(),
             classes,
             cloth: cloth(recipe)?,
-            skeleton: Skeleton::new(&SkeletonParams::default()).map_err(|e| e.to_string())?,
+            cytoskeletons: Cytoskeletons::new()?,
             pools: PoolMaker::new(fft)?,
             watch,
         })
+    }
+}
+
+impl Cytoskeletons {
+    fn new() -> Result<Self, String> {
+        let params = SkeletonParams::default();
+        let skeleton = Skeleton::new(&params).map_err(|e| e.to_string())?;
+        Ok(Self { skeleton, lloyd_passes: params.lloyd_passes, tori: Default::default() })
+    }
+
+    /// The rivers of one cell in its outline.
+    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<River>, String> {
+        let number = random::below(TORI, rng);
+        let torus = match self.tori[number].get() {
+            Some(torus) => torus,
+            None => {
+                let mut own = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
+                let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut own).map_err(|e| e.to_string())?;
+                self.tori[number].get_or_init(|| torus)
+            }
+        };
+        self.skeleton.grow_from(torus, outline, rng).map_err(|e| e.to_string())
     }
 }
 
@@ -84,7 +126,7 @@ impl ClassStudio {
 /// The quilting that a recipe asks for, on donors with pixels of a size.
 fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64, fft: Fft) -> QuiltParams {
     let nucleus = &recipe.nucleus;
-    let pixels = |um: f64, least: usize| crate::random::count(um / pixel_um).max(least);
+    let pixels = |um: f64, least: usize| random::count(um / pixel_um).max(least);
     // Patch and overlap are those in the middle of their range: a quilt has patches of one size.
     let middle = |number: &crate::recipe::Number| number.bounds().iter().sum::<f64>() / 2.0;
     let (overlap_px, core_px) = (pixels(middle(&nucleus.overlap_um), 1), pixels(middle(&nucleus.patch_um), 2));

@@ -74,8 +74,11 @@ impl Tile {
             let (left, rest) = row.split_at(first);
             let [head, coarse @ ..] = &mut values[at(1, y) * width..][..width] else { continue };
             left.iter().for_each(|value| *head += weight * value);
-            for (coarse, fine) in coarse.iter_mut().zip(rest.chunks(n)) {
-                fine.iter().for_each(|value| *coarse += weight * value);
+            match n {
+                2 => gather::<2>(coarse, rest, weight),
+                3 => gather::<3>(coarse, rest, weight),
+                4 => gather::<4>(coarse, rest, weight),
+                _ => coarse.iter_mut().zip(rest.chunks(n)).for_each(|(coarse, fine)| add_to(coarse, fine, weight)),
             }
         }
         Self { origin, width, values }
@@ -86,17 +89,50 @@ impl Tile {
         sum(&self.values)
     }
 
+    /// The sum of its values where another tile's, whose pixels are `step` times as wide, are at least so high.
+    pub(crate) fn sum_where(&self, other: &Self, step: usize, least: f32) -> f64 {
+        let side = step as i64;
+        let low = [0, 1].map(|axis| self.origin[axis].max(side * other.origin[axis]));
+        let other_size = [other.width, other.height()].map(|length| length as i64);
+        let size = [self.width, self.height()].map(|length| length as i64);
+        let end = |axis: usize| {
+            (self.origin[axis] + size[axis]).min(side * (other.origin[axis] + other_size[axis])).max(low[axis])
+        };
+        let place = |at: i64, origin: i64| usize::try_from(at - origin).unwrap_or(0);
+        let columns = place(end(0), low[0]);
+        if columns == 0 {
+            return 0.0;
+        }
+        // Pixels of the other tile that the columns begin and end in, and how far into the first.
+        let first = low[0].div_euclid(side);
+        let (from, skip) = (place(first, other.origin[0]), place(low[0], side * first));
+        let count = (skip + columns).div_ceil(step);
+        let mut line = vec![0.0; count * step];
+        let mut known = None;
+        let mut sum = 0.0;
+        for y in low[1]..end(1) {
+            let row = place(y.div_euclid(side), other.origin[1]);
+            if known != Some(row) {
+                repeat_each(&mut line, &other.values[row * other.width + from..][..count], step);
+                known = Some(row);
+            }
+            let values = &self.values[place(y, self.origin[1]) * self.width + place(low[0], self.origin[0])..];
+            sum += sum_where(&values[..columns], &line[skip..], least);
+        }
+        sum
+    }
+
     /// The tile on a grid `n` times as fine, each pixel repeated.
     pub(crate) fn repeated(self, n: usize) -> Self {
         if n == 1 {
             return self;
         }
         let width = self.width * n;
-        let mut values = Vec::with_capacity(self.values.len() * n * n);
-        for row in self.values.chunks_exact(self.width) {
-            let first = values.len();
-            row.iter().for_each(|value| values.extend(core::iter::repeat_n(*value, n)));
-            (1..n).for_each(|_| values.extend_from_within(first..first + width));
+        let mut values = vec![0.0; self.values.len() * n * n];
+        for (row, rows) in self.values.chunks_exact(self.width).zip(values.chunks_exact_mut(n * width)) {
+            let (first, others) = rows.split_at_mut(width);
+            repeat_each(first, row, n);
+            others.chunks_exact_mut(width).for_each(|other| other.copy_from_slice(first));
         }
         Self { origin: self.origin.map(|at| at * n as i64), width, values }
     }
@@ -222,13 +258,49 @@ fn mix(out: &mut [f32], [a, b, c, d]: [&[f32]; 4], weights: [f32; 4]) {
 /// From a row with [`REACH`] more at both ends to one `N` times as fine.
 #[multiversion(targets = "simd")]
 fn spread<const N: usize>(out: &mut [f32], line: &[f32], taps: &[Taps; N]) {
+    // With a weight of 0 at one end all places take the same values, and become vectors.
+    let mut weights = [[0.0; 2 * REACH + 1]; N];
+    for (weights, Taps { first, weights: four }) in weights.iter_mut().zip(taps) {
+        weights[*first..first + 4].copy_from_slice(four);
+    }
     for (out, near) in out.as_chunks_mut::<N>().0.iter_mut().zip(line.windows(2 * REACH + 1)) {
-        for (out, Taps { first, weights }) in out.iter_mut().zip(taps) {
-            let near = &near[*first..first + 4];
-            let value = weights[0] * near[0] + weights[1] * near[1] + weights[2] * near[2] + weights[3] * near[3];
+        for (out, w) in out.iter_mut().zip(&weights) {
+            let value = w[0] * near[0] + w[1] * near[1] + w[2] * near[2] + w[3] * near[3] + w[4] * near[4];
             *out = if value > 0.0 { value } else { 0.0 };
         }
     }
+}
+
+/// Adds so much of every `N` values of a row to the one pixel that they lie in; the last may have fewer.
+#[multiversion(targets = "simd")]
+fn gather<const N: usize>(coarse: &mut [f32], row: &[f32], weight: f32) {
+    let (whole, rest) = row.as_chunks::<N>();
+    for (coarse, fine) in coarse.iter_mut().zip(whole) {
+        add_to(coarse, fine, weight);
+    }
+    if let Some(last) = coarse.get_mut(whole.len()) {
+        add_to(last, rest, weight);
+    }
+}
+
+#[inline(always)]
+fn add_to(coarse: &mut f32, fine: &[f32], weight: f32) {
+    fine.iter().for_each(|value| *coarse += weight * value);
+}
+
+/// Each value of a row `n` times.
+fn repeat_each(fine: &mut [f32], row: &[f32], n: usize) {
+    match n {
+        1 => fine.copy_from_slice(row),
+        2 => repeat::<2>(fine, row),
+        _ => fine.chunks_exact_mut(n).zip(row).for_each(|(fine, value)| fine.fill(*value)),
+    }
+}
+
+/// Each value of a row `N` times.
+#[multiversion(targets = "simd")]
+fn repeat<const N: usize>(fine: &mut [f32], row: &[f32]) {
+    fine.as_chunks_mut::<N>().0.iter_mut().zip(row).for_each(|(fine, value)| *fine = [*value; N]);
 }
 
 #[multiversion(targets = "simd")]
@@ -242,6 +314,23 @@ fn sum(values: &[f32]) -> f64 {
         }
     }
     parts.iter().sum::<f64>() + rest.iter().map(|value| f64::from(*value)).sum::<f64>()
+}
+
+/// The sum of values beside others that are at least so high; in sixteen partial sums.
+#[multiversion(targets = "simd")]
+fn sum_where(values: &[f32], others: &[f32], least: f32) -> f64 {
+    const PARTS: usize = 16;
+    let mut parts = [0.0_f64; PARTS];
+    let kept = |value: f32, other: f32| f64::from(if other >= least { value } else { 0.0 });
+    let others = &others[..values.len()];
+    let ((values, last), (others, others_last)) = (values.as_chunks::<PARTS>(), others.as_chunks::<PARTS>());
+    for (values, others) in values.iter().zip(others) {
+        for l in 0..PARTS {
+            parts[l] += kept(values[l], others[l]);
+        }
+    }
+    let rest: f64 = last.iter().zip(others_last).map(|(value, other)| kept(*value, *other)).sum();
+    parts.iter().sum::<f64>() + rest
 }
 
 /// The part of a polygon that lies in a rectangle, cut side by side (Sutherland and Hodgman, doi:10.1145/360767.360802).
@@ -334,6 +423,34 @@ mod tests {
                 [centre[0] + radius * libm::cos(angle), centre[1] + radius * libm::sin(angle)]
             })
             .collect()
+    }
+
+    #[test]
+    fn sums_are_taken_where_tiles_meet_and_the_other_is_high() {
+        let values = |count: usize| (0..count).map(|i| ((i * 37) % 101) as f32 / 101.0).collect::<Vec<f32>>();
+        let tile = Tile { origin: [3, -2], width: 40, values: values(40 * 17) };
+        for (origin, step) in [
+            ([3, -2], 1),
+            ([-9, 4], 1),
+            ([20, -11], 1),
+            ([1, -3], 2),
+            ([-9, 2], 2),
+            ([9, -5], 3),
+            ([0, 0], 4),
+            ([70, 0], 1),
+            ([3, 30], 1),
+        ] {
+            sums(&tile, &Tile { origin, width: 25, values: values(25 * 21) }, step);
+        }
+    }
+
+    fn sums(tile: &Tile, other: &Tile, step: usize) {
+        let mut wide = tile.blank();
+        wide.meet(&other.clone().repeated(step), |row, values| row.copy_from_slice(values));
+        let high = tile.values.iter().zip(&wide.values).filter(|(_, other)| **other >= 0.5);
+        let slow: f64 = high.map(|(value, _)| f64::from(*value)).sum();
+        let found = tile.sum_where(other, step, 0.5);
+        assert!((found - slow).abs() < 1e-9 * slow.max(1.0), "{:?} {step}: {found} {slow}", other.origin);
     }
 
     #[test]

@@ -319,7 +319,7 @@ impl BrightFieldPath {
         if let (Some(feather), true) = (&self.restoration, imaged.clone().count() > 0) {
             let mut mask = vec![0.0; window.width * window.height];
             for piece in imaged {
-                add(&mut mask, window, &binary(&piece.coverage), 1.0);
+                add(&mut mask, window, &binary(&piece.coverage).repeated(piece.cover_step), 1.0);
             }
             // Eq. 16: C′ = C ∗ G_σ.
             loaded.restored = feather.blur(&mask, window.width, Border::Zero);

@@ -85,29 +85,25 @@ impl Mixer {
     /// The share that each piece has, over what it covers, in what the whole object absorbs of each channel's light.
     pub(super) fn shares(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
         let pieces = &phantom.pieces;
-        let share = |piece: &Piece, strengths: &[f32], own: f32| {
-            // What has no parts is all of it, whatever stains it.
-            if pieces.len() == 1 || piece.part == Part::Whole {
-                return 1.0;
+        // Sums of what each piece absorbs where one of them covers.
+        let within = |piece: &Piece| -> Vec<f64> {
+            pieces.iter().map(|other| other.absorbance.sum_where(&piece.coverage, piece.cover_step, COVERED)).collect()
+        };
+        // What has no parts is all of it, whatever stains it.
+        let is_all = |piece: &Piece| pieces.len() == 1 || piece.part == Part::Whole;
+        let sums: Vec<Vec<f64>> =
+            pieces.iter().map(|piece| if is_all(piece) { Vec::new() } else { within(piece) }).collect();
+        let share = |own: usize, strengths: &[f64]| {
+            let whole: f64 = sums[own].iter().zip(strengths).map(|(sum, strength)| sum * strength).sum();
+            match sums[own].get(own) {
+                None => 1.0,
+                Some(sum) if whole > 0.0 => sum * strengths[own] / whole,
+                Some(_) => 0.0,
             }
-            let tile = &piece.absorbance;
-            let window = Window { origin: tile.origin, width: tile.width, height: tile.height() };
-            let mut whole = vec![0.0; window.samples()];
-            for (other, strength) in pieces.iter().zip(strengths) {
-                add(&mut whole, window, &other.absorbance, *strength);
-            }
-            let mut sums = [0.0; 2];
-            for ((cover, value), whole) in piece.coverage.values.iter().zip(&tile.values).zip(&whole) {
-                if *cover >= COVERED {
-                    sums[0] += f64::from(own * value);
-                    sums[1] += f64::from(*whole);
-                }
-            }
-            if sums[1] > 0.0 { sums[0] / sums[1] } else { 0.0 }
         };
         let of_channel = |channel: usize| {
-            let strengths: Vec<f32> = pieces.iter().map(|piece| self.absorbance(&piece.dyes, channel) as f32).collect();
-            pieces.iter().zip(&strengths).map(|(piece, own)| share(piece, &strengths, *own)).collect()
+            let strengths: Vec<f64> = pieces.iter().map(|piece| self.absorbance(&piece.dyes, channel)).collect();
+            (0..pieces.len()).map(|own| share(own, &strengths)).collect()
         };
         (0..self.channels()).map(of_channel).collect()
     }

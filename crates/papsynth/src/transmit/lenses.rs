@@ -37,7 +37,7 @@ impl Lenses {
             return Ok(lens);
         }
         let microscope = Microscope::new(params).map_err(|e| format!("optics: {e}"))?;
-        let imager = PatchImager::new(&microscope, self.fft);
+        let imager = PatchImager::new(&microscope);
         let lens = Arc::new(Lens { params: params.clone(), fft: self.fft, imager });
         if known.len() == REMEMBERED {
             known.remove(0);

@@ -96,7 +96,7 @@ pub(super) fn add_cytoskeleton(
     const FIBRE_UM: f64 = 0.3;
     let origin = absorbance.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
-    let rivers = studio.skeleton.grow(&local, rng).map_err(|e| e.to_string())?;
+    let rivers = studio.cytoskeletons.grow(&local, rng)?;
     let mut lines = vec![0.0; absorbance.values.len()];
     let line = LineParams { width_px: (FIBRE_UM / pixel_um).max(1.0), ..LineParams::default() };
     draw_into(&mut lines, absorbance.width, &rivers, &line).map_err(|e| e.to_string())?;
@@ -116,6 +116,7 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
     let (width, height) = (absorbance.width, absorbance.height());
     // As many tries as would put the wanted number inside a box that the cell fills.
     let box_um2 = (width * height) as f64 * pixel_um * pixel_um;
+    let mut across = Vec::new();
     for _ in 0..random::count(wanted as f64 * box_um2 / area_um2.max(1e-9)) {
         let (x, y) = (random::between(0.0, width as f64, rng), random::between(0.0, height as f64, rng));
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
@@ -123,12 +124,15 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
         let reach = (3.0 * sigma).ceil();
         #[expect(clippy::cast_possible_truncation, reason = "a few pixels round a place in a tile")]
         let span = |at: f64| ((at - reach) as i64).max(0)..(at + reach) as i64 + 1;
+        let fall = |away: f64| libm::exp(-away * away / (2.0 * sigma * sigma));
+        across.clear();
+        across.extend(span(x).take_while(|px| *px < width as i64).map(|px| fall(px as f64 - x)));
+        let left = usize::try_from(span(x).start).unwrap_or(0);
         for py in span(y).take_while(|py| *py < height as i64) {
-            for px in span(x).take_while(|px| *px < width as i64) {
-                let (dx, dy) = (px as f64 - x, py as f64 - y);
-                let value = strength * libm::exp(-(dx * dx + dy * dy) / (2.0 * sigma * sigma));
-                let at = usize::try_from(py).unwrap_or(0) * width + usize::try_from(px).unwrap_or(0);
-                absorbance.values[at] += value as f32;
+            let peak = strength * fall(py as f64 - y);
+            let at = usize::try_from(py).unwrap_or(0) * width + left;
+            for (value, across) in absorbance.values[at..].iter_mut().zip(&across) {
+                *value += (peak * across) as f32;
             }
         }
     }

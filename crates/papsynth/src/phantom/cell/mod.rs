@@ -199,10 +199,18 @@ fn finish(
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
     let area_px = coverage.sum() * (step * step) as f64;
-    let (absorbance, coverage) = (absorbance.refined(step), coverage.repeated(step));
+    let absorbance = absorbance.refined(step);
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE);
-    let dyes = body.dyes;
-    let cytoplasm = Piece { part: Part::Cytoplasm, absorbance, coverage, area_px, imaged: false, dyes, phase_rad };
+    let cytoplasm = Piece {
+        part: Part::Cytoplasm,
+        absorbance,
+        coverage,
+        cover_step: step,
+        area_px,
+        imaged: false,
+        dyes: body.dyes,
+        phase_rad,
+    };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 

@@ -148,7 +148,7 @@ pub(super) fn roughened(outline: &[Point], depth_px: f64, step_px: f64, rng: &mu
         return outline.to_vec();
     }
     let count = random::count(fsd_shape::perimeter(outline) / step_px).max(outline.len());
-    let fine = fsd_shape::resample(outline, count);
+    let fine = fsd_shape::resample_along(outline, count);
     // Slow waves say where the rim is frayed, quick ones how: a first-order autoregression of either.
     let (mut slow, mut quick, mut middle) = (random::normal(rng), random::normal(rng), random::normal(rng));
     let step = |state: f64, memory: f64, rng: &mut Stream| {

@@ -34,7 +34,8 @@ pub(super) fn add(
     rng: &mut Stream,
 ) {
     let step = STEP_UM / pixel_um;
-    let rim = if detail.wrinkles > 0 { fsd_shape::resample(outline, steps_round(outline, step)) } else { Vec::new() };
+    let rim =
+        if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round(outline, step)) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     let mut canvas = vec![0.0; thickness.values.len()];
     for _ in 0..detail.wrinkles {
@@ -166,33 +167,20 @@ impl Brush {
     fn draw(&self, path: &[Point], thickness: &mut Tile, coverage: &Tile, canvas: &mut [f32]) {
         let (width, height) = (thickness.width, thickness.height());
         let origin = thickness.origin.map(|at| at as f64);
-        // First column, row; beyond the last ones.
-        let mut touched = [width, height, 0, 0];
+        // Of each row the columns that it meets.
+        let mut touched = vec![width..0; height];
         for (index, (ends, uneven)) in path.windows(2).zip(&self.uneven).enumerate() {
             let ends = [ends[0], ends[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
             let t = (index as f64 + 0.5) / (path.len() - 1) as f64;
             let fade = (t / self.rise).min((1.0 - t) / self.fall).min(1.0);
             let strength = self.strength * fade * (2.0 - fade) * uneven;
-            if strength <= 0.0 {
-                continue;
-            }
-            let strip = self.strip(ends, strength);
-            let rows = strip.rows(height);
-            let [first, end] = strip.paint(canvas, width, rows.clone());
-            if first < end {
-                touched[0] = touched[0].min(first);
-                touched[1] = touched[1].min(rows.start);
-                touched[2] = touched[2].max(end);
-                touched[3] = touched[3].max(rows.end);
+            if strength > 0.0 {
+                self.strip(ends, strength).paint(canvas, width, &mut touched);
             }
         }
-        let [left, top, right, bottom] = touched;
-        for row in (top..bottom).map(|y| y * width + left..y * width + right) {
-            let pixels = thickness.values[row.clone()].iter_mut().zip(&coverage.values[row.clone()]);
-            for ((value, cover), added) in pixels.zip(&mut canvas[row]) {
-                *value += if *cover > 0.0 { *added } else { 0.0 };
-                *added = 0.0;
-            }
+        for (y, columns) in touched.into_iter().enumerate().filter(|(_, columns)| !columns.is_empty()) {
+            let row = y * width + columns.start..y * width + columns.end;
+            settle(&mut thickness.values[row.clone()], &coverage.values[row.clone()], &mut canvas[row]);
         }
     }
 
@@ -254,20 +242,18 @@ impl Strip {
         whole(low, high, width)
     }
 
-    /// Raises the pixels of some rows to the profile across it, and says which columns those are: the first, and behind the last.
-    fn paint(&self, canvas: &mut [f32], width: usize, rows: Range<usize>) -> [usize; 2] {
-        let mut touched = [width, 0];
-        for y in rows {
+    /// Raises pixels to the profile across it, and adds their columns to those that were touched of each row.
+    fn paint(&self, canvas: &mut [f32], width: usize, touched: &mut [Range<usize>]) {
+        for y in self.rows(touched.len()) {
             let columns = self.columns(y, width);
             if columns.is_empty() {
                 continue;
             }
-            touched = [touched[0].min(columns.start), touched[1].max(columns.end)];
+            touched[y] = touched[y].start.min(columns.start)..touched[y].end.max(columns.end);
             let first = (columns.start as f64 - self.from[0]) * self.off[0] + (y as f64 - self.from[1]) * self.off[1];
             let row = &mut canvas[y * width..][columns];
             raise(row, [first as f32, self.off[0] as f32], [self.crest, self.slope], self.strength);
         }
-        touched
     }
 }
 
@@ -276,6 +262,15 @@ fn whole(low: f64, high: f64, count: usize) -> Range<usize> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to pixels of a tile")]
     let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
     clamped(low.ceil())..clamped(high.floor() + 1.0)
+}
+
+/// Adds what was painted to what is covered, and clears it.
+#[multiversion(targets = "simd")]
+fn settle(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
+    for ((value, cover), added) in thickness.iter_mut().zip(cover).zip(painted) {
+        *value += if *cover > 0.0 { *added } else { 0.0 };
+        *added = 0.0;
+    }
 }
 
 /// Raises a row to a profile, whose distances from the crest are `first + i·step`: a Gaussian crest, and a slope on the positive side.
@@ -303,7 +298,8 @@ mod tests {
             let [a, length] = [[40.3, 33.8], [7.0, 7.0]];
             let strip = brush.strip([a, [a[0] + length[0] * along[0], a[1] + length[1] * along[1]]], 0.8);
             let mut canvas = vec![0.0; width * height];
-            let touched = strip.paint(&mut canvas, width, strip.rows(height));
+            let mut touched = vec![width..0; height];
+            strip.paint(&mut canvas, width, &mut touched);
             let mut painted = 0;
             for (index, value) in canvas.iter().enumerate() {
                 let p = [(index % width) as f64 - a[0], (index / width) as f64 - a[1]];
@@ -315,7 +311,7 @@ mod tests {
                 let wanted = if inside { 0.8 * (gauss + slope) } else { 0.0 };
                 assert!((f64::from(*value) - wanted).abs() < 1e-5, "{direction}: {p:?} {value} {wanted}");
                 painted += usize::from(inside);
-                assert!(!inside || (touched[0]..touched[1]).contains(&(index % width)), "{touched:?} {index}");
+                assert!(!inside || touched[index / width].contains(&(index % width)), "{touched:?} {index}");
             }
             assert!(painted > 250, "{painted}");
         }

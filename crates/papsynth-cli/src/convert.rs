@@ -1,0 +1,28 @@
+//! `papsynth convert`: a data set in other formats.
+
+use papsynth_dataset::Progress;
+
+use crate::args::Convert;
+use crate::exit::{self, Complaint, Failure};
+use crate::interrupt::Interrupt;
+
+pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
+    if args.layout.format.is_empty() {
+        let complaint = Complaint::new("into which formats?").help("name them: --format cellpose,yolo-seg");
+        return Err(Failure::input(complaint));
+    }
+    let (layout, _) = args.layout.layout(0);
+    let interrupt = Interrupt::watch()?;
+    let report = |_: Progress| ();
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, interrupt.flag(), &report)?;
+    let out = args.out.display();
+    if outcome.stopped {
+        let message = format!("stopped; every file in {out} is whole");
+        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to write the rest")));
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
+    exit::print(&format!("{out}: {} frames written{there}\n", outcome.made))
+}

@@ -1,0 +1,191 @@
+//! `papsynth plan`: what a data set will cost.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use papsynth::Threads;
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Progress, Run, Share};
+
+use crate::args::Plan;
+use crate::exit::{self, Complaint, Failure};
+use crate::setup::Setup;
+
+/// Student's t for a two-sided interval of 95 %, for 1, 2, … degrees of freedom; beyond the table that of the normal distribution.
+const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
+
+pub(crate) fn run(args: &Plan) -> Result<(), Failure> {
+    if args.per_core_hour.is_some_and(|price| !(price >= 0.0 && price.is_finite())) {
+        return Err(Failure::input(Complaint::new("--per-core-hour: a price of 0 or more is expected")));
+    }
+    let setup = Setup::load(&args.engine, None)?;
+    let (layout, _) = args.layout.layout(args.frames);
+    let scratch = Scratch::new()?;
+    let samples = sample(args, &setup, &layout, &scratch)?;
+    exit::print(&table(args, &setup, &layout, &samples))
+}
+
+/// What the frames that were made for it cost.
+struct Samples {
+    /// Seconds of each but the first.
+    seconds: Vec<f64>,
+    /// Bytes of all, by the folder that they lie in.
+    bytes: BTreeMap<String, u64>,
+    count: u64,
+}
+
+#[expect(clippy::disallowed_methods, reason = "the time goes to whoever asks for it, and into no image")]
+fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Result<Samples, Failure> {
+    // The first frame also makes what later ones keep: it is not counted.
+    let frames = 0..args.samples + 1;
+    let layout = Layout { frames_per_shard: 1, ..layout.clone() };
+    let (map, seed) = (setup.map.as_ref(), args.engine.seed);
+    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
+    let dataset = Dataset::create_or_resume(&scratch.0, &info)?;
+    let times = Mutex::new(vec![Instant::now()]);
+    let run = Run {
+        frames: frames.clone(),
+        share: Share::ALL,
+        at_once: 1,
+        threads: Threads::One,
+        check: Check::Sizes,
+        stop: &AtomicBool::new(false),
+        profile: None,
+    };
+    let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
+    dataset.generate(&setup.engine, &run, &report).map_err(|error| match error {
+        papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
+        other => other.into(),
+    })?;
+    let times = times.into_inner().unwrap_or_else(|e| e.into_inner());
+    let seconds = times.windows(2).skip(1).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
+    let mut bytes = BTreeMap::new();
+    for shard in frames.clone() {
+        let files = dataset.whole(shard, Check::Sizes)?.map_or_else(Vec::new, |record| record.files);
+        for file in files {
+            *bytes.entry(format_of(&file.path).to_owned()).or_insert(0) += file.bytes;
+        }
+    }
+    Ok(Samples { seconds, bytes, count: frames.end })
+}
+
+/// The format that a file belongs to.
+fn format_of(path: &str) -> &str {
+    let folder = path.split('/').next().unwrap_or(path);
+    match Format::ALL.iter().find(|format| format.name() == folder) {
+        Some(format) => format.name(),
+        None if folder == "shards" || folder == "objects" => "truth",
+        None => Format::Folder.name(),
+    }
+}
+
+fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> String {
+    let (frames, count) = (args.frames as f64, samples.seconds.len() as f64);
+    let mean = samples.seconds.iter().sum::<f64>() / count;
+    let variance = samples.seconds.iter().map(|s| (s - mean) * (s - mean)).sum::<f64>() / (count - 1.0).max(1.0);
+    let t = T.get(samples.seconds.len().saturating_sub(2)).copied().unwrap_or(1.96);
+    let half = t * libm::sqrt(variance / count);
+    let hours = |seconds: f64| seconds.max(0.0) * frames / 3600.0;
+    let shards = args.frames.div_ceil(layout.frames_per_shard);
+    let mut out = String::new();
+    let mut row = |name: &str, value: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "{name:<14}{value}");
+    };
+    row("frames", format!("{} in {shards} shards of {} ({layout})", args.frames, layout.frames_per_shard));
+    row(
+        "a frame",
+        format!(
+            "{:.0} ms on one thread, {:.0} to {:.0} (95 %, {count} frames)",
+            1e3 * mean,
+            1e3 * (mean - half).max(0.0),
+            1e3 * (mean + half)
+        ),
+    );
+    row("all", format!("{:.2} core hours, {:.2} to {:.2}", hours(mean), hours(mean - half), hours(mean + half)));
+    let tasks = args.tasks.unwrap_or(1).min(shards);
+    // The slowest task has the most shards; each of its threads makes whole ones.
+    let most = shards.div_ceil(tasks).div_ceil(setup.threads as u64) * layout.frames_per_shard;
+    row(
+        "wall time",
+        format!("{} on {tasks} x {} threads", duration(mean * most.min(args.frames) as f64), setup.threads),
+    );
+    if let Some(price) = args.per_core_hour {
+        row(
+            "price",
+            format!(
+                "{:.2}, {:.2} to {:.2}",
+                price * hours(mean),
+                price * hours(mean - half),
+                price * hours(mean + half)
+            ),
+        );
+    }
+    let each = |bytes: u64| bytes as f64 / samples.count as f64;
+    for (format, bytes) in &samples.bytes {
+        row(format, format!("{:.2} MB a frame, {} in all", each(*bytes) / 1e6, size(each(*bytes) * frames)));
+    }
+    let sum: u64 = samples.bytes.values().sum();
+    row("on disk", size(each(sum) * frames));
+    if let Some(peak) = peak_memory() {
+        row("memory", format!("{} with one thread; about as much again for each further one", size(peak)));
+    }
+    out
+}
+
+/// The most memory that the program has had, bytes, where the system tells.
+fn peak_memory() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok().map(|kilobytes| kilobytes * 1024.0)
+}
+
+fn size(bytes: f64) -> String {
+    let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
+    let (unit, name) = units.into_iter().find(|(unit, _)| bytes >= *unit).unwrap_or((1.0, "bytes"));
+    format!("{:.1} {name}", bytes / unit)
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+/// A folder that vanishes.
+struct Scratch(std::path::PathBuf);
+
+impl Scratch {
+    fn new() -> Result<Self, Failure> {
+        let path = std::env::temp_dir().join(format!("papsynth-plan-{}", std::process::id()));
+        std::fs::create_dir_all(&path).map_err(|error| Failure::file("write", &path, &error))?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What cannot be removed is left to the system.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_counted_to_their_format() {
+        let of = ["images/1.png", "cellpose/nucleus/1.tif", "shards/1.json", "objects/1.csv"].map(format_of);
+        assert_eq!(of, ["folder", "cellpose", "truth", "truth"]);
+        assert_eq!(
+            (size(1.5e9), size(12.0), duration(90.0), duration(36_000.0)),
+            ("1.5 GB".to_owned(), "12.0 bytes".to_owned(), "90 s".to_owned(), "10.0 h".to_owned())
+        );
+    }
+}

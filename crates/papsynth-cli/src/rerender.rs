@@ -1,0 +1,124 @@
+//! `papsynth rerender`: the same scenes under another microscope.
+
+use std::sync::atomic::AtomicBool;
+
+use papsynth::Threads;
+use papsynth::recipe::Recipe;
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share, frames_of, truth_differs};
+use toml::Table;
+
+use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
+use crate::exit::{self, Complaint, Failure};
+use crate::interrupt::Interrupt;
+use crate::setup::Setup;
+
+/// The sections of a recipe that say how a scene is imaged, not what lies in it.
+const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
+
+pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
+    let source = Dataset::open(&args.dir)?;
+    let frames = frames_of(&source)?;
+    let seed = source.identity().seed;
+    let before = load(args, seed, false)?;
+    if before.recipe.recipe.to_toml() != source_recipe(&source)? {
+        let complaint = Complaint::new(format!("{}: this program reads its recipe otherwise", args.dir.display()));
+        return Err(Failure::input(complaint.help("a data set is rendered again by the release that made it")));
+    }
+    let after = load(args, seed, true)?;
+    let changed = changed_sections(&before.recipe.recipe, &after.recipe.recipe);
+    if let Some(section) = changed.iter().find(|section| !IMAGING.contains(&section.as_str())) {
+        let complaint =
+            Complaint::new(format!("`{section}` says what lies in a scene; rerender changes how it is imaged"));
+        return Err(Failure::input(
+            complaint.help(format!("it takes {}; for all else: papsynth generate", IMAGING.join(", "))),
+        ));
+    }
+    let (layout, _) = args.layout.layout(0);
+    let interrupt = Interrupt::watch()?;
+    let outcome = render(&after, seed, &frames, &layout, &args.out, interrupt.flag())?;
+    if let Some(difference) = truth_differs(&args.dir, &args.out)? {
+        let complaint = Complaint::new(format!("the truth is another: {difference}"));
+        return Err(Failure::input(
+            complaint.help("a finer grid (`optics.oversampling`) draws other masks; leave it as it was"),
+        ));
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let out = args.out.display();
+    exit::print(&format!(
+        "{out}: {} frames made, {} were there; the truth is that of {}\n",
+        outcome.made,
+        outcome.kept,
+        args.dir.display()
+    ))
+}
+
+/// The engine of the data set's recipe, with what is set over it or without.
+fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, Failure> {
+    let engine = EngineArgs {
+        recipe: RecipeArgs {
+            recipe: Some(args.dir.join("recipe.toml")),
+            preset: None,
+            with: if changed { args.with.clone() } else { Vec::new() },
+            camera: args.camera.filter(|_| changed),
+            set: if changed { args.set.clone() } else { Vec::new() },
+        },
+        model: Some(args.dir.join("model.json")),
+        seed,
+        threads: Some(u16::try_from(args::threads(args.threads)).unwrap_or(u16::MAX)),
+    };
+    Setup::load(&engine, None)
+}
+
+fn source_recipe(source: &Dataset) -> Result<String, Failure> {
+    let path = source.path().join("recipe.toml");
+    std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))
+}
+
+/// Names of the sections in which two recipes differ.
+fn changed_sections(before: &Recipe, after: &Recipe) -> Vec<String> {
+    let table = |recipe: &Recipe| -> Table { toml::from_str(&recipe.to_toml()).unwrap_or_default() };
+    let (before, after) = (table(before), table(after));
+    let names: std::collections::BTreeSet<&String> = before.keys().chain(after.keys()).collect();
+    names.into_iter().filter(|name| before.get(*name) != after.get(*name)).cloned().collect()
+}
+
+/// Makes frames that need not follow each other.
+pub(crate) fn render(
+    setup: &Setup,
+    seed: u64,
+    frames: &[u64],
+    layout: &Layout,
+    out: &std::path::Path,
+    stop: &AtomicBool,
+) -> Result<Outcome, Failure> {
+    let map = setup.map.as_ref();
+    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout };
+    let dataset = Dataset::create_or_resume(out, &info)?;
+    let mut sum = Outcome { kept: 0, made: 0, stopped: false };
+    for run in frames.chunk_by(|a, b| a + 1 == *b) {
+        let run = Run {
+            frames: run[0]..run[run.len() - 1] + 1,
+            share: Share::ALL,
+            at_once: setup.threads,
+            threads: Threads::One,
+            check: Check::Sizes,
+            stop,
+            profile: None,
+        };
+        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| match error {
+            papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
+            other => other.into(),
+        })?;
+        sum.kept += outcome.kept;
+        sum.made += outcome.made;
+        if outcome.stopped {
+            let message = format!("stopped; every file in {} is whole", out.display());
+            let complaint = Complaint::new(message).help("run the same command again to make the rest");
+            return Err(Failure::interrupted(complaint));
+        }
+    }
+    dataset.finish()?;
+    Ok(sum)
+}

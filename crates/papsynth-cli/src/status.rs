@@ -1,0 +1,71 @@
+//! `papsynth status` and `papsynth merge`: how much is there, and the end of the work of several.
+
+use std::ops::Range;
+
+use papsynth_dataset::{Dataset, shards_to_make};
+
+use crate::args::{Merge, Status};
+use crate::exit::{self, Complaint, Failure};
+
+pub(crate) fn run(args: &Status) -> Result<(), Failure> {
+    let dataset = Dataset::open(&args.dir)?;
+    let missing = shards_to_make(&dataset, 0..args.frames)?;
+    if args.missing {
+        let mut numbers: Vec<u64> = match args.tasks {
+            Some(tasks) => missing.iter().map(|shard| shard % tasks).collect(),
+            None => missing,
+        };
+        numbers.sort_unstable();
+        numbers.dedup();
+        let text = listed(&numbers);
+        return exit::print(&if text.is_empty() { text } else { format!("{text}\n") });
+    }
+    let all = args.frames.div_ceil(dataset.layout().frames_per_shard);
+    let whole = all - missing.len() as u64;
+    let percent = 100.0 * whole as f64 / all as f64;
+    let dir = args.dir.display();
+    exit::print(&format!("{dir}: {whole} of {all} shards are whole ({percent:.1} %)\n"))?;
+    match missing.is_empty() {
+        true => exit::print(&format!("Close it with: papsynth merge {dir} --frames {}\n", args.frames)),
+        false => exit::print(&format!("missing: {}\n", listed(&missing))),
+    }
+}
+
+pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
+    let dataset = Dataset::open(&args.dir)?;
+    let missing = shards_to_make(&dataset, 0..args.frames)?;
+    let dir = args.dir.display();
+    if !missing.is_empty() {
+        let message = format!("{dir}: {} shards are missing or damaged: {}", missing.len(), listed(&missing));
+        let help = "the command that makes the data set makes them, in any share; then merge again";
+        return Err(Failure::input(Complaint::new(message).help(help)));
+    }
+    let summary = dataset.finish()?;
+    exit::print(&format!("{dir}: {} frames\nLook at: {dir}/contact-sheet.png\n", summary.frames))
+}
+
+/// Sorted numbers as `sbatch --array` takes them.
+fn listed(numbers: &[u64]) -> String {
+    let mut ranges: Vec<Range<u64>> = Vec::new();
+    for &number in numbers {
+        match ranges.last_mut() {
+            Some(last) if last.end == number => last.end += 1,
+            _ => ranges.push(number..number + 1),
+        }
+    }
+    let text = ranges
+        .iter()
+        .map(|r| if r.end - r.start == 1 { r.start.to_string() } else { format!("{}-{}", r.start, r.end - 1) });
+    text.collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_listed_as_schedulers_take_them() {
+        assert_eq!(listed(&[0, 2, 3, 4, 9]), "0,2-4,9");
+        assert_eq!(listed(&[]), "");
+    }
+}

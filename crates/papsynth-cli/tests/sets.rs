@@ -1,0 +1,202 @@
+//! Data sets from outside: shares, schedulers, kills, conversion, verification.
+
+#[allow(dead_code, reason = "each test uses its part")]
+mod support;
+
+use std::fs;
+
+use support::{Bench, TINY};
+
+/// What `papsynth verify` prints of a whole data set after `root`.
+fn root(bench: &Bench, folder: &str, frames: u64) -> String {
+    let run = bench.good(&format!("verify {folder} --frames {frames}"));
+    run.out.lines().find_map(|line| line.strip_prefix("root ")).expect("a whole data set has a root").to_owned()
+}
+
+#[test]
+fn shares_make_what_one_run_makes_and_merging_fails_on_any_gap() {
+    let bench = Bench::new("shares");
+    let frames = format!("--frames 7 --format webdataset,cellpose --frames-per-shard 2 {TINY}");
+    bench.good(&format!("generate --out one {frames}"));
+    let whole = root(&bench, "one", 7);
+    for share in ["3/4", "0/4", "2/4"] {
+        let run = bench.good(&format!("generate --out parts {frames} --shard {share}"));
+        assert!(run.out.contains("papsynth merge parts"), "{}", run.out);
+    }
+    let run = bench.run("merge parts --frames 7");
+    assert!(run.code == 2 && run.err.contains("1 shards are missing or damaged: 1"), "{}", run.err);
+    assert_eq!(bench.good("status parts --frames 7 --missing").out, "1\n");
+    assert_eq!(bench.good("status parts --frames 7 --missing --tasks 4").out, "1\n");
+    assert!(bench.good("status parts --frames 7").out.contains("3 of 4 shards are whole (75.0 %)"));
+    let run =
+        bench.run_with(&format!("generate --out parts {frames} --shard auto/4"), &[("JOB_COMPLETION_INDEX", "1")]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    bench.good("merge parts --frames 7");
+    assert_eq!(root(&bench, "parts", 7), whole);
+    assert_eq!(bench.files("one"), bench.files("parts"));
+    let run = bench.run(&format!("generate --out parts {frames} --shard auto"));
+    assert!(run.code == 2 && run.err.contains("SLURM_ARRAY_TASK_ID"), "{}", run.err);
+}
+
+#[test]
+fn four_writers_on_the_same_shards_do_no_harm() {
+    let bench = Bench::new("writers");
+    let frames = format!("--frames 6 --format folder,webdataset --frames-per-shard 2 {TINY}");
+    bench.good(&format!("generate --out one {frames}"));
+    let children: Vec<_> = (0..4).map(|_| bench.spawn(&format!("generate --quiet --out four {frames}"))).collect();
+    for mut child in children {
+        assert!(child.wait().unwrap().success());
+    }
+    bench.good("merge four --frames 6");
+    assert_eq!(root(&bench, "four", 6), root(&bench, "one", 6));
+}
+
+/// Kills at random moments, 50 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
+#[cfg(unix)]
+#[test]
+fn whatever_is_killed_is_completed_by_the_next_run() {
+    let bench = Bench::new("kills");
+    let frames = format!("--quiet --threads 2 --frames 12 --format folder,webdataset --frames-per-shard 3 {TINY}");
+    bench.good(&format!("generate --out whole {frames}"));
+    let expected = root(&bench, "whole", 12);
+    let kills: u64 = std::env::var("PAPSYNTH_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(50);
+    let mut state = 20_261_122_u64;
+    let (mut killed, mut rounds) = (0, 0);
+    while killed < kills {
+        rounds += 1;
+        loop {
+            let mut child = bench.spawn(&format!("generate --out out {frames}"));
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            std::thread::sleep(std::time::Duration::from_micros((state >> 33) % 400_000));
+            let ended = child.try_wait().unwrap();
+            child.kill().unwrap();
+            let _ = child.wait();
+            if ended.is_some_and(|status| status.success()) {
+                break;
+            }
+            assert!(ended.is_none(), "a run that is not killed succeeds");
+            killed += 1;
+            // Every file that has its name is whole.
+            for (name, bytes) in bench.files("out") {
+                let good = fs::read(bench.path("whole").join(&name));
+                let changes = ["manifest.json", "splits.csv", "README.md", "croissant.json", "contact-sheet.png"];
+                let is_whole = good.is_ok_and(|good| good == bytes) || changes.contains(&name.as_str());
+                assert!(is_whole || name.ends_with(".tmp"), "{name} after {killed} kills");
+            }
+            if killed >= kills {
+                bench.good(&format!("generate --out out {frames}"));
+                break;
+            }
+        }
+        bench.good("clean out");
+        assert_eq!(root(&bench, "out", 12), expected, "round {rounds}");
+        fs::remove_dir_all(bench.path("out")).unwrap();
+    }
+    eprintln!("{killed} kills in {rounds} rounds");
+}
+
+#[test]
+fn damage_is_told_and_mended() {
+    let bench = Bench::new("mend");
+    let command = format!("generate --out out --frames 3 {TINY}");
+    bench.good(&command);
+    let before = bench.files("out");
+    let path = bench.path("out/labels/nucleus/000001.tif");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[200] ^= 4;
+    fs::write(&path, bytes).unwrap();
+    fs::write(bench.path("out/mine.txt"), "mine").unwrap();
+    let run = bench.run("verify out --json");
+    assert_eq!(run.code, 2);
+    let verdict: serde_json::Value = serde_json::from_str(&run.out).unwrap();
+    assert_eq!(verdict["findings"][0]["path"], "labels/nucleus/000001.tif");
+    assert_eq!(verdict["findings"][1]["mend"], "clean");
+    bench.good(&format!("{command} --verify"));
+    bench.good("clean out --strays");
+    assert_eq!(bench.files("out"), before);
+    root(&bench, "out", 3);
+}
+
+#[test]
+fn conversion_keeps_everything_but_the_format() {
+    let bench = Bench::new("convert");
+    bench.good(&format!("generate --out out --frames 3 {TINY}"));
+    bench.good(&format!("generate --out direct --frames 3 --format stardist,qupath --flatten drop {TINY}"));
+    bench.good("convert out --out converted --format qupath,stardist --flatten drop");
+    assert_eq!(bench.files("direct"), bench.files("converted"));
+    let run = bench.run("convert out --out converted --format yolo-seg");
+    assert!(run.code == 2 && run.err.contains("lies in files in another way"), "{}", run.err);
+    assert_eq!(bench.run("convert out --out other").code, 2);
+    assert_eq!(bench.run("convert none --out other --format cellpose").code, 2);
+}
+
+#[test]
+fn scenes_are_imaged_again_and_their_truth_stays() {
+    let bench = Bench::new("rerender");
+    bench.good(&format!("generate --out out --range 2..5 {TINY}"));
+    let soft = bench
+        .good("rerender out --out soft --set optics.extra_blur_um=0.8 --set stain.slide_nucleus=0.5 --camera scmos");
+    assert!(soft.out.contains("3 frames made"), "{}", soft.out);
+    let (before, after) = (bench.files("out"), bench.files("soft"));
+    for name in ["labels/nucleus/000002.tif", "labels/cytoplasm/000004.tif", "labels/layers/000003.tif"] {
+        assert_eq!(before[name], after[name], "{name}");
+    }
+    assert_ne!(before["images/000002.png"], after["images/000002.png"]);
+    let same = bench.good("rerender out --out same");
+    assert!(same.out.contains("3 frames made"), "{}", same.out);
+    assert_eq!(bench.files("same"), before);
+    let run = bench.run("rerender out --out other --set cells.intermediate.count=9");
+    assert!(run.code == 2 && run.err.contains("`cells` says what lies in a scene"), "{}", run.err);
+    let run = bench.run("rerender out --out finer --set optics.oversampling=3");
+    assert!(run.code == 0 || run.err.contains("the truth is another"), "{}", run.err);
+}
+
+#[test]
+fn a_sweep_makes_every_combination_and_one_table() {
+    let bench = Bench::new("sweep");
+    let vary = "--vary camera.full_well_e=2000,18000 --vary debris.speckles.count=0,9,30";
+    bench.good(&format!("sweep --out sweep --frames 2 {vary} {TINY}"));
+    let table = String::from_utf8(fs::read(bench.path("sweep/sweep.csv")).unwrap()).unwrap();
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), 1 + 2 * 3 * 2);
+    assert_eq!(lines[0], "set,image,slide,file,camera.full_well_e,debris.speckles.count");
+    assert_eq!(lines[12], "0005,1,0,images/000001.png,18000,30");
+    let files = bench.files("sweep");
+    // Cells do not depend on specks, nor masks on the camera.
+    assert_eq!(files["0000/labels/nucleus/000001.tif"], files["0005/labels/nucleus/000001.tif"]);
+    assert_eq!(files["0002/labels/debris/000001.tif"], files["0005/labels/debris/000001.tif"]);
+    assert_ne!(files["0000/images/000001.png"], files["0003/images/000001.png"]);
+    assert_eq!(bench.run(&format!("sweep --out other --frames 1 --vary camera.bits=8,99 {TINY}")).code, 2);
+    assert!(!bench.path("other").exists());
+}
+
+#[test]
+fn a_plan_tells_time_bytes_and_shards() {
+    let bench = Bench::new("plan");
+    let run = bench.good(&format!("plan --frames 100000 --samples 3 --tasks 10 --per-core-hour 0.05 {TINY}"));
+    for part in ["391 shards of 256", "core hours", "10 x", "price", "webdataset", "on disk"] {
+        assert!(run.out.contains(part), "{part}: {}", run.out);
+    }
+    assert!(bench.files("").is_empty(), "nothing is left");
+}
+
+#[test]
+fn scripts_are_printed_and_what_tasks_would_refuse_is_refused() {
+    let bench = Bench::new("submit");
+    let run = bench.good("submit slurm --tasks 4 --threads 2 -- --out many --frames 2000 --format webdataset");
+    for part in ["--array=0-3", "--shard auto/4", "--cpus-per-task=2", "generate --out many --frames 2000"] {
+        assert!(run.out.contains(part), "{part}: {}", run.out);
+    }
+    let run = bench.good("submit kubernetes --tasks 4 --image papsynth:1 -- --out /data/many --frames 2000");
+    for part in ["completions: 4", "backoffLimitPerIndex", "\"auto/4\"", "values: [2]"] {
+        assert!(run.out.contains(part), "{part}: {}", run.out);
+    }
+    for wrong in [
+        "submit slurm --tasks 4 -- --out many --frams 2000",
+        "submit slurm --tasks 4 -- --out many --frames 2000 --shard 0/4",
+        "submit slurm --tasks 9 -- --out many --frames 1000 --format webdataset",
+        "submit kubernetes --tasks 4 -- --out many --frames 2000",
+    ] {
+        assert_eq!(bench.run(wrong).code, 2, "{wrong}");
+    }
+}

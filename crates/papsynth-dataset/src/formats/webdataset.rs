@@ -1,0 +1,229 @@
+//! `webdataset`: tar files of many frames. The files of a frame follow each other and share their name up to the first dot:
+//! `json` (its truth as COCO, and its splits), `png` or (of a stack) `ome.tif` and `all-in-focus.png`, `cytoplasm.png` and `nucleus.png` (labels of 16 bits).
+
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::rc::Rc;
+
+use papsynth::Plane;
+use papsynth::truth::Group;
+use serde_json::{Value, json};
+
+use super::written::{differs, is_described};
+use super::{Field, Place, Sink, Written, flat};
+use crate::error::{Error, Problem};
+use crate::files::{Handle, Pending};
+use crate::flatten::Flatten;
+use crate::image_of::LIMITS;
+use crate::layout::{Form, numbered};
+use crate::record::{FileRecord, Geometry, broken};
+use crate::splits::Split;
+use crate::write::{PageWriter, Pixels, as_io, description, label_png, label_tiff, narrow};
+
+pub(super) struct Shard {
+    tar: tar::Builder<BufWriter<Handle>>,
+    pending: Pending,
+    policy: Flatten,
+    /// The planes of a stack: the tar file wants its size before its bytes.
+    stack: Option<(PageWriter<Memory>, Memory)>,
+}
+
+/// A file in memory, of which the writer has one handle and we the other.
+#[derive(Debug, Clone, Default)]
+struct Memory(Rc<RefCell<Cursor<Vec<u8>>>>);
+
+impl Write for Memory {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.borrow_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for Memory {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.0.borrow_mut().seek(position)
+    }
+}
+
+impl Shard {
+    pub(super) fn new(place: Place<'_>) -> Result<Self, Error> {
+        let pending = place.folder.pending(&tar(place.shard))?;
+        let tar = tar::Builder::new(BufWriter::with_capacity(1 << 18, pending.handle()?));
+        Ok(Self { tar, pending, policy: place.layout.flatten, stack: None })
+    }
+
+    /// Adds a file whose head tells nothing but its name and size.
+    fn add(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        let mut header = tar::Header::new_ustar();
+        header.set_size(bytes.len() as u64);
+        header.set_mode(0o644);
+        header.set_mtime(0);
+        self.tar.append_data(&mut header, name, bytes).map_err(Error::io("write", self.pending.path()))
+    }
+}
+
+pub(crate) fn tar(shard: u64) -> String {
+    format!("webdataset/{shard:06}.tar")
+}
+
+pub(super) fn image(shard: u64, index: u64, form: Form) -> String {
+    let ending = if form == Form::Stack { "ome.tif" } else { "png" };
+    format!("{}/{index:06}.{ending}", tar(shard))
+}
+
+pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
+    format!("{}/{index:06}.all-in-focus.png", tar(shard))
+}
+
+/// What is known of a frame.
+fn head(field: &Field) -> Value {
+    let split = json!({
+        "field": Split::of_field(field.geometry.key.seed, field.index()).name(),
+        "slide": Split::of_slide(field.geometry.key.seed, field.geometry.slide).name(),
+    });
+    json!({ "frame": field.summary, "split": split, "truth": field.document })
+}
+
+/// The files of a tar file, one after the other.
+pub(crate) struct Tar<'a> {
+    path: &'a Path,
+    entries: tar::Entries<'a, BufReader<File>>,
+}
+
+impl<'a> Tar<'a> {
+    pub(crate) fn new(path: &'a Path, archive: &'a mut tar::Archive<BufReader<File>>) -> Result<Self, Error> {
+        Ok(Self { path, entries: archive.entries().map_err(cannot_be_read(path))? })
+    }
+
+    /// Name and content of the next file.
+    fn next(&mut self) -> Result<Option<(String, Vec<u8>)>, Error> {
+        let Some(entry) = self.entries.next() else { return Ok(None) };
+        let entry = entry.map_err(cannot_be_read(self.path))?;
+        let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
+        let mut bytes = Vec::new();
+        entry.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(cannot_be_read(self.path))?;
+        Ok(Some((name, bytes)))
+    }
+
+    /// No further file follows.
+    pub(crate) fn end(&mut self) -> Result<(), Error> {
+        match self.next()? {
+            None => Ok(()),
+            Some((name, _)) => differs(&format!("it has a file `{}` of no frame", name.escape_default()))
+                .map_err(Error::input(self.path)),
+        }
+    }
+}
+
+/// What the system reads without complaint and is no tar file is broken.
+fn cannot_be_read(path: &Path) -> impl Fn(io::Error) -> Error {
+    move |e| match e.kind() {
+        io::ErrorKind::Other | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
+            Error::input(path)(Problem::Broken { format: "tar", message: e.to_string() })
+        }
+        _ => Error::io("read", path)(e),
+    }
+}
+
+pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
+    let (field, key) = (written.field, numbered(written.field.index()));
+    let form = Form::of(field.geometry.planes_um.len());
+    let images: &[&str] = if form == Form::Stack { &["ome.tif", "all-in-focus.png"] } else { &["png"] };
+    for part in ["json"].iter().chain(images).copied().chain(flat::GROUPS.map(Group::name)) {
+        let (name, bytes) = tar.next()?.unwrap_or_default();
+        let path = tar.path.join(&name);
+        let ending = name.strip_prefix(&format!("{key}.")).unwrap_or_default();
+        let group = flat::GROUPS.into_iter().find(|group| group.name() == part);
+        let looked = match (part, group) {
+            (_, Some(group)) if [".png", ".tif"].iter().any(|end| ending == format!("{part}{end}")) => {
+                written.labels(&bytes, &written.flat(group))
+            }
+            ("json", _) if ending == part => match serde_json::from_slice::<Value>(&bytes) {
+                Ok(found) if found == head(field) => Ok(()),
+                Ok(_) => differs("it does not say what the record and coco.json say"),
+                Err(error) => Err(broken(error)),
+            },
+            ("ome.tif", _) if ending == part => {
+                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.geometry)))
+            }
+            (_, None) if ending == part => written.picture(&bytes),
+            _ => {
+                let what = format!("it has `{}` where {key}.{part} is due", name.escape_default());
+                return differs(&what).map_err(Error::input(tar.path));
+            }
+        };
+        looked.map_err(Error::input(&path))?;
+    }
+    Ok(())
+}
+
+impl Sink for Shard {
+    fn begin(&mut self, geometry: &Geometry) -> Result<(), Error> {
+        let bytes = geometry.values() as u64 * geometry.planes_um.len() as u64 * 2;
+        self.stack = match Form::of(geometry.planes_um.len()) {
+            Form::Single => None,
+            Form::Stack => {
+                let memory = Memory::default();
+                let writer = PageWriter::new(memory.clone(), bytes);
+                Some((writer.map_err(|e| Error::io("encode", self.pending.path())(as_io(e)))?, memory))
+            }
+        };
+        Ok(())
+    }
+
+    fn plane(&mut self, plane: &Plane, geometry: &Geometry) -> Result<(), Error> {
+        let Some((writer, _)) = &mut self.stack else { return Ok(()) };
+        let text = (plane.index == 0).then(|| description(geometry));
+        let (narrow, wide);
+        let pixels = match geometry.bits {
+            ..=8 => {
+                narrow = self::narrow(&plane.grey);
+                Pixels::U8(&narrow)
+            }
+            _ => {
+                wide = &plane.grey;
+                Pixels::U16(wide)
+            }
+        };
+        let (width, channels, pixel_um) = (geometry.view.width, geometry.channels, geometry.view.pixel_um);
+        let written = writer.write(pixels, width, channels, pixel_um, text.as_deref());
+        written.map_err(|e| Error::io("encode", self.pending.path())(as_io(e)))
+    }
+
+    fn field(&mut self, field: &Field) -> Result<(), Error> {
+        let (key, view) = (numbered(field.index()), field.geometry.view);
+        let failed = |path| Error::io("encode", path);
+        let path = self.pending.path().to_owned();
+        self.add(&format!("{key}.json"), &serde_json::to_vec(&head(field)).map_err(|e| failed(&path)(e.into()))?)?;
+        match self.stack.take() {
+            None => self.add(&format!("{key}.png"), field.png().map_err(failed(&path))?)?,
+            Some((_, memory)) => {
+                self.add(&format!("{key}.ome.tif"), memory.0.borrow().get_ref())?;
+                self.add(&format!("{key}.all-in-focus.png"), field.png().map_err(failed(&path))?)?;
+            }
+        }
+        for group in flat::GROUPS {
+            let ids = self.policy.labels(field.truth, group);
+            let small = ids.iter().all(|&id| id <= u16::MAX.into());
+            let (ending, bytes) = match small {
+                true => ("png", label_png(&ids, view.width, view.pixel_um)),
+                false => ("tif", label_tiff(&ids, view.width, view.pixel_um)),
+            };
+            self.add(&format!("{key}.{}.{ending}", group.name()), &bytes.map_err(failed(&path))?)?;
+        }
+        Ok(())
+    }
+
+    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
+        let Self { tar, pending, .. } = *self;
+        let mut writer = tar.into_inner().map_err(Error::io("write", pending.path()))?;
+        writer.flush().map_err(Error::io("write", pending.path()))?;
+        drop(writer);
+        Ok(vec![pending.commit()?])
+    }
+}

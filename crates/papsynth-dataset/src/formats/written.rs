@@ -1,0 +1,115 @@
+//! A frame as it lies in the files of a format, against what the truth says must lie there.
+
+use std::cell::OnceCell;
+
+use papsynth::truth::Group;
+
+use super::Field;
+use crate::error::{Error, Problem};
+use crate::files::{Folder, sha256};
+use crate::image_of::{LIMITS, levels};
+use crate::layout::{Form, Layout};
+use crate::read::{self, LevelImage};
+
+/// A frame of which every file is read again.
+pub(crate) struct Written<'a> {
+    pub(crate) folder: &'a Folder,
+    pub(crate) layout: &'a Layout,
+    /// What is known of it from its shard's record and COCO document; its picture is not among it.
+    pub(crate) field: &'a Field<'a>,
+    /// SHA-256 of the levels of each plane, and of the picture of a stack, as the first format had them that was read.
+    planes: OnceCell<Vec<String>>,
+    picture: OnceCell<Vec<String>>,
+}
+
+impl<'a> Written<'a> {
+    pub(crate) fn new(folder: &'a Folder, layout: &'a Layout, field: &'a Field<'a>) -> Self {
+        Self { folder, layout, field, planes: OnceCell::new(), picture: OnceCell::new() }
+    }
+
+    /// Reads a file and looks at it.
+    pub(super) fn file(&self, name: &str, look: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
+        let path = self.folder.path(name);
+        look(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
+    }
+
+    /// All planes are there and of the size that the record says, and the same in every format.
+    pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
+        let planes = self.field.geometry.planes_um.len();
+        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
+        self.pages(bytes, planes, seen)
+    }
+
+    /// The one picture of a frame, the same in every format.
+    pub(super) fn picture(&self, bytes: &[u8]) -> Result<(), Problem> {
+        self.pages(bytes, 1, &self.picture)
+    }
+
+    fn pages(&self, bytes: &[u8], planes: usize, seen: &OnceCell<Vec<String>>) -> Result<(), Problem> {
+        let geometry = self.field.geometry;
+        let mut found = Vec::new();
+        LevelImage::pages(bytes, &LIMITS, |page| {
+            if [page.width, page.height()] != [geometry.view.width, geometry.view.height] {
+                return differs("it has not the size that the record says");
+            }
+            let levels = levels(page, geometry.channels);
+            if levels.len() != geometry.values() {
+                return differs("it has not the channels that the record says");
+            }
+            found.push(sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>()));
+            Ok(())
+        })?;
+        if found.len() != planes {
+            return differs(&format!("it has {} planes, the record says {planes}", found.len()));
+        }
+        match *seen.get_or_init(|| found.clone()) == found {
+            true => Ok(()),
+            false => differs("it shows other pixels than the image in another format"),
+        }
+    }
+
+    /// A label image is what the masks give.
+    pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), Problem> {
+        let found = read::label_map(bytes, &LIMITS)?;
+        is_of_masks(found.width == self.field.geometry.view.width && found.ids == ids)
+    }
+
+    /// Layers of labels are what the masks give.
+    pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), Problem> {
+        let found = read::label_pages(bytes, &LIMITS)?;
+        is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
+    }
+
+    /// The labels of a group where a pixel has one.
+    pub(super) fn flat(&self, group: Group) -> Vec<u32> {
+        self.layout.flatten.labels(self.field.truth, group)
+    }
+}
+
+/// OME-XML says sizes, channels, units and depths as `expected` does.
+pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), Problem> {
+    let found = read::description(bytes)?.unwrap_or_default();
+    let wrong =
+        ["SizeX", "SizeY", "SizeZ", "SizeC", "SizeT", "Type", "PhysicalSizeX", "PhysicalSizeY", "PhysicalSizeZ"]
+            .into_iter()
+            .find(|name| values(&found, name).ne(values(expected, name)))
+            .or_else(|| values(&found, "PositionZ").ne(values(expected, "PositionZ")).then_some("PositionZ"));
+    wrong.map_or(Ok(()), |name| differs(&format!("its OME-XML says another {name} than the record")))
+}
+
+/// All values of an attribute.
+fn values<'x>(xml: &'x str, attribute: &str) -> impl Iterator<Item = &'x str> {
+    let name = format!(" {attribute}=\"");
+    xml.match_indices(&name)
+        .map(|(at, name)| xml[at + name.len()..].split('"').next().unwrap_or_default())
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+fn is_of_masks(holds: bool) -> Result<(), Problem> {
+    if holds { Ok(()) } else { differs("it is not what the masks of coco.json give") }
+}
+
+pub(super) fn differs<T>(what: &str) -> Result<T, Problem> {
+    Err(Problem::Differs { what: what.to_owned() })
+}

@@ -1,0 +1,94 @@
+//! `yolo-seg`: a line an object, its class and the corners of its complete outline as fractions of width and height.
+//!
+//! Parts that lie apart, and holes, are joined by seams of no width: filled by the even-odd rule the polygon is the mask.
+
+use std::fmt::Write;
+
+use super::written::differs;
+use super::{Field, Files, Place, Sink, Written};
+use crate::error::Error;
+use crate::polygon::outlines;
+use crate::record::FileRecord;
+use crate::splits::Split;
+
+pub(super) struct Polygons<'a> {
+    files: Files<'a>,
+}
+
+impl<'a> Polygons<'a> {
+    pub(super) fn new(place: Place<'a>) -> Self {
+        Self { files: Files::new(place.folder) }
+    }
+}
+
+pub(super) fn image(split: Split, index: u64) -> String {
+    format!("yolo-seg/images/{}/{index:06}.png", split.name())
+}
+
+fn labels(split: Split, index: u64) -> String {
+    format!("yolo-seg/labels/{}/{index:06}.txt", split.name())
+}
+
+/// The lines of a frame. What no pixel shows has no outline, and no line.
+fn text(field: &Field) -> String {
+    let view = field.geometry.view;
+    let mut text = String::new();
+    for (object, annotation) in field.truth.objects.iter().zip(&field.document.annotations) {
+        let mut corners = Vec::new();
+        let mut seams = Vec::new();
+        for ring in outlines(&object.amodal) {
+            seams.extend(ring.first().copied());
+            corners.extend(ring.iter().copied());
+            corners.extend(ring.first().copied());
+        }
+        if corners.is_empty() {
+            continue;
+        }
+        // Back over the seams, the way they came.
+        corners.extend(seams.into_iter().rev().skip(1));
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{}", annotation.category_id - 1);
+        for [x, y] in corners {
+            let [x, y] = [f64::from(x) / view.width as f64, f64::from(y) / view.height as f64];
+            let _ = write!(text, " {x:.6} {y:.6}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+pub(super) fn check(written: &Written) -> Result<(), Error> {
+    let field = written.field;
+    let split = Split::of_slide(field.geometry.key.seed, field.geometry.slide);
+    written.file(&image(split, field.index()), |bytes| written.picture(bytes))?;
+    written.file(&labels(split, field.index()), |bytes| match bytes == text(field).as_bytes() {
+        true => Ok(()),
+        false => differs("its outlines are not those of the masks of coco.json"),
+    })
+}
+
+impl Sink for Polygons<'_> {
+    fn field(&mut self, field: &Field) -> Result<(), Error> {
+        let split = Split::of_slide(field.geometry.key.seed, field.geometry.slide);
+        self.files.png(&image(split, field.index()), field)?;
+        self.files.write(&labels(split, field.index()), text(field).as_bytes())
+    }
+
+    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
+        Ok(self.files.written)
+    }
+}
+
+/// What tells a trainer where the splits lie and what the classes are called. Without a `path`, Ultralytics starts from the folder of the
+/// file; a relative one would mean the folder of its own settings, or the one it runs in.
+pub(super) fn description(classes: &[String]) -> (String, Vec<u8>) {
+    let mut text = "# Complete (amodal) outlines; the split is that of the slide.\n".to_owned();
+    for split in Split::ALL {
+        text.push_str(&format!("{0}: images/{0}\n", split.name()));
+    }
+    text.push_str("names:\n");
+    for (number, class) in classes.iter().enumerate() {
+        text.push_str(&format!("  {number}: {}\n", serde_json::Value::from(class.as_str())));
+    }
+    ("yolo-seg/data.yaml".to_owned(), text.into_bytes())
+}

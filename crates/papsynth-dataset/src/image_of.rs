@@ -1,0 +1,59 @@
+//! The image of a frame, read back from whatever format it was written in.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+
+use crate::dataset::Dataset;
+use crate::error::{Error, Problem};
+use crate::read::{self, LevelImage, Limits};
+use crate::record::FrameSummary;
+
+/// What was written for one frame is read whole.
+pub(crate) const LIMITS: Limits =
+    Limits { max_side_px: 1 << 15, max_pixels: 1 << 30, max_file_bytes: 1 << 32, max_regions: 1 << 20 };
+
+/// The image that shows a frame in one plane: of a stack the one with everything in focus or, where that was not written, the middle
+/// plane.
+pub(crate) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
+    let [image, all_in_focus] = dataset.images_of(frame, shard);
+    let name = all_in_focus.or(image).unwrap_or_default();
+    let path = dataset.folder.path(&name);
+    let bytes = bytes(dataset, &name)?;
+    let (mut number, mut middle) = (0, None);
+    let read = LevelImage::pages(&bytes, &LIMITS, |page| {
+        if number <= frame.planes_um.len() / 2 {
+            middle = Some(page);
+        }
+        number += 1;
+        Ok(())
+    });
+    read.map_err(Error::input(&path))?;
+    middle.ok_or_else(|| Error::input(&path)(Problem::NoImages))
+}
+
+/// The levels of a page with as many channels as the frame has: a picture in colour whose pixels are all grey is read as grey.
+pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
+    match channels / page.channels.max(1) {
+        3 => page.levels.iter().flat_map(|&level| [level; 3]).collect(),
+        _ => page.levels,
+    }
+}
+
+/// The bytes of a file, or of one in a tar file of the data set.
+pub(crate) fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
+    let Some((tar, entry)) = name.split_once(".tar/") else {
+        return read::bytes(&dataset.folder.path(name), LIMITS.max_file_bytes);
+    };
+    let path = dataset.folder.path(&format!("{tar}.tar"));
+    let failed = |e| Error::io("read", &path)(e);
+    let mut archive = tar::Archive::new(BufReader::new(File::open(&path).map_err(failed)?));
+    for file in archive.entries().map_err(failed)? {
+        let file = file.map_err(failed)?;
+        if *file.path_bytes() == *entry.as_bytes() {
+            let mut bytes = Vec::new();
+            file.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(failed)?;
+            return Ok(bytes);
+        }
+    }
+    Err(Error::input(&path)(Problem::Broken { format: "tar", message: format!("it has no file `{entry}`") }))
+}

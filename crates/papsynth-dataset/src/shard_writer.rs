@@ -1,0 +1,330 @@
+//! One shard, frame by frame, plane by plane, in every format of the data set.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+
+use papsynth::scene::Scene;
+use papsynth::truth::{Group, Mask, Truth};
+use papsynth::{Finished, Plane};
+
+use crate::coco::{Document, Info, category_name};
+use crate::dataset::Dataset;
+use crate::error::Error;
+use crate::files::Output;
+use crate::flatten::Flatten;
+use crate::formats::{Field, Place, Sink};
+use crate::layout::{self, Form};
+use crate::record::{FORMAT_VERSION, FrameSummary, Geometry, ShardRecord, WRITER};
+use crate::table::table;
+
+/// Writes the files of one shard. Frames come one after the other, planes as they arrive; neither is kept. Dropped before it is
+/// committed, it leaves no record, and the shard counts as not made.
+pub struct ShardWriter<'a> {
+    dataset: &'a Dataset,
+    shard: u64,
+    sinks: Vec<Box<dyn Sink + 'a>>,
+    truth: TruthFiles,
+    frame: Option<Begun>,
+    done: Vec<FrameSummary>,
+}
+
+/// A frame of which planes are still to come.
+struct Begun {
+    geometry: Geometry,
+    /// Masks of the planes' saturated pixels.
+    saturated: Vec<Mask>,
+    floored: Vec<usize>,
+    /// Grey levels of a single plane.
+    picture: Vec<u16>,
+}
+
+/// COCO document and table of a shard, as they grow.
+struct TruthFiles {
+    coco: Output,
+    table: Output,
+    annotations: u64,
+    images: Vec<crate::coco::Image>,
+}
+
+impl<'a> ShardWriter<'a> {
+    pub(crate) fn new(dataset: &'a Dataset, shard: u64) -> Result<Self, Error> {
+        let folder = &dataset.folder;
+        // From now on the shard is not whole, whatever it was before.
+        let record = folder.path(&layout::record(shard));
+        match fs::remove_file(&record) {
+            Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound) => return Err(Error::io("remove", &record)(e)),
+            _ => {}
+        }
+        let place = Place { folder, layout: &dataset.layout, shard };
+        let sinks = dataset.layout.formats.iter().map(|format| format.sink(place)).collect::<Result<_, _>>()?;
+        let truth = TruthFiles::begin(dataset, shard)?;
+        Ok(Self { dataset, shard, sinks, truth, frame: None, done: Vec::new() })
+    }
+
+    /// Begins the frame of a scene, whose planes will follow.
+    ///
+    /// # Errors
+    /// If the scene is not one of this shard or not the next one, or the system refuses.
+    pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
+        self.begin_with(Geometry::of(scene))
+    }
+
+    pub(crate) fn begin_with(&mut self, geometry: Geometry) -> Result<(), Error> {
+        let index = geometry.key.index;
+        let wrong = |message: String| Err(Error::Frame { index, message });
+        if geometry.key.seed != self.dataset.identity.seed {
+            let (there, here) = (geometry.key.seed, self.dataset.identity.seed);
+            return wrong(format!("the scene is of seed {there}, the data set of {here}"));
+        }
+        let frames = self.dataset.frames_of_shard(self.shard);
+        if !frames.contains(&index) || self.done.last().is_some_and(|last| last.index >= index) {
+            return wrong(format!(
+                "shard {} has the frames {} to {}, in this order",
+                self.shard,
+                frames.start,
+                frames.end - 1
+            ));
+        }
+        if let Some(frame) = &self.frame {
+            return wrong(format!("frame {} is not finished yet", frame.geometry.key.index));
+        }
+        let (pixels, planes) = (geometry.pixels(), geometry.planes_um.len());
+        if pixels == 0 || planes == 0 {
+            return wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"));
+        }
+        for sink in &mut self.sinks {
+            sink.begin(&geometry)?;
+        }
+        let (saturated, floored) = (Vec::with_capacity(planes), Vec::with_capacity(planes));
+        self.frame = Some(Begun { geometry, saturated, floored, picture: Vec::new() });
+        Ok(())
+    }
+
+    /// Writes the next plane.
+    ///
+    /// # Errors
+    /// If it is not the next one or of another size than the scene, or the system refuses.
+    pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
+        let frame = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        frame.check_plane(plane)?;
+        for sink in &mut self.sinks {
+            sink.plane(plane, &frame.geometry)?;
+        }
+        if Form::of(frame.geometry.planes_um.len()) == Form::Single {
+            frame.picture.clone_from(&plane.grey);
+        }
+        frame.saturated.push(plane.saturated.clone());
+        frame.floored.push(plane.floored);
+        Ok(())
+    }
+
+    /// Writes everything else of the frame.
+    ///
+    /// # Errors
+    /// If planes are missing, something is of another size than the scene, or the system refuses.
+    pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
+        let frame = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        if Geometry::of(&finished.scene) != frame.geometry {
+            let other = finished.scene.key.index;
+            return Err(frame
+                .geometry
+                .wrong(format!("the truth handed over is that of another scene, of frame {other}")));
+        }
+        let sharp = match Form::of(frame.geometry.planes_um.len()) {
+            Form::Single => Vec::new(),
+            Form::Stack => rounded(&finished.all_in_focus, white(frame.geometry.bits)),
+        };
+        self.end_with(&finished.truth, sharp)
+    }
+
+    /// The same with the grey levels of the picture of a stack with everything in focus.
+    pub(crate) fn end_with(&mut self, truth: &Truth, sharp: Vec<u16>) -> Result<&FrameSummary, Error> {
+        let frame = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        frame.check(truth, &sharp)?;
+        let geometry = &frame.geometry;
+        let picture = if sharp.is_empty() { frame.picture } else { sharp };
+        let summary = summary(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
+        let files = self.dataset.images_of(&summary, self.shard);
+        let document = Document::of_frame(truth, &summary, &frame.saturated, &self.dataset.categories, files)
+            .map_err(|name| geometry.wrong(format!("the recipe knows no category `{name}`")))?;
+        let field = Field::new(geometry, &summary, truth, &document, &picture);
+        for sink in &mut self.sinks {
+            sink.field(&field)?;
+        }
+        let rows = table(truth, geometry.key.index, self.done.is_empty());
+        self.truth.add(document, &rows.map_err(|e| geometry.wrong(e.to_string()))?)?;
+        self.done.push(summary);
+        Ok(&self.done[self.done.len() - 1])
+    }
+
+    /// Gives the files their names and writes, last, the record that makes the shard whole.
+    ///
+    /// # Errors
+    /// If a frame was begun and not ended, or the system refuses.
+    pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
+        if let Some(frame) = &self.frame {
+            return Err(frame.geometry.wrong("is not finished".to_owned()));
+        }
+        let mut files = Vec::new();
+        for sink in self.sinks {
+            files.extend(sink.close()?);
+        }
+        let [coco, table] = self.truth.end()?;
+        files.extend([coco.commit()?, table.commit()?]);
+        files.sort_by(|a, b| a.path.cmp(&b.path));
+        let record = ShardRecord {
+            version: FORMAT_VERSION,
+            writer: WRITER.to_owned(),
+            identity: self.dataset.identity.clone(),
+            layout: self.dataset.layout.clone(),
+            shard: self.shard,
+            frames: self.done,
+            files,
+            sha256: String::new(),
+        }
+        .sealed();
+        let folder = &self.dataset.folder;
+        // First the files and their names, then what says that they are there.
+        folder.sync_names(&record.files)?;
+        let name = layout::record(self.shard);
+        let text = serde_json::to_vec_pretty(&record);
+        let text = text.map_err(|e| Error::io("encode", &folder.path(&name))(e.into()))?;
+        folder.sync_names([&folder.write(&name, &text)?])?;
+        Ok(record.frames)
+    }
+}
+
+fn not_begun(dataset: &Dataset, shard: u64) -> Error {
+    Error::Frame { index: dataset.frames_of_shard(shard).start, message: "no frame was begun".to_owned() }
+}
+
+impl TruthFiles {
+    fn begin(dataset: &Dataset, shard: u64) -> Result<Self, Error> {
+        let output = |name: String| Output::new(dataset.folder.pending(&name)?);
+        let mut coco = output(layout::coco(shard))?;
+        coco.bytes(b"{\"info\":")?;
+        coco.json(&Info::default())?;
+        coco.bytes(b",\"licenses\":[],\"categories\":")?;
+        coco.json(&dataset.categories)?;
+        coco.bytes(b",\"annotations\":[")?;
+        Ok(Self { coco, table: output(layout::table(shard))?, annotations: 0, images: Vec::new() })
+    }
+
+    fn add(&mut self, frame: Document, rows: &[u8]) -> Result<(), Error> {
+        let before = self.annotations;
+        for annotation in frame.annotations {
+            self.coco.bytes(if self.annotations == 0 { b"\n" } else { b",\n" })?;
+            self.coco.json(&annotation.renumbered(before))?;
+            self.annotations += 1;
+        }
+        self.images.extend(frame.images);
+        self.table.bytes(rows)
+    }
+
+    fn end(mut self) -> Result<[crate::files::Pending; 2], Error> {
+        self.coco.bytes(b"],\"images\":[")?;
+        self.coco.json_lines(self.images.iter().map(Ok))?;
+        self.coco.bytes(b"]}\n")?;
+        Ok([self.coco.into_pending()?, self.table.into_pending()?])
+    }
+}
+
+impl Begun {
+    fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
+        let (values, bits) = (self.geometry.values(), self.geometry.bits);
+        let (next, planes) = (self.saturated.len(), self.geometry.planes_um.len());
+        if plane.index != next || next >= planes {
+            let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
+            return Err(self.geometry.wrong(message));
+        }
+        self.check_size("grey levels", plane.grey.len(), values)?;
+        self.check_size("noise-free values", plane.noise_free.len(), values)?;
+        match plane.grey.iter().copied().max() {
+            Some(brightest) if brightest > white(bits) => {
+                Err(self.geometry.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything must fit to the scene before a file is written.
+    fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
+        let (view, due) = (&self.geometry.view, self.geometry.planes_um.len());
+        let wrong = |message: String| Err(self.geometry.wrong(message));
+        if self.saturated.len() != due {
+            return wrong(format!("{} of {due} planes were written", self.saturated.len()));
+        }
+        if due > 1 {
+            self.check_size("all-in-focus values", sharp.len(), self.geometry.values())?;
+        }
+        if [truth.width, truth.height] != [view.width, view.height] {
+            let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
+            return wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}"));
+        }
+        let outside = truth.objects.iter().find(|object| {
+            [&object.amodal, &object.front]
+                .iter()
+                .filter_map(|mask| mask.bounds())
+                .any(|b| (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height)
+        });
+        outside.map_or(Ok(()), |object| wrong(format!("the mask of object {} leaves the image", object.id)))
+    }
+
+    fn check_size(&self, what: &str, found: usize, values: usize) -> Result<(), Error> {
+        if found == values {
+            return Ok(());
+        }
+        let channels = self.geometry.channels;
+        let pixels = values / channels;
+        let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
+        Err(self.geometry.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
+    }
+}
+
+/// The largest grey level.
+pub(crate) fn white(bits: u32) -> u16 {
+    u16::MAX >> 16_u32.saturating_sub(bits.max(1)).min(15)
+}
+
+/// Expected grey levels as a camera without noise would give them.
+fn rounded(values: &[f32], white: u16) -> Vec<u16> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range; NaN becomes 0")]
+    let round = |v: f32| (v + 0.5).clamp(0.0, f32::from(white)) as u16;
+    values.iter().map(|&v| round(v)).collect()
+}
+
+/// Pixels of the masks of each group that one label a pixel does not show.
+fn lost(truth: &Truth, flatten: Flatten) -> BTreeMap<String, u64> {
+    Group::ALL.map(|group| (group.name().to_owned(), flatten.lost(truth, group))).into()
+}
+
+/// A frame in a few numbers.
+pub(crate) fn summary(
+    geometry: &Geometry,
+    truth: &Truth,
+    saturated: &[Mask],
+    floored: Vec<usize>,
+    flatten: Flatten,
+) -> FrameSummary {
+    let mut objects = BTreeMap::new();
+    for object in &truth.objects {
+        *objects.entry(category_name(&object.class, object.part)).or_insert(0) += 1;
+    }
+    FrameSummary {
+        index: geometry.key.index,
+        width: geometry.view.width,
+        height: geometry.view.height,
+        pixel_um: geometry.view.pixel_um,
+        bits: geometry.bits,
+        channels: geometry.channels,
+        slide: geometry.slide,
+        planes_um: geometry.planes_um.clone(),
+        saturated: saturated.iter().map(|mask| usize::try_from(mask.area()).unwrap_or(usize::MAX)).collect(),
+        floored,
+        objects,
+        truncated: truth.objects.iter().filter(|o| o.truncated).count() as u64,
+        most_layers: truth.layers().into_iter().max().unwrap_or(0),
+        lost_px: lost(truth, flatten),
+    }
+}

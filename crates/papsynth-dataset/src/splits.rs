@@ -1,0 +1,60 @@
+//! Which frames to train with, to tune with, and to test with.
+
+use sha2::{Digest, Sha256};
+
+/// A part of a data set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Split {
+    Train,
+    Val,
+    Test,
+}
+
+impl Split {
+    pub(crate) const ALL: [Self; 3] = [Self::Train, Self::Val, Self::Test];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Val => "val",
+            Self::Test => "test",
+        }
+    }
+
+    /// That of a frame by itself: fields of one slide may fall into several.
+    pub(crate) fn of_field(seed: u64, index: u64) -> Self {
+        Self::draw(seed, "field", index)
+    }
+
+    /// That of all fields of a slide, which share its stain and its light.
+    pub(crate) fn of_slide(seed: u64, slide: u64) -> Self {
+        Self::draw(seed, "slide", slide)
+    }
+
+    /// Eight in ten, one, one: decided by the number alone, so that a data set that grows keeps its splits.
+    fn draw(seed: u64, what: &str, number: u64) -> Self {
+        let hash = Sha256::digest(format!("papsynth split {seed} {what} {number}"));
+        let word = u32::from_le_bytes([hash[0], hash[1], hash[2], hash[3]]);
+        match (u64::from(word) * 10) >> 32 {
+            0..8 => Self::Train,
+            8 => Self::Val,
+            _ => Self::Test,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn splits_have_their_shares_and_slides_are_not_fields() {
+        for of in [Split::of_field, Split::of_slide] {
+            let count = |split| (0..20_000).filter(|&n| of(7, n) == split).count();
+            // Four standard deviations.
+            assert!(count(Split::Train).abs_diff(16_000) < 226);
+            assert!(count(Split::Val).abs_diff(2_000) < 170 && count(Split::Test).abs_diff(2_000) < 170);
+        }
+        assert!((0..100).any(|n| Split::of_field(7, n) != Split::of_slide(7, n)));
+    }
+}

@@ -1,0 +1,339 @@
+//! Whatever happens to a file is found.
+
+#![allow(clippy::cast_possible_truncation, reason = "the numbers are small")]
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use papsynth::model::Model;
+use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, Mend, ShardRecord, Verdict, clean, verify};
+use sha2::{Digest, Sha256};
+use support::{SEED, Scratch, contents, frame, recipe};
+
+/// A data set in all formats, of a stack and two images.
+fn make(name: &str) -> Scratch {
+    let scratch = Scratch::new(name);
+    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::ALL) };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1), frame(2, 1, 12, 1)];
+    for (shard, frames) in [(0, &frames[..2]), (1, &frames[2..])] {
+        let mut writer = dataset.shard_writer(shard).unwrap();
+        for frame in frames {
+            writer.begin(&frame.finished.scene).unwrap();
+            frame.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
+            writer.end(&frame.finished).unwrap();
+        }
+        writer.commit().unwrap();
+    }
+    dataset.finish().unwrap();
+    scratch
+}
+
+fn look(path: &Path) -> Verdict {
+    verify(path, Some(0..3)).unwrap()
+}
+
+/// Whether the finding is about this file, or about the record or manifest that names it.
+fn is_found(verdict: &Verdict, name: &str) -> bool {
+    verdict.root.is_none() && verdict.findings.iter().any(|finding| finding.path == name)
+}
+
+/// The usual little generator: which bits turn over must only be the same every time.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % end
+    }
+}
+
+#[test]
+fn a_whole_data_set_has_a_root() {
+    let (one, two) = (make("root-1"), make("root-2"));
+    let verdict = look(one.path());
+    assert_eq!((verdict.frames, verdict.findings.len()), (3, 0));
+    assert!(verdict.root.is_some());
+    assert_eq!(verdict, look(two.path()));
+    assert_eq!(verdict.files, contents(one.path()).len() as u64);
+}
+
+#[test]
+fn every_bit_that_turns_over_is_found() {
+    let scratch = make("flips");
+    let files = contents(scratch.path());
+    let mut numbers = Numbers(1);
+    // Every file in turn, so that small ones are not spared; a thousand with `PAPSYNTH_TORTURE`.
+    let count = if std::env::var_os("PAPSYNTH_TORTURE").is_some() { 1000 } else { 3 * files.len() };
+    for number in 0..count {
+        let (name, bytes) = &files[number % files.len()];
+        let mut changed = bytes.clone();
+        let bit = numbers.below(bytes.len() * 8);
+        changed[bit / 8] ^= 1 << (bit % 8);
+        fs::write(scratch.join(name), &changed).unwrap();
+        assert!(is_found(&look(scratch.path()), name), "bit {bit} of {name}");
+        fs::write(scratch.join(name), bytes).unwrap();
+    }
+    assert!(look(scratch.path()).root.is_some());
+}
+
+#[test]
+fn every_file_that_is_cut_is_found() {
+    let scratch = make("cuts");
+    let files = contents(scratch.path());
+    let mut numbers = Numbers(2);
+    for number in 0..100 {
+        let (name, bytes) = &files[number % files.len()];
+        let keep = numbers.below(bytes.len());
+        fs::write(scratch.join(name), &bytes[..keep]).unwrap();
+        assert!(is_found(&look(scratch.path()), name), "{keep} bytes of {name}");
+        fs::write(scratch.join(name), bytes).unwrap();
+    }
+}
+
+#[test]
+fn every_file_that_is_gone_or_too_many_is_found() {
+    let scratch = make("gone");
+    for (name, bytes) in contents(scratch.path()) {
+        let path = scratch.join(&name);
+        fs::remove_file(&path).unwrap();
+        if name == "manifest.json" {
+            assert!(verify(scratch.path(), None).is_err());
+        } else {
+            let verdict = look(scratch.path());
+            // Without its record a shard is not there: its frames are missing, its files too many.
+            assert!(is_found(&verdict, &name), "{name}: {verdict:?}");
+        }
+        fs::write(&path, bytes).unwrap();
+    }
+    fs::write(scratch.join("images/notes.txt"), "mine").unwrap();
+    fs::write(scratch.join("labels/.000009.tif.0123.tmp"), "half").unwrap();
+    let found = look(scratch.path()).findings;
+    let strays: Vec<(&str, Mend)> = found.iter().map(|finding| (finding.path.as_str(), finding.mend)).collect();
+    assert_eq!(strays, [("images/notes.txt", Mend::Clean), ("labels/.000009.tif.0123.tmp", Mend::Clean)]);
+    let cleaned = clean(scratch.path(), false).unwrap();
+    assert_eq!((cleaned.temporary, cleaned.strays), (1, 0));
+    assert!(scratch.join("images/notes.txt").exists());
+    assert_eq!(clean(scratch.path(), true).unwrap().strays, 1);
+    assert!(look(scratch.path()).root.is_some());
+    assert!(verify(scratch.path(), Some(0..9)).unwrap().findings[0].message.contains("frame"));
+}
+
+#[test]
+#[cfg(unix)]
+fn links_are_strays_and_lead_nowhere() {
+    let (scratch, elsewhere) = (make("links"), Scratch::new("elsewhere"));
+    fs::write(elsewhere.join("precious.txt"), "mine").unwrap();
+    std::os::unix::fs::symlink(elsewhere.path(), scratch.join("link")).unwrap();
+    let found = look(scratch.path()).findings;
+    assert_eq!(found.iter().map(|f| f.path.as_str()).collect::<Vec<_>>(), ["link"]);
+    clean(scratch.path(), true).unwrap();
+    assert!(!scratch.join("link").exists() && elsewhere.join("precious.txt").exists());
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Changes a record and mends its own hash and the manifest, so that no hash tells.
+fn lie_in_record(scratch: &Scratch, shard: u64, change: impl FnOnce(&mut ShardRecord)) {
+    let name = format!("shards/{shard:06}.json");
+    let mut record = ShardRecord::from_json(&fs::read(scratch.join(&name)).unwrap()).unwrap();
+    change(&mut record);
+    record.sha256 = String::new();
+    record.sha256 = sha256(&serde_json::to_vec(&record).unwrap());
+    let text = serde_json::to_vec_pretty(&record).unwrap();
+    fs::write(scratch.join(&name), &text).unwrap();
+    let entry = |path: &str, bytes: usize, sha: &str| {
+        format!("{{\"path\":\"{path}\",\"bytes\":{bytes},\"sha256\":\"{sha}\",\"shard\":{shard}}}")
+    };
+    let mut entries: Vec<String> =
+        record.files.iter().map(|file| entry(&file.path, file.bytes as usize, &file.sha256)).collect();
+    entries.push(entry(&name, text.len(), &sha256(&text)));
+    // The entries of a shard stand together, a line each.
+    let manifest = fs::read_to_string(scratch.join("manifest.json")).unwrap();
+    let (head, list) = manifest.split_once("\"files\":[\n").unwrap();
+    let lines: Vec<&str> = list.trim_end().trim_end_matches("]}").split(",\n").collect();
+    let is_own = |line: &&&str| line.ends_with(&format!("\"shard\":{shard}}}"));
+    let first = lines.iter().position(|line| is_own(&line)).unwrap();
+    let others = |range: &[&str]| range.iter().filter(|l| !is_own(l)).map(|&l| l.to_owned()).collect::<Vec<_>>();
+    let all = [others(&lines[..first]), entries, others(&lines[first..])].concat().join(",\n");
+    fs::write(scratch.join("manifest.json"), format!("{head}\"files\":[\n{all}]}}\n")).unwrap();
+}
+
+/// Changes a file of a shard and mends every hash.
+fn lie(scratch: &Scratch, shard: u64, name: &str, bytes: &[u8]) {
+    fs::write(scratch.join(name), bytes).unwrap();
+    lie_in_record(scratch, shard, |record| {
+        let file = record.files.iter_mut().find(|file| file.path == name).unwrap();
+        (file.bytes, file.sha256) = (bytes.len() as u64, sha256(bytes));
+    });
+}
+
+/// Puts back what was there.
+fn restore(scratch: &Scratch, files: &[(String, Vec<u8>)]) {
+    files.iter().for_each(|(name, bytes)| fs::write(scratch.join(name), bytes).unwrap());
+}
+
+fn replaced(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).expect(from);
+    [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat()
+}
+
+/// The files of a tar file, of which some are changed.
+fn tar_with(bytes: &[u8], change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) -> Vec<u8> {
+    let mut archive = tar::Archive::new(bytes);
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    for entry in archive.entries().unwrap() {
+        let mut entry = entry.unwrap();
+        let name = entry.path().unwrap().to_string_lossy().into_owned();
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        files.push((name, content));
+    }
+    change(&mut files);
+    let mut builder = tar::Builder::new(Vec::new());
+    for (name, content) in files {
+        let mut header = tar::Header::new_ustar();
+        header.set_size(content.len() as u64);
+        header.set_mode(0o644);
+        header.set_mtime(0);
+        builder.append_data(&mut header, name, content.as_slice()).unwrap();
+    }
+    builder.into_inner().unwrap()
+}
+
+/// What readers overlook, planted by somebody who mends every hash.
+#[test]
+fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
+    let scratch = make("lies");
+    let files = contents(scratch.path());
+    let of = |name: &str| files.iter().find(|(n, _)| n == name).unwrap().1.as_slice();
+    let coco = "shards/000000.coco.json";
+    // The mending itself is not what is found.
+    lie(&scratch, 0, coco, &[of(coco), b"\n"].concat());
+    let verdict = look(scratch.path());
+    assert!(verdict.root.is_some(), "{verdict:?}");
+    restore(&scratch, &files);
+
+    let mut lies: Vec<(&str, Vec<u8>)> = Vec::new();
+    let stacks = ["images/000000.ome.tif", "ome-tiff/000000.ome.tif"];
+    let tiffs = ["ome-tiff/000000.cytoplasm.ome.tif", "noise-free/000000.tif", "labels/nucleus/000000.tif"];
+    for (name, percent) in stacks.into_iter().chain(tiffs).flat_map(|name| [50, 75, 95].map(|p| (name, p))) {
+        lies.push((name, of(name)[..of(name).len() * percent / 100].to_vec()));
+    }
+    for name in stacks {
+        lies.push((name, replaced(of(name), " SizeZ=\"2\"", " SizeZ=\"9\"")));
+        lies.push((name, replaced(of(name), " PhysicalSizeX=\"0.25\"", " PhysicalSizeX=\"0.52\"")));
+    }
+    // Floating-point labels, and labels of another group, policy or frame.
+    lies.push(("labels/nucleus/000001.tif", of("noise-free/000001.tif").to_vec()));
+    lies.push(("labels/nucleus/000001.tif", of("labels/cytoplasm/000001.tif").to_vec()));
+    lies.push(("labels/layers/000000.tif", of("labels/layers/000001.tif").to_vec()));
+    lies.push(("ome-tiff/000001.nucleus.ome.tif", of("ome-tiff/000001.debris.ome.tif").to_vec()));
+    lies.push(("cellpose/nucleus/000001_masks.tif", of("cellpose/nucleus/000000_masks.tif").to_vec()));
+    lies.push(("stardist/cytoplasm/masks/000001.tif", of("stardist/nucleus/masks/000001.tif").to_vec()));
+    // Another image than in the other formats.
+    lies.push(("cellpose/nucleus/000001.tif", of("cellpose/nucleus/000000.tif").to_vec()));
+    lies.push(("qupath/000001.ome.tif", of("qupath/000000.ome.tif").to_vec()));
+    // Outlines and tables.
+    let yolo = files.iter().find(|(name, _)| name.ends_with("000001.txt")).unwrap();
+    lies.push((&yolo.0, yolo.1.split_inclusive(|&b| b == b'\n').skip(1).flatten().copied().collect()));
+    lies.push(("qupath/000000.geojson", replaced(of("qupath/000000.geojson"), "\"cell\"", "\"annotation\"")));
+    lies.push(("objects/000000.csv", replaced(of("objects/000000.csv"), "NILM", "HSIL")));
+    // COCO: a mask that is cut, and wrong boxes, areas, fronts, parents and categories.
+    let text = String::from_utf8(of(coco).to_vec()).unwrap();
+    let first = |key: &str, until: char| {
+        let at = text.find(&format!("\"{key}\":")).unwrap() + key.len() + 3;
+        (at, at + text[at..].find(until).unwrap())
+    };
+    let (from, to) = first("counts", '}');
+    lies.push((coco, [&text[..to - 3], &text[to - 1..]].concat().into_bytes()));
+    let counts = &text[from..to];
+    for (key, until, value) in [
+        ("area", ',', "7"),
+        ("bbox", ']', "[1,2,3,4"),
+        ("front_area", ',', "7"),
+        ("category_id", ',', "9"),
+        ("image_id", ',', "1"),
+        ("object_id", ',', "77"),
+        ("depth_um", ',', "9.5"),
+        ("width", ',', "71"),
+        ("file_name", ',', "\"images/000001.png\""),
+    ] {
+        let (from, to) = first(key, until);
+        lies.push((coco, [&text[..from], value, &text[to..]].concat().into_bytes()));
+    }
+    // The complete mask as what lies in front, with its area: it overlaps the cell that is nearer.
+    let (from, to) = first("front", '}');
+    let (area, _) = first("area", ',');
+    let area = text[area..].split(',').next().unwrap();
+    let front = text[from..to].replace(text[from..to].split("\"counts\":").nth(1).unwrap(), counts);
+    let lied = [&text[..from], &front, &text[to..]].concat();
+    let at = lied.find("\"front_area\":").unwrap() + 13;
+    let end = at + lied[at..].find(',').unwrap();
+    lies.push((coco, [&lied[..at], area, &lied[end..]].concat().into_bytes()));
+    // Tar files.
+    let tar = "webdataset/000000.tar";
+    lies.push((tar, of(tar)[..of(tar).len() / 2].to_vec()));
+    lies.push((tar, tar_with(of(tar), |files| drop(files.pop()))));
+    lies.push((tar, tar_with(of(tar), |files| files.push(("000009.png".to_owned(), Vec::new())))));
+    lies.push((tar, tar_with(of(tar), |files| files.swap(1, 2))));
+    lies.push((tar, tar_with(of(tar), |files| files[3].1 = files[4].1.clone())));
+    lies.push((tar, tar_with(of(tar), |files| files[0].1 = replaced(&files[0].1, "\"area\":", "\"area\":1"))));
+    lies.push((
+        tar,
+        tar_with(of(tar), |files| {
+            let image = files.iter().find(|(name, _)| name == "000000.all-in-focus.png").unwrap().1.clone();
+            files.iter_mut().find(|(name, _)| name == "000001.png").unwrap().1 = image;
+        }),
+    ));
+    for (number, (name, bytes)) in lies.iter().enumerate() {
+        lie(&scratch, 0, name, bytes);
+        let verdict = look(scratch.path());
+        assert!(verdict.root.is_none(), "lie {number} in {name}");
+        // Two files that differ are both suspect; the first is named.
+        assert!(verdict.findings.iter().all(|finding| finding.mend == Mend::Generate), "{verdict:?}");
+        restore(&scratch, &files);
+    }
+    assert!(look(scratch.path()).root.is_some());
+}
+
+#[test]
+fn a_record_that_lies_is_found() {
+    let scratch = make("records");
+    let files = contents(scratch.path());
+    let lies: [fn(&mut ShardRecord); 8] = [
+        |record| record.frames[0].planes_um.push(9.0),
+        |record| record.frames[0].planes_um[1] = 9.0,
+        |record| record.frames[1].pixel_um = 0.5,
+        |record| record.frames[1].width = 71,
+        |record| record.frames[1].lost_px.values_mut().for_each(|px| *px += 1),
+        |record| record.frames[1].objects.values_mut().for_each(|count| *count += 1),
+        |record| record.frames[0].saturated[1] = 0,
+        |record| drop(record.frames.pop()),
+    ];
+    for (number, change) in lies.into_iter().enumerate() {
+        lie_in_record(&scratch, 0, change);
+        assert!(look(scratch.path()).root.is_none(), "lie {number}");
+        restore(&scratch, &files);
+    }
+    // Each file of a shard is taken away, and out of every list.
+    for (name, _) in files.iter().filter(|(name, _)| name.contains('/') && !name.ends_with("data.yaml")) {
+        if ["shards/000000.json", "shards/000001.json"].contains(&name.as_str()) {
+            continue;
+        }
+        let record =
+            |shard| ShardRecord::from_json(&fs::read(scratch.join(&format!("shards/{shard:06}.json"))).unwrap());
+        let shard = u64::from(record(1).unwrap().files.iter().any(|file| file.path == *name));
+        lie_in_record(&scratch, shard, |record| record.files.retain(|file| file.path != *name));
+        fs::remove_file(scratch.join(name)).unwrap();
+        let verdict = look(scratch.path());
+        assert!(is_found(&verdict, name), "{name}: {verdict:?}");
+        restore(&scratch, &files);
+    }
+    assert!(look(scratch.path()).root.is_some());
+}
