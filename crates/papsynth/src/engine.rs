@@ -120,14 +120,32 @@ impl Engine {
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |message| E::from(Error::Image { index, message });
-        let desk = self.desks().pop().unwrap_or_default();
-        let mut rendering = Rendering::new(&self.studio, &self.lenses, scene, threads, desk).map_err(fail)?;
+        let mut rendering = self.rendering(scene, threads).map_err(fail)?;
         for plane in 0..rendering.planes() {
             sink(rendering.plane(plane).map_err(fail)?)?;
         }
         let (finished, desk) = rendering.finish().map_err(fail)?;
         self.desks().push(desk);
         Ok(finished)
+    }
+
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    pub(crate) fn lenses(&self) -> &Lenses {
+        &self.lenses
+    }
+
+    /// A scene on its way, in the memory of finished ones.
+    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, String> {
+        let desk = self.desks().pop().unwrap_or_default();
+        Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
+    }
+
+    /// Takes the memory of a scene back.
+    pub(crate) fn give_back(&self, rendering: Rendering) {
+        self.desks().push(rendering.into_desk());
     }
 
     fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {

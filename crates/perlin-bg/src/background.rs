@@ -124,6 +124,15 @@ impl Background {
         Ok(background)
     }
 
+    /// The same light over another part of the slide: the scatter is that of a field of view that begins at pixel `at`
+    /// (column, row) of one without end, so that neighbouring fields of one key go on in each other. Scatter that is
+    /// stretched to each image's extremes does not.
+    #[must_use]
+    pub fn on_slide(mut self, at: [i64; 2]) -> Self {
+        self.window.first = at;
+        self
+    }
+
     /// Fills `image` with transmitted light (Eqs. 8 and 9), above 0 and at most level times the brightest
     /// illumination. `image` shows the part of the field of view that begins at pixel `first` (column, row):
     /// [0, 0] for all of it.

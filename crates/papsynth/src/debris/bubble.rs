@@ -90,6 +90,10 @@ impl Thing for Bubble {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        1.05 * self.radius_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         // Surface tension keeps it round.
