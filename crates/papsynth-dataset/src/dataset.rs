@@ -261,7 +261,7 @@ impl Dataset {
 }
 
 /// Something in a folder, if it is there and not empty. What was never finished does not count.
-fn stranger(path: &Path) -> Result<Option<String>, Error> {
+pub(crate) fn stranger(path: &Path) -> Result<Option<String>, Error> {
     let entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),

@@ -57,7 +57,7 @@ pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Result<Vec<u8>, 
     writer.into_inner().map_err(|e| e.into_error().into())
 }
 
-fn part(part: Part) -> &'static str {
+pub(crate) fn part(part: Part) -> &'static str {
     match part {
         Part::Cytoplasm => "cytoplasm",
         Part::Nucleus => "nucleus",

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::key::Key;
 use crate::recipe::{Imaging, Optics, Problem};
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
-use crate::threads::Threads;
+use crate::threads::{self, Threads};
 use crate::transmit::Spread;
 use crate::truth::{Group, LabelMap, ObjectTruth};
 
@@ -74,7 +74,7 @@ pub struct PartPlane {
     pub stage_um: f64,
     /// Grey levels, row by row, the channels of a pixel side by side.
     pub grey: Vec<u16>,
-    /// The same without noise and before rounding.
+    /// The same without noise and before rounding; empty where it was not asked for.
     pub noise_free: Vec<f32>,
 }
 
@@ -231,10 +231,10 @@ impl<'a> Slide<'a> {
             let message = format!("frame {at:?} is not on the slide, which has {} x {}", frames[0], frames[1]);
             return Err(self.fail(message));
         }
-        self.expose(at, threads).map_err(|message| self.fail(message))
+        self.expose(at, threads, true).map_err(|message| self.fail(message))
     }
 
-    fn expose(&self, at: [u32; 2], threads: Threads) -> Result<SlidePart, String> {
+    fn expose(&self, at: [u32; 2], threads: Threads, noise_free: bool) -> Result<SlidePart, String> {
         let side = self.side_px();
         let origin_px = at.map(|at| at * side);
         let border = self.border_px;
@@ -258,7 +258,7 @@ impl<'a> Slide<'a> {
             planes.push(PartPlane {
                 stage_um: plane.stage_um,
                 grey: cut.of(&plane.grey, channels),
-                noise_free: cut.of(&plane.noise_free, channels),
+                noise_free: if noise_free { cut.of(&plane.noise_free, channels) } else { Vec::new() },
             });
         }
         let pixel_um = self.pixel_um();
@@ -284,6 +284,24 @@ impl<'a> Slide<'a> {
     /// # Errors
     /// As [`Slide::frame`], or if the part leaves the slide.
     pub fn part(&self, origin_px: [u32; 2], size_px: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
+        self.cut(origin_px, size_px, threads, true)
+    }
+
+    /// The same without the noise-free images, which take four times the memory of the picture.
+    ///
+    /// # Errors
+    /// As [`Slide::part`].
+    pub fn picture(&self, origin_px: [u32; 2], size_px: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
+        self.cut(origin_px, size_px, threads, false)
+    }
+
+    fn cut(
+        &self,
+        origin_px: [u32; 2],
+        size_px: [u32; 2],
+        threads: Threads,
+        noise_free: bool,
+    ) -> Result<SlidePart, Error> {
         let slide_px = self.size_px();
         let inside = (0..2).all(|axis| {
             size_px[axis] > 0 && origin_px[axis].checked_add(size_px[axis]).is_some_and(|end| end <= slide_px[axis])
@@ -296,10 +314,14 @@ impl<'a> Slide<'a> {
         }
         let side = self.side_px();
         let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;
-        let mut part = SlidePart::blank(origin_px, size_px, self.planes_um(), self.channels());
-        for row in frames(1) {
-            for column in frames(0) {
-                part.lay(&self.frame([column, row], threads)?, self.channels());
+        let mut part = SlidePart::blank(origin_px, size_px, self.planes_um(), self.channels(), noise_free);
+        let frames: Vec<[u32; 2]> =
+            frames(1).flat_map(|row| frames(0).map(move |column| [column, row])).collect();
+        // Few at a time, since each takes the memory of a picture.
+        for frames in frames.chunks(threads::count(threads)) {
+            let inner = if frames.len() > 1 { Threads::One } else { threads };
+            for frame in threads::map(threads, frames, |&at| self.expose(at, inner, noise_free)) {
+                part.lay(&frame.map_err(|message| self.fail(message))?, self.channels());
             }
         }
         let pixel_um = self.pixel_um();
@@ -323,12 +345,18 @@ fn too_far(object: &Object, reach_um: f64, most_um: f64) -> String {
 }
 
 impl SlidePart {
-    fn blank(origin_px: [u32; 2], size_px: [u32; 2], planes_um: &[f64], channels: usize) -> Self {
+    fn blank(
+        origin_px: [u32; 2],
+        size_px: [u32; 2],
+        planes_um: &[f64],
+        channels: usize,
+        noise_free: bool,
+    ) -> Self {
         let pixels = size_px[0] as usize * size_px[1] as usize;
         let plane = |stage_um: &f64| PartPlane {
             stage_um: *stage_um,
             grey: vec![0; pixels * channels],
-            noise_free: vec![0.0; pixels * channels],
+            noise_free: if noise_free { vec![0.0; pixels * channels] } else { Vec::new() },
         };
         let labels = Group::ALL.map(|_| LabelMap { width: size_px[0] as usize, ids: vec![0; pixels] });
         Self {
@@ -362,7 +390,9 @@ impl SlidePart {
         }
         for (plane, others) in self.planes.iter_mut().zip(&other.planes) {
             copy(&places, columns * channels, &mut plane.grey, &others.grey, channels);
-            copy(&places, columns * channels, &mut plane.noise_free, &others.noise_free, channels);
+            if !plane.noise_free.is_empty() {
+                copy(&places, columns * channels, &mut plane.noise_free, &others.noise_free, channels);
+            }
         }
         for (labels, others) in self.labels.iter_mut().zip(&other.labels) {
             copy(&places, columns, &mut labels.ids, &others.ids, 1);

@@ -2,6 +2,7 @@
 
 mod real;
 mod sets;
+mod slide;
 mod values;
 
 use std::ops::Range;
@@ -14,6 +15,7 @@ pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
 pub(crate) use sets::{
     Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
 };
+pub(crate) use slide::{Slide, SlideFinalize, SlideMake, SlideTile, SlideVerb};
 use values::{camera_parser, parse_range, preset_parser};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
@@ -58,6 +60,7 @@ pub(crate) enum Verb {
     Status(Status),
     Merge(Merge),
     Clean(Clean),
+    Slide(Box<Slide>),
     Study(Box<Study>),
     Schema(SchemaArgs),
     Completions(Completions),

@@ -86,6 +86,14 @@ pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {
     Ok(range)
 }
 
+/// Two whole numbers.
+pub(super) fn parse_pair(text: &str) -> Result<[u32; 2], String> {
+    let expected = "expected two whole numbers, such as 1024,768";
+    let (first, second) = text.split_once([',', 'x']).ok_or(expected)?;
+    let number = |part: &str| part.trim().parse::<u32>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    Ok([number(first)?, number(second)?])
+}
+
 /// A name that can stand in a recipe without quotes.
 pub(super) fn parse_class(text: &str) -> Result<String, String> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';

@@ -8,7 +8,7 @@ mod cellpose;
 mod flat;
 mod folder;
 mod ome_tiff;
-mod qupath;
+pub(crate) mod qupath;
 mod stardist;
 mod webdataset;
 mod written;

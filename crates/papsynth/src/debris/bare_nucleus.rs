@@ -115,7 +115,7 @@ impl Thing for BareNucleus {
     }
 
     fn reach_um(&self, _pixel_um: f64) -> f64 {
-        (1.6 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.3) * self.radius_um
+        (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {

@@ -91,7 +91,7 @@ impl Thing for Bubble {
     }
 
     fn reach_um(&self, _pixel_um: f64) -> f64 {
-        1.05 * self.radius_um
+        1.1 * self.radius_um + 1.0
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {

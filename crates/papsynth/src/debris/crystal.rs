@@ -92,7 +92,7 @@ impl Thing for Crystal {
     }
 
     fn reach_um(&self, _pixel_um: f64) -> f64 {
-        0.7 * self.diameter_um
+        0.7 * self.diameter_um + 1.0
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {

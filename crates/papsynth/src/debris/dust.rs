@@ -76,7 +76,7 @@ impl Thing for Grain {
     }
 
     fn reach_um(&self, _pixel_um: f64) -> f64 {
-        0.65 * self.diameter_um
+        0.65 * self.diameter_um + 1.0
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {

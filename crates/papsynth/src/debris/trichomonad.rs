@@ -131,7 +131,7 @@ impl Thing for Trichomonad {
     }
 
     fn reach_um(&self, _pixel_um: f64) -> f64 {
-        self.length_um
+        1.1 * self.length_um
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {
