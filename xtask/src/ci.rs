@@ -7,23 +7,25 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
-use crate::{Chore, bench, browser, dataset, deps, equations, external, publish, shell, test, wasm};
+use crate::{Chore, bench, browser, dataset, deps, equations, external, hashes, publish, shell, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
     usage: "[--full]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full every reader there is. All steps run even if one fails; each tells its time. Where CI \
-              is set, a step that cannot run for want of Python, Chromium, valgrind or the real material (PAPSYNTH_REFERENCE) is a failure.",
+              readers, the study in a browser, wasm32, packages. With --full every reader there is, and what other processors give. All steps run even if one fails; each tells its time. Where CI \
+              is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
-/// What takes the heavier readers; at most 80 minutes with everything before.
-const FULL: [Step; 1] =
-    [("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()])))];
+/// What takes the heavier readers and compiles for other processors; at most 80 minutes with everything before.
+const FULL: [Step; 2] = [
+    ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+    ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+];
 
 /// Cheap ones first. The golden images are part of the tests.
 const STEPS: [Step; 14] = [

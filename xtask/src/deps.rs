@@ -11,8 +11,8 @@ pub(crate) const CHORE: Chore = Chore {
     name: "deps",
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
-    details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine and kinds of files, which know no one, the study the data set, the \
-              judge nobody, the program all of them, the benches what they time, the chores nobody. Dependencies of tests count too, so \
+    details: "The transforms know no one here, technique crates the transforms, the engine knows techniques alone, the data set the engine and kinds of files, which know \
+              no one, the study the data set, the judge nobody, the program all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -20,6 +20,7 @@ pub(crate) const CHORE: Chore = Chore {
 /// The place of a crate in the house.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
+    Transforms,
     Technique,
     Engine,
     Container,
@@ -29,11 +30,13 @@ enum Role {
     Study,
     Program,
     Benches,
+    Hashes,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 18] = [
+const PLACES: [(&str, Role); 20] = [
+    ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -51,6 +54,7 @@ const PLACES: [(&str, Role); 18] = [
     ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
     ("papsynth-benches", Role::Benches),
+    ("papsynth-hashes", Role::Hashes),
     ("xtask", Role::Chores),
 ];
 
@@ -63,8 +67,12 @@ impl Role {
     fn may_know(self) -> &'static [Self] {
         match self {
             // Who judges must not know what is judged, nor a kind of file what lies in it.
-            Self::Technique | Self::Container | Self::Judge | Self::Chores => &[],
+            Self::Transforms | Self::Container | Self::Judge | Self::Chores => &[],
+            // Those that compute in frequencies share the transforms.
+            Self::Technique => &[Self::Transforms],
             Self::Engine => &[Self::Technique],
+            // It must run where files and threads do not.
+            Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
@@ -81,7 +89,7 @@ impl Role {
 /// The crates that know techniques alone, for chores that build them without the rest.
 pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
     let names = workspace.packages.iter().map(|package| package.name.as_str());
-    names.filter(|name| matches!(Role::of(name), Some(Role::Technique | Role::Engine)))
+    names.filter(|name| matches!(Role::of(name), Some(Role::Transforms | Role::Technique | Role::Engine)))
 }
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {

@@ -14,6 +14,7 @@ mod equations;
 mod external;
 mod figures;
 mod golden;
+mod hashes;
 mod outcome;
 mod peers;
 mod publish;
@@ -49,6 +50,7 @@ const CHORES: &[Chore] = &[
     dataset::CHORE,
     test::CHORE,
     golden::CHORE,
+    hashes::CHORE,
     bench::CHORE,
     figures::CHORE,
     realism::CHORE,

@@ -3,10 +3,10 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::canvas::{Canvas, Memory, Samples, Spectra, absorbed_of, amplitude_of, is_lit};
-use crate::fft::fast_length;
 use crate::filter::{Filter, Lattice, incoherence};
+use crate::grid::fast_length;
 use crate::ladder::Ladder;
-use crate::lane_fft::LanePlans;
+use crate::lanes::LanePlans;
 use crate::microscope::distance;
 use crate::{Error, Microscope};
 

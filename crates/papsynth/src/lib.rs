@@ -28,7 +28,7 @@ mod threads;
 mod transmit;
 pub mod truth;
 
-pub use engine::{Arithmetic, Engine, Inputs};
+pub use engine::{Engine, Inputs};
 pub use error::Error;
 pub use frame::{Finished, Frame, Plane};
 pub use slide::Slide;

@@ -9,6 +9,6 @@ mod spectrum;
 
 pub use error::Error;
 pub use field::SpectralField;
-pub use params::{Fft, FieldParams, Padding};
+pub use params::{FieldParams, Padding};
 pub use rand_core::Rng;
 pub use spectrum::Spectrum;

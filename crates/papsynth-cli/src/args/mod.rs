@@ -138,8 +138,8 @@ pub(crate) fn threads(asked: Option<u16>) -> usize {
 
 /// Make images and their truth.
 ///
-/// The same recipe, model and seed give the same bytes, whatever the number of threads and however the frames are
-/// split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
+/// The same recipe, model and seed give the same pixels, labels and tables on any machine, whatever the number of threads and
+/// however the frames are split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
 Examples:

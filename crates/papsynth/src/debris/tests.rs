@@ -33,7 +33,7 @@ fn draw(debris: &Debris) -> Scene {
 
 /// The phantoms of everything but cells.
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
-    let maker = PoolMaker::new(spectral_field::Fft::Portable).unwrap();
+    let maker = PoolMaker::new().unwrap();
     let pools = maker.make(scene.key);
     let made = |object: &Object| Some((object.body.kind(), phantom(scene, &pools, object)?));
     scene.objects.iter().filter_map(made).collect()
