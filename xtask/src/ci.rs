@@ -1,5 +1,6 @@
 //! Everything that has to pass before a change is taken.
 
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
@@ -14,15 +15,22 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full every reader there is, and what other processors give. All steps run even if one fails; each tells its time. Where CI \
+              readers, the study in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
-/// What takes the heavier readers and compiles for other processors; at most 80 minutes with everything before.
-const FULL: [Step; 2] = [
+/// What takes heavy crates, the heavier readers, and other processors; at most 80 minutes with everything before.
+const FULL: [Step; 5] = [
+    ("heavy lints", |workspace| {
+        run_cargo(workspace.cargo_heavy("clippy").args(["--all-targets", "--", "-D", "warnings"]))
+    }),
+    ("heavy docs", |workspace| {
+        run_cargo(workspace.cargo_heavy("doc").args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    }),
+    ("heavy tests", |workspace| run_cargo(&mut workspace.cargo_heavy("test"))),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
     ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
@@ -34,7 +42,9 @@ const STEPS: [Step; 14] = [
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
     ("real material", |_| real_material()),
     ("lints", |workspace| {
-        cargo(workspace, &["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"])
+        let features = workspace.light_features();
+        let mut command = workspace.cargo_light("clippy");
+        run_cargo(command.args(["--all-targets", "--features", &features, "--", "-D", "warnings"]))
     }),
     ("documentation", documentation),
     ("tests", |workspace| chore(workspace, &test::CHORE)),
@@ -87,7 +97,11 @@ fn chore(workspace: &Workspace, chore: &Chore) -> Result<Outcome> {
 }
 
 fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<Outcome> {
-    shell::run(workspace.cargo().args(arguments))?;
+    run_cargo(workspace.cargo().args(arguments))
+}
+
+fn run_cargo(command: &mut Command) -> Result<Outcome> {
+    shell::run(command)?;
     Ok(Outcome::Done)
 }
 
@@ -112,11 +126,10 @@ fn real_material() -> Result<Outcome> {
 }
 
 fn documentation(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = workspace.cargo();
+    let mut command = workspace.cargo_light("doc");
     // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    command.args(["doc", "--workspace", "--lib", "--no-deps", "--all-features"]).env("RUSTDOCFLAGS", "-D warnings");
-    shell::run(&mut command)?;
-    Ok(Outcome::Done)
+    command.args(["--lib", "--no-deps", "--features", &workspace.light_features()]);
+    run_cargo(command.env("RUSTDOCFLAGS", "-D warnings"))
 }
 
 fn licences(workspace: &Workspace) -> Result<Outcome> {

@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 use crate::Chore;
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
-use crate::workspace::{Package, Workspace};
+use crate::workspace::{HEAVY, Package, Workspace};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "deps",
@@ -95,11 +95,26 @@ pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     print!("{}", picture(&workspace.packages));
-    let faults = faults(&workspace.packages);
+    let mut faults = faults(&workspace.packages);
+    faults.extend(unusual(workspace));
     if !faults.is_empty() {
         bail!("{}", faults.join("\n       "));
     }
     Ok(Outcome::Done)
+}
+
+/// Where the members that Cargo builds unasked are not all crates but the heavy ones.
+fn unusual(workspace: &Workspace) -> impl Iterator<Item = String> {
+    let crates = workspace.root.join("crates");
+    workspace.packages.iter().filter(move |package| package.folder.starts_with(&crates)).filter_map(|package| {
+        let name = &package.name;
+        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == name);
+        match (is_heavy, workspace.usual.contains(name)) {
+            (true, true) => Some(format!("`{name}` is heavy and must not be among the default-members: Cargo.toml")),
+            (false, false) => Some(format!("`{name}` must be among the default-members: Cargo.toml")),
+            _ => None,
+        }
+    })
 }
 
 /// Everything that is against the rules.
@@ -137,7 +152,14 @@ mod tests {
 
     fn package(name: &str, members: &[&str]) -> Package {
         let members = members.iter().map(|&member| member.to_owned()).collect();
-        Package { name: name.to_owned(), folder: "/".into(), members, targets: Vec::new() }
+        Package {
+            name: name.to_owned(),
+            id: name.to_owned(),
+            features: Vec::new(),
+            folder: "/".into(),
+            members,
+            targets: Vec::new(),
+        }
     }
 
     #[test]

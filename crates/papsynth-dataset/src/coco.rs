@@ -187,6 +187,12 @@ impl Annotation {
         Self { id: self.id + ids, parent_id: self.parent_id.map(|parent| parent + ids), ..self }
     }
 
+    /// Whether it is part of another object that is in the image.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn has_parent(&self) -> bool {
+        self.parent_id.is_some()
+    }
+
     /// The frame that it is in.
     pub(crate) fn image(&self) -> u64 {
         self.image_id

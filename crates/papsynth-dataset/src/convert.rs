@@ -11,7 +11,7 @@ use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
 use crate::generate::{Outcome, Progress};
-use crate::image_of::{LIMITS, bytes, levels};
+use crate::image_of::{LIMITS, bytes, levels, pages};
 use crate::layout::{self, Form, Layout};
 use crate::merge::document;
 use crate::read::{self, LevelImage};
@@ -163,8 +163,6 @@ impl Source {
             return self.refuse(format!("{} keeps no planes of stacks", self.dataset.layout));
         };
         let name = format.image(self.dataset.identity.seed, open.record.shard, frame);
-        let path = folder.path(&name);
-        let file = bytes(&self.dataset, &name)?;
         let mut noise_free = match self.dataset.layout.has(Format::Folder) {
             true => Some(NoiseFree::open(&folder.path(&layout::noise_free(frame.index)))?),
             false => None,
@@ -174,7 +172,7 @@ impl Source {
         let saturated = image.map_or_else(|| Ok(Vec::new()), Image::saturated).map_err(Error::input(&coco))?;
         let mut index = 0;
         let mut failure = None;
-        let read = LevelImage::pages(&file, &LIMITS, |page| {
+        let read = pages(&self.dataset, &name, frame, |page| {
             let values = frame.width * frame.height * frame.channels;
             let grey = levels(page, frame.channels);
             let done = || -> Result<(), Error> {
@@ -201,7 +199,7 @@ impl Source {
         });
         match (failure, read) {
             (Some(error), _) => Err(error),
-            (None, read) => read.map_err(Error::input(&path)),
+            (None, read) => read,
         }
     }
 

@@ -90,6 +90,9 @@ impl Dataset {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });
         }
+        if let Some(format) = layout.formats.iter().find(|format| format.needs().is_some()) {
+            return Err(format.missing(path));
+        }
         let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
         match stranger(path)? {

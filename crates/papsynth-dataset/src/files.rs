@@ -383,17 +383,12 @@ mod tests {
 
     use super::*;
     use crate::support::{SEED, Scratch, contents, frame, recipe};
-    use crate::{Dataset, DatasetInfo, Layout};
+    use crate::{Dataset, DatasetInfo, Format, Layout};
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {
-        let info = DatasetInfo {
-            recipe: &recipe(),
-            model: &Model::builtin(),
-            seed: SEED,
-            map: None,
-            layout: &Layout::default(),
-        };
+        let layout = Layout::new([Format::Folder, Format::OmeZarr].into_iter().filter(|f| f.needs().is_none()));
+        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
         let dataset = Dataset::create_or_resume(path, &info)?;
         if dataset.whole(0, Check::Sizes)?.is_none() {
             let frame = frame(0, 2, 8, 1);

@@ -5,8 +5,15 @@ use std::io::{BufReader, Read};
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Problem};
+#[cfg(not(feature = "zarr"))]
+use crate::formats::Format;
+use crate::formats::ZARR_GROUP;
+#[cfg(feature = "zarr")]
+use crate::formats::read_planes;
 use crate::read::{self, LevelImage, Limits};
 use crate::record::FrameSummary;
+#[cfg(feature = "zarr")]
+use crate::record::Geometry;
 
 /// What was written for one frame is read whole.
 pub(crate) const LIMITS: Limits =
@@ -18,17 +25,35 @@ pub(crate) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Re
     let [image, all_in_focus] = dataset.images_of(frame, shard);
     let name = all_in_focus.or(image).unwrap_or_default();
     let path = dataset.folder.path(&name);
-    let bytes = bytes(dataset, &name)?;
     let (mut number, mut middle) = (0, None);
-    let read = LevelImage::pages(&bytes, &LIMITS, |page| {
+    pages(dataset, &name, frame, |page| {
         if number <= frame.planes_um.len() / 2 {
             middle = Some(page);
         }
         number += 1;
         Ok(())
-    });
-    read.map_err(Error::input(&path))?;
+    })?;
     middle.ok_or_else(|| Error::input(&path)(Problem::NoImages))
+}
+
+/// Hands over the pages of an image of a frame, one after the other.
+pub(crate) fn pages(
+    dataset: &Dataset,
+    name: &str,
+    frame: &FrameSummary,
+    mut take: impl FnMut(LevelImage) -> Result<(), Problem>,
+) -> Result<(), Error> {
+    if !name.ends_with(ZARR_GROUP) {
+        return LevelImage::pages(&bytes(dataset, name)?, &LIMITS, take)
+            .map_err(Error::input(&dataset.folder.path(name)));
+    }
+    #[cfg(feature = "zarr")]
+    return read_planes(&dataset.folder, &Geometry::of_summary(frame, dataset.identity.seed), &mut take);
+    #[cfg(not(feature = "zarr"))]
+    {
+        let _ = (frame, &mut take);
+        Err(Format::OmeZarr.missing(dataset.path()))
+    }
 }
 
 /// The levels of a page with as many channels as the frame has: a picture in colour whose pixels are all grey is read as grey.

@@ -15,7 +15,7 @@ pub const VERSION: &str = "0.5";
 pub struct Space {
     /// Side of a pixel of the full image.
     pub pixel_um: f64,
-    /// From a plane to the next; of no meaning without an axis z.
+    /// From a plane to the next, below 0 if that lies lower; of no meaning without an axis z.
     pub step_um: f64,
     /// Where the first plane lies.
     pub first_um: f64,
@@ -102,7 +102,7 @@ impl Image {
     ///
     /// # Errors
     /// If there are other channels than the image has, a label image has another size or another number of levels than the image or is not made of
-    /// integers, its name is none or another's, or a size in µm is not a number above 0.
+    /// integers, its name is none or another's, a pixel is not above 0 µm, or a step is 0.
     pub fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         self.check()?;
         let mut attributes = self.attributes.clone();
@@ -140,8 +140,8 @@ impl Image {
         if !(pixel_um > 0.0 && pixel_um.is_finite()) {
             return argument(format!("pixel_um: {pixel_um} is not above 0"));
         }
-        if full.has[1] && !(step_um > 0.0 && step_um.is_finite() && first_um.is_finite()) {
-            return argument(format!("step_um: {step_um} from {first_um} on is not above 0"));
+        if full.has[1] && !(step_um != 0.0 && step_um.is_finite() && first_um.is_finite()) {
+            return argument(format!("step_um: {step_um} from {first_um} on does not lead to other planes"));
         }
         let mut names = BTreeSet::new();
         for Labels { name, pyramid, .. } in &self.labels {

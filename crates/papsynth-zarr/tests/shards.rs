@@ -241,6 +241,33 @@ fn indices_that_lie_and_chunks_that_swell_are_refused() {
     }
 }
 
+proptest! {
+    /// Whatever stands where chunks and index were, under a right checksum: values or an error, and nothing else.
+    #[test]
+    fn no_bytes_make_the_reader_panic(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
+        entries in prop::collection::vec((any::<prop::sample::Index>(), any::<u64>()), 0..4),
+        near in any::<bool>(),
+    ) {
+        let array = small();
+        let mut bytes = shard_bytes(&array, Shard::default(), &values(&array, |v| v as u16)).unwrap();
+        let data = bytes.len() - 3 * 2 * 16 * 16 - 4;
+        for (at, byte) in changes {
+            bytes[at.index(data)] = byte;
+        }
+        let bytes = with_index(&bytes, |index| {
+            for (at, number) in entries {
+                let at = at.index(index.len());
+                index[at] = if near { index[at].wrapping_add(number % 3).wrapping_sub(1) } else { number };
+            }
+        });
+        match read_all(&array, &bytes) {
+            Ok(found) => prop_assert_eq!(found.len(), 3 * 2 * 20 * 29),
+            Err(error) => prop_assert!(matches!(error, Error::Damaged { .. }), "{}", error),
+        }
+    }
+}
+
 #[test]
 fn a_slide_is_halved_shard_by_shard_and_then_from_its_files() {
     let tiling = Tiling { chunk: 8, shard: 16, planes: 1 };

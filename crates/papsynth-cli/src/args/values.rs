@@ -45,9 +45,17 @@ pub(super) fn grey_parser() -> impl TypedValueParser<Value = Grey> {
 
 /// Names of formats, each with what it is.
 pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
-    let names = Format::ALL.map(|format| PossibleValue::new(format.name()).help(format.about()));
-    PossibleValuesParser::new(names).try_map(|name| {
-        Format::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| format!("there is no format `{name}`"))
+    let named = |format: Format| {
+        let needs = format.needs().map(|feature| format!(" (wants a build with --features {feature})"));
+        PossibleValue::new(format.name()).help(format!("{}{}", format.about(), needs.unwrap_or_default()))
+    };
+    PossibleValuesParser::new(Format::ALL.map(named)).try_map(|name| {
+        let format = Format::ALL.into_iter().find(|f| f.name() == name);
+        let format = format.ok_or_else(|| format!("there is no format `{name}`"))?;
+        match format.needs() {
+            None => Ok(format),
+            Some(feature) => Err(format!("`--format {name}` needs a build of papsynth with `--features {feature}`")),
+        }
     })
 }
 

@@ -8,17 +8,22 @@ mod cellpose;
 mod flat;
 mod folder;
 mod ome_tiff;
+#[cfg(feature = "zarr")]
+mod ome_zarr;
 pub(crate) mod qupath;
 mod stardist;
 mod webdataset;
 mod written;
 mod yolo;
 
+#[cfg(feature = "zarr")]
+pub(crate) use ome_zarr::read_planes;
 pub(crate) use webdataset::{Tar, tar};
 pub(crate) use written::Written;
 
 use std::cell::OnceCell;
 use std::io;
+use std::path::Path;
 
 use papsynth::Plane;
 use papsynth::truth::{Group, Truth};
@@ -50,12 +55,40 @@ pub enum Format {
     YoloSeg,
     /// GeoJSON, nuclei within cells, beside OME-TIFF images.
     Qupath,
+    /// OME-Zarr groups with their labels; of builds with the feature `zarr`.
+    OmeZarr,
 }
 
 impl Format {
-    /// All formats.
-    pub const ALL: [Self; 7] =
-        [Self::Folder, Self::Webdataset, Self::OmeTiff, Self::Cellpose, Self::Stardist, Self::YoloSeg, Self::Qupath];
+    /// All formats, also those that this build cannot write ([`needs`](Self::needs)).
+    pub const ALL: [Self; 8] = [
+        Self::Folder,
+        Self::Webdataset,
+        Self::OmeTiff,
+        Self::Cellpose,
+        Self::Stardist,
+        Self::YoloSeg,
+        Self::Qupath,
+        Self::OmeZarr,
+    ];
+
+    /// The formats that this build writes and reads.
+    pub fn built() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|format| format.needs().is_none())
+    }
+
+    /// The feature that a build must have to write and read it, if this one has it not.
+    #[must_use]
+    pub fn needs(self) -> Option<&'static str> {
+        (self == Self::OmeZarr && !cfg!(feature = "zarr")).then_some("zarr")
+    }
+
+    /// What to say of a data set where a format is missing.
+    pub(crate) fn missing(self, path: &Path) -> Error {
+        let (name, feature) = (self.name(), self.needs().unwrap_or_default());
+        let message = format!("the format `{name}` needs a build of papsynth with `--features {feature}`");
+        Error::Folder { path: path.to_owned(), message }
+    }
 
     /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
     #[must_use]
@@ -68,6 +101,7 @@ impl Format {
             Self::Stardist => "stardist",
             Self::YoloSeg => "yolo-seg",
             Self::Qupath => "qupath",
+            Self::OmeZarr => "ome-zarr",
         }
     }
 
@@ -82,6 +116,7 @@ impl Format {
             Self::Stardist => "images/ and masks/, for cytoplasm and for nuclei",
             Self::YoloSeg => "images/ and labels/ by split, with polygons, and data.yaml",
             Self::Qupath => "GeoJSON with nuclei within cells, beside OME-TIFF images",
+            Self::OmeZarr => "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap",
         }
     }
 
@@ -107,6 +142,10 @@ impl Format {
             Self::Stardist => Box::new(stardist::Pairs::new(place)),
             Self::YoloSeg => Box::new(yolo::Polygons::new(place)),
             Self::Qupath => Box::new(qupath::Objects::new(place)),
+            #[cfg(feature = "zarr")]
+            Self::OmeZarr => Box::new(ome_zarr::Images::new(place)),
+            #[cfg(not(feature = "zarr"))]
+            Self::OmeZarr => return Err(self.missing(place.folder.root())),
         })
     }
 
@@ -120,6 +159,10 @@ impl Format {
             Self::Stardist => stardist::check(written),
             Self::YoloSeg => yolo::check(written),
             Self::Qupath => qupath::check(written),
+            #[cfg(feature = "zarr")]
+            Self::OmeZarr => ome_zarr::check(written),
+            #[cfg(not(feature = "zarr"))]
+            Self::OmeZarr => Err(self.missing(written.folder.root())),
         }
     }
 
@@ -134,6 +177,7 @@ impl Format {
             Self::Stardist => stardist::image(Group::Cytoplasm, index),
             Self::YoloSeg => yolo::image(Split::of_slide(seed, frame.slide), index),
             Self::Qupath => qupath::image(index),
+            Self::OmeZarr => zarr_group(index),
         }
     }
 
@@ -148,7 +192,7 @@ impl Format {
 
     /// Whether it has all planes of a stack, rather than its picture with everything in focus alone.
     pub(crate) fn has_planes(self) -> bool {
-        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff)
+        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::OmeZarr)
     }
 
     /// Files that it has once in a data set.
@@ -159,6 +203,14 @@ impl Format {
         }
     }
 }
+
+/// The folder of a frame that is a group of Zarr.
+pub(crate) fn zarr_group(index: u64) -> String {
+    format!("ome-zarr/{index:06}{ZARR_GROUP}")
+}
+
+/// How the name of such a folder ends.
+pub(crate) const ZARR_GROUP: &str = ".ome.zarr";
 
 /// Where a shard is written, and how.
 #[derive(Debug, Clone, Copy)]

@@ -46,9 +46,29 @@ impl<'a> Written<'a> {
     }
 
     fn pages(&self, bytes: &[u8], planes: usize, seen: &OnceCell<Vec<String>>) -> Result<(), Problem> {
+        self.compare(planes, seen, |take| LevelImage::pages(bytes, &LIMITS, take))
+    }
+
+    /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
+    #[cfg(feature = "zarr")]
+    pub(super) fn shown(
+        &self,
+        planes: usize,
+        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
+        self.compare(planes, seen, read)
+    }
+
+    fn compare(
+        &self,
+        planes: usize,
+        seen: &OnceCell<Vec<String>>,
+        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
         let geometry = self.field.geometry;
         let mut found = Vec::new();
-        LevelImage::pages(bytes, &LIMITS, |page| {
+        read(&mut |page| {
             if [page.width, page.height()] != [geometry.view.width, geometry.view.height] {
                 return differs("it has not the size that the record says");
             }
