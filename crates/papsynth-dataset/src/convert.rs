@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use papsynth::Plane;
 
 use crate::coco::{Document, Image};
-use crate::dataset::{Dataset, recorded_shards, whole_record};
+use crate::dataset::{Dataset, recorded_shards};
 use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
@@ -138,8 +138,7 @@ impl Source {
     }
 
     fn record(&self, shard: u64) -> Result<ShardRecord, Error> {
-        let Dataset { folder, identity, layout, .. } = &self.dataset;
-        match whole_record(folder, identity, layout, shard, Check::Sizes)? {
+        match self.dataset.whole_or_flaw(shard, Check::Sizes)? {
             Ok(record) => Ok(record),
             Err(flaw) => self.refuse(format!("{flaw}; `papsynth verify` says what is wrong")),
         }

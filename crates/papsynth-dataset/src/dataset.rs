@@ -141,7 +141,12 @@ impl Dataset {
     /// # Errors
     /// If the system refuses to tell.
     pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
-        Ok(whole_record(&self.folder, &self.identity, &self.layout, shard, check)?.ok())
+        Ok(self.whole_or_flaw(shard, check)?.ok())
+    }
+
+    /// The same, or what the shard lacks.
+    pub(crate) fn whole_or_flaw(&self, shard: u64, check: Check) -> Result<Result<ShardRecord, Flaw>, Error> {
+        whole_record(&self.folder, &self.identity, &self.layout, &self.categories, shard, check)
     }
 
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
@@ -308,6 +313,7 @@ pub(crate) fn whole_record(
     folder: &Folder,
     identity: &Identity,
     layout: &Layout,
+    categories: &[Category],
     shard: u64,
     check: Check,
 ) -> Result<Result<ShardRecord, Flaw>, Error> {
@@ -326,7 +332,7 @@ pub(crate) fn whole_record(
         }
     }
     if check == Check::Hashes
-        && let Some(flaw) = contents::flaw(folder, layout, &record)?
+        && let Some(flaw) = contents::flaw(folder, layout, categories, &record)?
     {
         return Ok(Err(flaw));
     }
