@@ -46,8 +46,7 @@ pub(crate) fn flaw(
 }
 
 fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &ShardRecord) -> Result<(), Error> {
-    let names = [layout::coco(record.shard), layout::table(record.shard)].map(|name| folder.path(&name));
-    let [coco, csv] = &names;
+    let (coco, csv) = (&folder.path(&layout::coco(record.shard)), &folder.inside(&layout::table(record.shard))?);
     let document = document(folder, record.shard)?;
     if document.images.len() != record.frames.len() {
         return differs(coco, format!("it has {} images, the record {}", document.images.len(), record.frames.len()));
@@ -58,7 +57,7 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
     if document.categories != categories {
         return differs(coco, "its categories are not those of the data set".to_owned());
     }
-    let tar_path = folder.path(&tar(record.shard));
+    let tar_path = folder.inside(&tar(record.shard))?;
     let open = || match File::open(&tar_path) {
         Err(e) if e.kind() == ErrorKind::NotFound => Err(Error::input(&tar_path)(Problem::Missing { wanted: "file" })),
         opened => opened.map_err(Error::io("read", &tar_path)),

@@ -109,7 +109,7 @@ impl Source {
     /// A data set of the same identity.
     fn begin(&self, to: &Path, layout: &Layout) -> Result<Dataset, Error> {
         let Dataset { folder, identity, categories, map, .. } = &self.dataset;
-        let given = |name: &str| read::bytes(&folder.path(name), GIVEN_BYTES);
+        let given = |name: &str| read::bytes(&folder.inside(name)?, GIVEN_BYTES);
         let (recipe, model) = (given(layout::RECIPE)?, given(layout::MODEL)?);
         for (name, bytes, sha) in
             [(layout::RECIPE, &recipe, &identity.recipe_sha256), (layout::MODEL, &model, &identity.model_sha256)]
@@ -165,7 +165,7 @@ impl Source {
         let path = folder.path(&name);
         let file = bytes(&self.dataset, &name)?;
         let mut noise_free = match self.dataset.layout.has(Format::Folder) {
-            true => Some(NoiseFree::open(&folder.path(&layout::noise_free(frame.index)))?),
+            true => Some(NoiseFree::open(&folder.inside(&layout::noise_free(frame.index))?, frame.planes_um.len())?),
             false => None,
         };
         let coco = folder.path(&layout::coco(open.record.shard));
@@ -226,8 +226,8 @@ struct NoiseFree {
 }
 
 impl NoiseFree {
-    fn open(path: &Path) -> Result<Self, Error> {
-        let pages = read::float_pages(&read::bytes(path, LIMITS.max_file_bytes)?, &LIMITS);
+    fn open(path: &Path, planes: usize) -> Result<Self, Error> {
+        let pages = read::float_pages(&read::bytes(path, LIMITS.max_file_bytes)?, &LIMITS, planes);
         Ok(Self { path: path.to_owned(), pages: pages.map_err(Error::input(path))?.into_iter() })
     }
 

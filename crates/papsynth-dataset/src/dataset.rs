@@ -286,7 +286,7 @@ fn stranger(path: &Path) -> Result<Option<String>, Error> {
 
 /// The record of a shard; a missing one is an [`Problem::Missing`].
 pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
-    let path = folder.path(&layout::record(shard));
+    let path = folder.inside(&layout::record(shard))?;
     let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
     if record.shard != shard {
         let message = format!("is the record of shard {}", record.shard);
@@ -341,7 +341,7 @@ pub(crate) fn whole_record(
 
 /// Numbers of all shards with a record, in order.
 pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let path = folder.path(layout::SHARDS);
+    let path = folder.inside(layout::SHARDS)?;
     let entries = match fs::read_dir(&path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -156,7 +156,7 @@ fn splits(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error
 /// The tables one below the other, under the header of the first.
 fn tables(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     for (i, &index) in shards.iter().enumerate() {
-        let text = read::bytes(&folder.path(&layout::table(index)), SHARD_FILE_BYTES)?;
+        let text = read::bytes(&folder.inside(&layout::table(index))?, SHARD_FILE_BYTES)?;
         let header = text.iter().position(|&b| b == b'\n').map_or(text.len(), |end| end + 1);
         out(if i == 0 { &text } else { &text[header..] })?;
     }
@@ -197,7 +197,7 @@ fn json(folder: &Folder, value: &impl Serialize, out: &mut Sink) -> Result<(), E
 }
 
 pub(crate) fn document(folder: &Folder, shard: u64) -> Result<Document, Error> {
-    let path = folder.path(&layout::coco(shard));
+    let path = folder.inside(&layout::coco(shard))?;
     let bytes = read::bytes(&path, SHARD_FILE_BYTES)?;
     serde_json::from_slice(&bytes).map_err(|e| Error::input(&path)(broken(e)))
 }

@@ -161,7 +161,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
         return Ok(flaws);
     }
     // Of these streams the recipe is one that this program reads: what there may be in the images follows from it.
-    let path = folder.path(layout::RECIPE);
+    let path = folder.inside(layout::RECIPE)?;
     let text = match read::bytes(&path, GIVEN_BYTES) {
         Ok(text) if sha256(&text) == identity.recipe_sha256 => text,
         // It is missing or damaged, which has been found already.

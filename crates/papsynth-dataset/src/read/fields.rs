@@ -203,8 +203,8 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
                 group: String::new(),
                 pixel_um: Some(frame.pixel_um),
                 slide: Some(frame.slide),
-                image: folder.path(&image),
-                nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
+                image: folder.inside(&image)?,
+                nuclei: NucleiFile::Labels(folder.inside(&layout::labels(papsynth::truth::Group::Nucleus, index))?),
                 white: Some(white(frame.bits)),
             });
         }
