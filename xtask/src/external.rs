@@ -9,7 +9,7 @@ use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::python::Python;
 use crate::workspace::{self, Workspace};
-use crate::{Chore, dataset, shell};
+use crate::{Chore, dataset, shell, supply};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "external",
@@ -17,7 +17,7 @@ pub(crate) const CHORE: Chore = Chore {
     about: "has other people's programs read what we write, and judge our camera",
     details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
               Python of docs/formats runs; with --full also mlcroissant, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
-              frames of the camera presets; libjpeg compresses what our JPEG did. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
+              frames of the camera presets; libjpeg compresses what our JPEG did; with --full the bill of materials is held against the schema of CycloneDX, too. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
 
@@ -78,6 +78,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         written.push(out);
     }
     if full {
+        bill_of_materials(workspace)?;
         // Of a pyramid.
         let out = folder.join("large");
         let own = [
@@ -95,6 +96,27 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         read_zarr(workspace, written.iter().chain([&out]), &pages)?;
     }
     measure(workspace)
+}
+
+/// Has the bill of materials validated against the schema of CycloneDX 1.5.
+fn bill_of_materials(workspace: &Workspace) -> Result<()> {
+    let python = match Python::environment(workspace, "cyclonedx", "cyclonedx-python-lib[json-validation]\n")? {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => bail!("{reason}"),
+    };
+    let path = supply::write(workspace)?;
+    let first = std::fs::read(&path)?;
+    ensure!(
+        std::fs::read(supply::write(workspace)?)? == first,
+        "the bill of materials differs from one run to the next"
+    );
+    const VALIDATE: &str = "import sys
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+found = JsonStrictValidator(SchemaVersion.V1_5).validate_str(open(sys.argv[1]).read())
+sys.exit(f'not CycloneDX 1.5: {found}') if found else print('CycloneDX 1.5:', sys.argv[1])
+";
+    shell::run(Command::new(&python).args(["-c", VALIDATE]).arg(&path))
 }
 
 fn script(workspace: &Workspace, name: &str) -> Result<PathBuf> {

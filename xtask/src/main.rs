@@ -2,6 +2,7 @@
 //!
 //! Cargo and rustc do all the work; each chore is one file. Nothing here knows what a cell is.
 
+#![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a program that talks to whoever called it")]
 
 mod arguments;
@@ -21,6 +22,7 @@ mod publish;
 mod python;
 mod realism;
 mod shell;
+mod supply;
 mod test;
 mod torture;
 mod wasm;
@@ -60,6 +62,7 @@ const CHORES: &[Chore] = &[
     browser::CHORE,
     wasm::CHORE,
     publish::CHORE,
+    supply::CHORE,
     ci::CHORE,
     torture::CHORE,
 ];

@@ -144,7 +144,12 @@ impl Dataset {
     /// # Errors
     /// If the system refuses to tell.
     pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
-        Ok(whole_record(&self.folder, &self.identity, &self.layout, shard, check)?.ok())
+        Ok(self.whole_or_flaw(shard, check)?.ok())
+    }
+
+    /// The same, or what the shard lacks.
+    pub(crate) fn whole_or_flaw(&self, shard: u64, check: Check) -> Result<Result<ShardRecord, Flaw>, Error> {
+        whole_record(&self.folder, &self.identity, &self.layout, &self.categories, shard, check)
     }
 
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
@@ -284,7 +289,7 @@ pub(crate) fn stranger(path: &Path) -> Result<Option<String>, Error> {
 
 /// The record of a shard; a missing one is an [`Problem::Missing`].
 pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
-    let path = folder.path(&layout::record(shard));
+    let path = folder.inside(&layout::record(shard))?;
     let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
     if record.shard != shard {
         let message = format!("is the record of shard {}", record.shard);
@@ -311,6 +316,7 @@ pub(crate) fn whole_record(
     folder: &Folder,
     identity: &Identity,
     layout: &Layout,
+    categories: &[Category],
     shard: u64,
     check: Check,
 ) -> Result<Result<ShardRecord, Flaw>, Error> {
@@ -329,7 +335,7 @@ pub(crate) fn whole_record(
         }
     }
     if check == Check::Hashes
-        && let Some(flaw) = contents::flaw(folder, layout, &record)?
+        && let Some(flaw) = contents::flaw(folder, layout, categories, &record)?
     {
         return Ok(Err(flaw));
     }
@@ -338,7 +344,7 @@ pub(crate) fn whole_record(
 
 /// Numbers of all shards with a record, in order.
 pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let path = folder.path(layout::SHARDS);
+    let path = folder.inside(layout::SHARDS)?;
     let entries = match fs::read_dir(&path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

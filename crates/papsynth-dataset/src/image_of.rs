@@ -67,9 +67,9 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
 /// The bytes of a file, or of one in a tar file of the data set.
 pub(crate) fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
     let Some((tar, entry)) = name.split_once(".tar/") else {
-        return read::bytes(&dataset.folder.path(name), LIMITS.max_file_bytes);
+        return read::bytes(&dataset.folder.inside(name)?, LIMITS.max_file_bytes);
     };
-    let path = dataset.folder.path(&format!("{tar}.tar"));
+    let path = dataset.folder.inside(&format!("{tar}.tar"))?;
     let failed = |e| Error::io("read", &path)(e);
     let mut archive = tar::Archive::new(BufReader::new(File::open(&path).map_err(failed)?));
     for file in archive.entries().map_err(failed)? {

@@ -29,7 +29,7 @@ impl<'a> Written<'a> {
 
     /// Reads a file and looks at it.
     pub(super) fn file(&self, name: &str, look: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
-        let path = self.folder.path(name);
+        let path = self.folder.inside(name)?;
         look(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
     }
 
@@ -76,6 +76,9 @@ impl<'a> Written<'a> {
             if levels.len() != geometry.values() {
                 return differs("it has not the channels that the record says");
             }
+            if found.len() >= planes {
+                return differs(&format!("it has more planes than the {planes} that the record says"));
+            }
             found.push(sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>()));
             Ok(())
         })?;
@@ -96,7 +99,7 @@ impl<'a> Written<'a> {
 
     /// Layers of labels are what the masks give.
     pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), Problem> {
-        let found = read::label_pages(bytes, &LIMITS)?;
+        let found = read::label_pages(bytes, &LIMITS, layers.len().max(1))?;
         is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
     }
 
