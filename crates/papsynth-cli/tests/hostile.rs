@@ -139,6 +139,7 @@ impl Gauntlet {
         }
     }
 
+    #[expect(clippy::disallowed_methods, reason = "how long a refusal takes is told, and decides nothing")]
     fn run(&mut self, what: &str, words: &str) -> Outcome {
         let start = Instant::now();
         let run = self.bench.run_within(MEMORY_KB, words);

@@ -16,8 +16,7 @@ fn recipe() -> Recipe {
 
 /// A slide whose frames are lit alike all over, so that they differ in their noise alone.
 fn even(mut recipe: Recipe) -> Recipe {
-    recipe.background.illumination =
-        Illumination::Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() };
+    recipe.background.illumination = Illumination::Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() };
     recipe
 }
 
@@ -147,9 +146,8 @@ fn density_is_that_of_fields_within_the_deposit_and_falls_beyond_it() {
     };
     let fields = 24;
     let scenes = (0..fields).map(|index| engine.scene(papsynth::key::Key { seed: 3, index }).unwrap());
-    let cells: usize = scenes
-        .map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count())
-        .sum();
+    let cells: usize =
+        scenes.map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count()).sum();
     let wanted = cells as f64 / (fields as f64 * 1376.0 * 1038.0);
     let side = 8000;
     let (mut inside, mut beyond) = (0.0, 0.0);
