@@ -286,7 +286,6 @@ fn hardly_anything_reaches_farther_than_it_says() {
             (told, most) = (told + 1, most.max(share));
             beyond += usize::from(share > 1.0);
         }
-        println!("{}: {most:.2} of what it says, {beyond} of {told} beyond", kind.name());
         // What reaches farther is cut off on slides.
         assert!(beyond * 100 <= told, "{}: {beyond} of {told}", kind.name());
         assert!(most > 0.25, "{}: {most}", kind.name());
@@ -314,6 +313,5 @@ fn hardly_a_cell_reaches_farther_than_it_says() {
             beyond += usize::from(share > 1.0);
         }
     }
-    println!("{most:.2} of what they say, {beyond} of {told} beyond");
     assert!(beyond * 200 <= told && most > 0.6, "{beyond} of {told}, {most}");
 }
