@@ -14,16 +14,32 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full every reader there is. All steps run even if one fails; each tells its time. Where CI \
+              readers, the study in a browser, wasm32, packages. With --full every reader there is, and the packages and features that take long to compile. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, valgrind or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
-/// What takes the heavier readers; at most 80 minutes with everything before.
-const FULL: [Step; 1] =
-    [("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()])))];
+/// Packages that take long to compile: the usual steps leave them out, with the features that bring them along; `--full` looks at them.
+pub(crate) const HEAVY: [&str; 1] = ["papsynth-parquet"];
+
+/// Features that bring them along, as `--features` wants them with the packages that have them.
+pub(crate) const HEAVY_FEATURES: &str = "papsynth-dataset/parquet,papsynth-cli/parquet";
+
+/// All other features.
+const LIGHT_FEATURES: &str = "fsd-shape/serde,papsynth/threads";
+
+/// The packages that are built with heavy features.
+const WITH_HEAVY: [&str; 2] = ["papsynth-dataset", "papsynth-cli"];
+
+/// What takes the heavier packages and readers; at most 80 minutes with everything before.
+const FULL: [Step; 4] = [
+    ("heavy lints", |workspace| heavy(workspace, &["clippy", "--all-targets"], &["--", "-D", "warnings"])),
+    ("heavy tests", |workspace| heavy(workspace, &["test"], &[])),
+    ("heavy pages", |workspace| heavy(workspace, &["doc", "--lib", "--no-deps"], &[])),
+    ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+];
 
 /// Cheap ones first. The golden images are part of the tests.
 const STEPS: [Step; 14] = [
@@ -31,9 +47,7 @@ const STEPS: [Step; 14] = [
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
     ("real material", |_| real_material()),
-    ("lints", |workspace| {
-        cargo(workspace, &["clippy", "--workspace", "--all-targets", "--all-features", "--", "-D", "warnings"])
-    }),
+    ("lints", lints),
     ("documentation", documentation),
     ("tests", |workspace| chore(workspace, &test::CHORE)),
     ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
@@ -109,10 +123,32 @@ fn real_material() -> Result<Outcome> {
     }
 }
 
+/// The whole workspace without what is heavy.
+pub(crate) fn light() -> impl Iterator<Item = &'static str> {
+    std::iter::once("--workspace").chain(HEAVY.into_iter().flat_map(|package| ["--exclude", package]))
+}
+
+fn lints(workspace: &Workspace) -> Result<Outcome> {
+    let mut command = workspace.cargo();
+    command.arg("clippy").args(light()).args(["--all-targets", "--features", LIGHT_FEATURES, "--", "-D", "warnings"]);
+    shell::run(&mut command)?;
+    Ok(Outcome::Done)
+}
+
+/// What is heavy, and what is built with it.
+fn heavy(workspace: &Workspace, before: &[&str], after: &[&str]) -> Result<Outcome> {
+    let mut command = workspace.cargo();
+    let packages = HEAVY.into_iter().chain(WITH_HEAVY).flat_map(|package| ["--package", package]);
+    command.args(before).args(packages).args(["--features", HEAVY_FEATURES]).args(after);
+    shell::run(&mut command)?;
+    Ok(Outcome::Done)
+}
+
 fn documentation(workspace: &Workspace) -> Result<Outcome> {
     let mut command = workspace.cargo();
     // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    command.args(["doc", "--workspace", "--lib", "--no-deps", "--all-features"]).env("RUSTDOCFLAGS", "-D warnings");
+    command.arg("doc").args(light()).args(["--lib", "--no-deps", "--features", LIGHT_FEATURES]);
+    command.env("RUSTDOCFLAGS", "-D warnings");
     shell::run(&mut command)?;
     Ok(Outcome::Done)
 }

@@ -11,7 +11,7 @@ pub(crate) const CHORE: Chore = Chore {
     name: "deps",
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
-    details: "Technique crates know no one here, the engine knows techniques alone, the data set the engine, the study the data set, the \
+    details: "Technique crates know no one here, nor do containers of files; the engine knows techniques alone, the data set the engine and the containers, the study the data set, the \
               judge nobody, the program all of them, the benches what they time, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
@@ -22,6 +22,8 @@ pub(crate) const CHORE: Chore = Chore {
 enum Role {
     Technique,
     Engine,
+    /// Knows how a kind of file is laid out, and nothing of what is in it.
+    Container,
     Dataset,
     Judge,
     Match,
@@ -32,7 +34,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 17] = [
+const PLACES: [(&str, Role); 18] = [
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -43,6 +45,7 @@ const PLACES: [(&str, Role); 17] = [
     ("dye-spectra", Role::Technique),
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
+    ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
     ("papsynth-study", Role::Study),
@@ -61,9 +64,9 @@ impl Role {
     fn may_know(self) -> &'static [Self] {
         match self {
             // Who judges must not know what is judged.
-            Self::Technique | Self::Judge | Self::Chores => &[],
+            Self::Technique | Self::Container | Self::Judge | Self::Chores => &[],
             Self::Engine => &[Self::Technique],
-            Self::Dataset => &[Self::Engine],
+            Self::Dataset => &[Self::Engine, Self::Container],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
             // It shows files, whoever made them.
