@@ -25,7 +25,7 @@ type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 pub(crate) const HEAVY: [&str; 1] = ["papsynth-parquet"];
 
 /// Features that bring them along, as `--features` wants them with the packages that have them.
-pub(crate) const HEAVY_FEATURES: &str = "papsynth-dataset/parquet,papsynth-cli/parquet";
+pub(crate) const HEAVY_FEATURES: &str = "papsynth-cli/parquet";
 
 /// All other features.
 const LIGHT_FEATURES: &str = "fsd-shape/serde,papsynth/threads";

@@ -39,12 +39,24 @@ pub(crate) fn generate<I: AsRef<OsStr>>(
     out: &Path,
     arguments: impl IntoIterator<Item = I>,
 ) -> Result<()> {
+    generate_with(workspace, &[], out, arguments)
+}
+
+/// The same with what `cargo` is told before.
+pub(crate) fn generate_with<I: AsRef<OsStr>>(
+    workspace: &Workspace,
+    build: &[&str],
+    out: &Path,
+    arguments: impl IntoIterator<Item = I>,
+) -> Result<()> {
     if out.exists() {
         fs::remove_dir_all(out).with_context(|| format!("cannot empty {}", out.display()))?;
     }
     let mut command = workspace.cargo();
     command
-        .args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--", "generate", "--out"])
+        .args(["run", "--quiet", "--release", "--package", "papsynth-cli"])
+        .args(build)
+        .args(["--", "generate", "--out"])
         .arg(out)
         .args(arguments);
     shell::run(&mut command)

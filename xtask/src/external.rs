@@ -9,14 +9,14 @@ use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell};
+use crate::{Chore, ci, dataset, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "external",
     usage: "[--full]",
     about: "has other people's programs read what we write, and judge our camera",
     details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
-              Python of docs/formats runs; with --full also mlcroissant, datasets, OpenCV and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
+              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
               frames of the camera presets; libjpeg compresses what our JPEG did. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
@@ -25,14 +25,17 @@ pub(crate) const CHORE: Chore = Chore {
 const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\npycocotools\nwebdataset\nshapely\n";
 
 /// Heavier ones. jsonpath-rw, which mlcroissant wants, has no wheel.
-const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\ndatasets\nopencv-python-headless\n";
+const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nopencv-python-headless\n";
 
 /// Those who measure cameras.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
 
 const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
 
-const ALL_FORMATS: [&str; 2] = ["--format", "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath"];
+const ALL_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
+
+/// Those that want a feature.
+const HEAVY_FORMATS: &str = ",huggingface";
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let full = arguments.flag("--full");
@@ -56,13 +59,16 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     }
     let pages = workspace.root.join("docs/formats");
     let mut written = Vec::new();
+    let build: &[&str] = if full { &["--features", ci::HEAVY_FEATURES] } else { &[] };
+    let formats = [ALL_FORMATS, if full { HEAVY_FORMATS } else { "" }].concat();
     for (name, own) in [
         ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),
         ("all-stack", &["--frames", "1", "--frames-per-shard", "1", "--set", "focus.planes=3", "--flatten", "drop"]),
         ("all-colour", &[colour.as_slice(), &["--camera", "scmos", "--flatten", "max"]].concat()),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, &out, own.iter().chain(&SMALL).chain(&ALL_FORMATS))?;
+        let arguments = own.iter().chain(&SMALL).copied().chain(["--format", formats.as_str()]);
+        dataset::generate_with(workspace, build, &out, arguments)?;
         shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
         written.push(out);
     }

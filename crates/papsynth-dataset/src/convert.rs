@@ -11,7 +11,7 @@ use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
 use crate::generate::{Outcome, Progress};
-use crate::image_of::{LIMITS, bytes, levels};
+use crate::image_of::{LIMITS, images, levels};
 use crate::layout::{self, Form, Layout};
 use crate::merge::document;
 use crate::read::{self, LevelImage};
@@ -164,7 +164,7 @@ impl Source {
         };
         let name = format.image(self.dataset.identity.seed, open.record.shard, frame);
         let path = folder.path(&name);
-        let file = bytes(&self.dataset, &name)?;
+        let files = images(&self.dataset, &name)?;
         let mut noise_free = match self.dataset.layout.has(Format::Folder) {
             true => Some(NoiseFree::open(&folder.path(&layout::noise_free(frame.index)))?),
             false => None,
@@ -174,7 +174,7 @@ impl Source {
         let saturated = image.map_or_else(|| Ok(Vec::new()), Image::saturated).map_err(Error::input(&coco))?;
         let mut index = 0;
         let mut failure = None;
-        let read = LevelImage::pages(&file, &LIMITS, |page| {
+        let mut each = |page: LevelImage| {
             let values = frame.width * frame.height * frame.channels;
             let grey = levels(page, frame.channels);
             let done = || -> Result<(), Error> {
@@ -198,7 +198,8 @@ impl Source {
                 failure = Some(error);
                 Problem::Differs { what: String::new() }
             })
-        });
+        };
+        let read = files.iter().try_for_each(|file| LevelImage::pages(file, &LIMITS, &mut each));
         match (failure, read) {
             (Some(error), _) => Err(error),
             (None, read) => read.map_err(Error::input(&path)),
@@ -215,7 +216,9 @@ impl Source {
             return self.refuse(format!("{layout} keeps no picture of a stack with everything in focus"));
         };
         let path = self.dataset.folder.path(&name);
-        let image = LevelImage::decode(&bytes(&self.dataset, &name)?, &LIMITS).map_err(Error::input(&path))?;
+        let files = images(&self.dataset, &name)?;
+        let file = files.first().map(Vec::as_slice).unwrap_or_default();
+        let image = LevelImage::decode(file, &LIMITS).map_err(Error::input(&path))?;
         Ok(levels(image, frame.channels))
     }
 }

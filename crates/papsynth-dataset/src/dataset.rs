@@ -90,6 +90,10 @@ impl Dataset {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });
         }
+        if let Some((feature, what)) = layout.lacks() {
+            let message = format!("{what} needs a build with `--features {feature}`");
+            return Err(Error::Folder { path: path.to_owned(), message });
+        }
         let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
         match stranger(path)? {
@@ -190,7 +194,15 @@ impl Dataset {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let folder = Folder::new(path);
         let manifest = Manifest::read(&folder)?;
-        let own = [layout::RECIPE, layout::MODEL, layout::TABLE, layout::COCO, layout::SPLITS, layout::SHEET];
+        let own = [
+            layout::RECIPE,
+            layout::MODEL,
+            layout::TABLE,
+            layout::OBJECTS,
+            layout::COCO,
+            layout::SPLITS,
+            layout::SHEET,
+        ];
         let own = [own.as_slice(), &[layout::CARD, layout::CROISSANT]].concat();
         let is_map = |file: &&FileRecord| !file.path.contains('/') && !own.contains(&file.path.as_str());
         let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());

@@ -5,6 +5,7 @@ use std::io::{BufReader, Read};
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Problem};
+use crate::parquet;
 use crate::read::{self, LevelImage, Limits};
 use crate::record::FrameSummary;
 
@@ -18,15 +19,16 @@ pub(crate) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Re
     let [image, all_in_focus] = dataset.images_of(frame, shard);
     let name = all_in_focus.or(image).unwrap_or_default();
     let path = dataset.folder.path(&name);
-    let bytes = bytes(dataset, &name)?;
+    let files = images(dataset, &name)?;
     let (mut number, mut middle) = (0, None);
-    let read = LevelImage::pages(&bytes, &LIMITS, |page| {
+    let mut take = |page| {
         if number <= frame.planes_um.len() / 2 {
             middle = Some(page);
         }
         number += 1;
         Ok(())
-    });
+    };
+    let read = files.iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut take));
     read.map_err(Error::input(&path))?;
     middle.ok_or_else(|| Error::input(&path)(Problem::NoImages))
 }
@@ -39,8 +41,16 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     }
 }
 
+/// The files that make up an image of the data set: one, or one for each plane.
+pub(crate) fn images(dataset: &Dataset, name: &str) -> Result<Vec<Vec<u8>>, Error> {
+    match name.split_once(".parquet/") {
+        Some((file, image)) => parquet::images(&dataset.folder.path(&format!("{file}.parquet")), image),
+        None => Ok(vec![bytes(dataset, name)?]),
+    }
+}
+
 /// The bytes of a file, or of one in a tar file of the data set.
-pub(crate) fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
+fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
     let Some((tar, entry)) = name.split_once(".tar/") else {
         return read::bytes(&dataset.folder.path(name), LIMITS.max_file_bytes);
     };

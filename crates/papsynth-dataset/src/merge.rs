@@ -1,6 +1,6 @@
 //! What is known of all frames, in one place. Only one shard is held at a time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -10,8 +10,10 @@ use crate::coco::{Annotation, Document, Info};
 use crate::dataset::{Dataset, read_record, recorded_shards, whole_record};
 use crate::error::Error;
 use crate::files::{Folder, Output, hex};
+use crate::formats::Format;
 use crate::image_of::picture;
 use crate::layout;
+use crate::parquet;
 use crate::picture::ContactSheet;
 use crate::read;
 use crate::record::{Check, Entry, FORMAT, FORMAT_VERSION, FileRecord, ManifestHead, WRITER, broken};
@@ -37,7 +39,7 @@ const SHARD_FILE_BYTES: u64 = 1 << 32;
 pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
     let folder = &dataset.folder;
     let mut summary = Summary { frames: 0, objects: BTreeMap::new(), damaged: Vec::new(), lost_px: BTreeMap::new() };
-    let (mut shards, mut tars) = (Vec::new(), Vec::new());
+    let (mut shards, mut sharded, mut split) = (Vec::new(), Vec::new(), BTreeSet::new());
     for shard in recorded_shards(folder)? {
         let record = whole_record(folder, &dataset.identity, &dataset.layout, shard, Check::Sizes)?;
         let Ok(record) = record else {
@@ -49,8 +51,9 @@ pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
         for frame in record.frames {
             add(&mut summary.objects, frame.objects);
             add(&mut summary.lost_px, frame.lost_px);
+            split.insert(Split::of_slide(dataset.identity.seed, frame.slide));
         }
-        tars.extend(record.files.into_iter().filter(|file| file.path.ends_with(".tar")));
+        sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
     }
     let given = [layout::MODEL, layout::RECIPE].into_iter().chain(dataset.map.as_deref());
     let mut merged = given.map(|name| folder.record(name)).collect::<Result<Vec<_>, _>>()?;
@@ -58,17 +61,23 @@ pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
         if dataset.layout.is_by_frame() {
             merged.push(folder.write_if_new(layout::TABLE, |out| tables(folder, &shards, out))?);
             merged.push(folder.write_if_new(layout::COCO, |out| documents(dataset, &shards, out))?);
+            if dataset.layout.objects_parquet {
+                merged.push(parquet::merge(folder, &shards)?);
+            }
         }
         merged.push(folder.write_if_new(layout::SPLITS, |out| splits(dataset, &shards, out))?);
         merged.push(contact_sheet(dataset, &shards)?);
         let classes: Vec<String> = dataset.categories.iter().map(|category| category.name.clone()).collect();
-        for (name, bytes) in dataset.layout.formats.iter().flat_map(|format| format.shared(&classes)) {
-            merged.push(folder.keep(&name, &bytes)?);
+        let split: Vec<Split> = split.into_iter().collect();
+        for format in &dataset.layout.formats {
+            for (name, bytes) in format.shared(&classes, &split)? {
+                merged.push(folder.keep(&name, &bytes)?);
+            }
         }
     }
     if !shards.is_empty() {
         merged.push(folder.keep(layout::CARD, card(dataset, &summary).as_bytes())?);
-        let described: Vec<FileRecord> = merged.iter().chain(&tars).cloned().collect();
+        let described: Vec<FileRecord> = merged.iter().chain(&sharded).cloned().collect();
         let text = serde_json::to_vec_pretty(&croissant(dataset, &described));
         let text = text.map_err(|e| Error::io("encode", &folder.path(layout::CROISSANT))(e.into()))?;
         merged.push(folder.keep(layout::CROISSANT, &text)?);
@@ -78,6 +87,14 @@ pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
     let manifest = write_manifest(dataset, &merged, &shards, summary.frames)?;
     folder.sync_names([&manifest])?;
     Ok(summary)
+}
+
+/// Whether a file is one of a format that keeps many frames in a file.
+fn is_sharded(path: &str) -> bool {
+    Format::ALL
+        .into_iter()
+        .filter(|format| format.is_sharded())
+        .any(|format| path.split('/').next() == Some(format.name()))
 }
 
 fn add(sums: &mut BTreeMap<String, u64>, counts: BTreeMap<String, u64>) {

@@ -15,7 +15,7 @@ use support::{SEED, Scratch, contents, frame, recipe};
 /// A data set in all formats, of a stack and two images.
 fn make(name: &str) -> Scratch {
     let scratch = Scratch::new(name);
-    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::ALL) };
+    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::available()) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
     let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1), frame(2, 1, 12, 1)];
@@ -206,6 +206,75 @@ fn tar_with(bytes: &[u8], change: impl FnOnce(&mut Vec<(String, Vec<u8>)>)) -> V
     builder.into_inner().unwrap()
 }
 
+/// A Parquet file of which rows are changed.
+#[cfg(feature = "parquet")]
+fn table_with(bytes: &[u8], told: &str, change: impl FnOnce(&mut Vec<Vec<papsynth_parquet::Value>>)) -> Vec<u8> {
+    use papsynth_parquet::{Limits, Reader, Writer};
+    let reader = Reader::from_bytes(bytes, &Limits::default()).unwrap();
+    let names: Vec<&str> = reader.columns().iter().map(|column| column.name.as_str()).collect();
+    let mut rows = reader.rows(&names, 0..u64::MAX).unwrap().collect::<Result<Vec<_>, _>>().unwrap();
+    change(&mut rows);
+    let features = reader.metadata("huggingface").map(|features| features.replace(told, "other"));
+    let metadata: Vec<(&str, &str)> = features.iter().map(|features| ("huggingface", features.as_str())).collect();
+    let mut writer = Writer::new(Vec::new(), reader.columns(), &metadata).unwrap();
+    rows.into_iter().for_each(|row| writer.row(row).unwrap());
+    writer.finish().unwrap()
+}
+
+/// Wrong rows, masks, images and features.
+#[cfg(feature = "parquet")]
+fn parquet_lies<'f>(files: &'f [(String, Vec<u8>)], lies: &mut Vec<(&'f str, Vec<u8>)>) {
+    use papsynth_parquet::Value;
+    /// The next part of a value by its number.
+    fn part<'v>(value: &'v mut Value, path: &[usize]) -> &'v mut Value {
+        path.iter().fold(value, |value, &at| match value {
+            Value::List(parts) | Value::Struct(parts) => &mut parts[at],
+            other => panic!("{other:?} has no parts"),
+        })
+    }
+    const NOTHING: &str = "none of this";
+    let of = |name: &str| files.iter().find(|(n, _)| n == name).unwrap();
+    let (name, objects) = of("objects/000000.parquet");
+    let mut lie = |name: &'f str, bytes: &[u8], told: &str, change: &dyn Fn(&mut Vec<Vec<Value>>)| {
+        lies.push((name, table_with(bytes, told, change)));
+    };
+    lie(name, objects, NOTHING, &|rows| drop(rows.pop()));
+    lie(name, objects, NOTHING, &|rows| rows.push(rows[0].clone()));
+    lie(name, objects, NOTHING, &|rows| rows.swap(0, 1));
+    for column in 0..32 {
+        lie(name, objects, NOTHING, &|rows| {
+            let cell = &mut rows[0][column];
+            *cell = match cell {
+                Value::Bool(flag) => Value::Bool(!*flag),
+                Value::U32(id) => Value::U32(*id + 1),
+                Value::I64(whole) => Value::I64(*whole + 1),
+                Value::F64(number) => Value::F64(*number + 0.5),
+                Value::Text(text) => Value::Text(format!("{text}0")),
+                Value::List(numbers) => Value::List(numbers[1..].to_vec()),
+                other => panic!("{other:?} in column {column}"),
+            };
+        });
+    }
+    // Frames 0, a stack of two planes, and 1, a single image, are of one slide.
+    let (name, frames) =
+        files.iter().find(|(n, _)| n.starts_with("huggingface/data/") && n.contains("000000.p")).unwrap();
+    lie(name, frames, NOTHING, &|rows| drop(rows.pop()));
+    lie(name, frames, NOTHING, &|rows| rows.swap(0, 1));
+    lie(name, frames, NOTHING, &|rows| rows.push(rows[0].clone()));
+    lie(name, frames, "ClassLabel", &|_| ());
+    lie(name, frames, NOTHING, &|rows| rows[1][1] = Value::I64(7));
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[0][6], &[1]) = Value::F64(9.0));
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[0][7], &[0, 2]) = Value::I64(8));
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[0][7], &[0, 8, 3]) = Value::I64(7));
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[0][7], &[1, 16]) = part(&mut rows[0][7], &[0, 16]).clone());
+    lie(name, frames, NOTHING, &|rows| rows[1][8] = rows[0][8].clone());
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[1][8], &[0]) = part(&mut rows[0][8], &[0]).clone());
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[1][8], &[1]) = Value::Text("000009.png".to_owned()));
+    lie(name, frames, NOTHING, &|rows| rows[0][9] = Value::List(vec![part(&mut rows[0][9], &[0]).clone()]));
+    lie(name, frames, NOTHING, &|rows| *part(&mut rows[0][9], &[1, 0]) = part(&mut rows[0][9], &[0, 0]).clone());
+    lies.push((name, frames[..frames.len() / 2].to_vec()));
+}
+
 /// What readers overlook, planted by somebody who mends every hash.
 #[test]
 fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
@@ -291,6 +360,9 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
             files.iter_mut().find(|(name, _)| name == "000001.png").unwrap().1 = image;
         }),
     ));
+    // Parquet.
+    #[cfg(feature = "parquet")]
+    parquet_lies(&files, &mut lies);
     for (number, (name, bytes)) in lies.iter().enumerate() {
         lie(&scratch, 0, name, bytes);
         let verdict = look(scratch.path());

@@ -1,5 +1,6 @@
 //! A file in, rows out.
 
+use std::borrow::Borrow;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -216,14 +217,16 @@ impl Reader {
     ///
     /// # Errors
     /// If there is no column of a name.
-    pub fn rows(&self, columns: &[&str], range: Range<u64>) -> Result<Rows<'_>, Error> {
-        let place = |name: &&str| match self.columns.iter().position(|column| column.name == **name) {
-            Some(place) => Ok(place),
-            None => Error::table(format!("the table has no column `{}`", name.escape_default())),
-        };
-        let places = columns.iter().map(place).collect::<Result<_, _>>()?;
-        let (nodes, leaves) = trees(&self.columns);
-        Ok(Rows { reader: self, places, nodes, leaves, group: 0, first: 0, range, left: 0 })
+    pub fn rows(&self, columns: &[&str], range: Range<u64>) -> Result<Rows<&Self>, Error> {
+        Rows::new(self, columns, range)
+    }
+
+    /// The same of a table that is kept no longer.
+    ///
+    /// # Errors
+    /// As those of [`rows`](Self::rows).
+    pub fn into_rows(self, columns: &[&str], range: Range<u64>) -> Result<Rows<Self>, Error> {
+        Rows::new(self, columns, range)
     }
 
     /// The levels and values of a leaf in some rows of a group.
@@ -250,8 +253,8 @@ fn rows_of(group: &RowGroupMetaData) -> u64 {
 
 /// The rows of a table, one after the other.
 #[derive(Debug)]
-pub struct Rows<'a> {
-    reader: &'a Reader,
+pub struct Rows<R> {
+    reader: R,
     /// The columns that are wanted.
     places: Vec<usize>,
     nodes: Vec<Node>,
@@ -264,25 +267,36 @@ pub struct Rows<'a> {
     left: usize,
 }
 
-impl Rows<'_> {
+impl<R: Borrow<Reader>> Rows<R> {
+    fn new(reader: R, columns: &[&str], range: Range<u64>) -> Result<Self, Error> {
+        let there = &reader.borrow().columns;
+        let place = |name: &&str| match there.iter().position(|column| column.name == **name) {
+            Some(place) => Ok(place),
+            None => Error::table(format!("the table has no column `{}`", name.escape_default())),
+        };
+        let places = columns.iter().map(place).collect::<Result<_, _>>()?;
+        let (nodes, leaves) = trees(there);
+        Ok(Self { reader, places, nodes, leaves, group: 0, first: 0, range, left: 0 })
+    }
+
     /// Decodes the next group that has rows of the range, if there is one.
     fn fill(&mut self) -> Result<bool, Error> {
         while self.left == 0 {
-            if self.first >= self.range.end || self.group >= self.reader.meta().num_row_groups() {
+            if self.first >= self.range.end || self.group >= self.reader.borrow().meta().num_row_groups() {
                 return Ok(false);
             }
             let (group, from) = (self.group, self.first);
-            let to = from.saturating_add(rows_of(self.reader.meta().row_group(group)));
+            let to = from.saturating_add(rows_of(self.reader.borrow().meta().row_group(group)));
             (self.group, self.first) = (group + 1, to);
             let rows = from.max(self.range.start)..to.min(self.range.end);
             if rows.is_empty() {
                 continue;
             }
             let rows = rows.start - from..rows.end - from;
-            (_, self.leaves) = trees(&self.reader.columns);
+            (_, self.leaves) = trees(&self.reader.borrow().columns);
             for place in &self.places {
                 for number in self.nodes[*place].leaves() {
-                    self.reader.read(number, &mut self.leaves[number], group, rows.clone())?;
+                    self.reader.borrow().read(number, &mut self.leaves[number], group, rows.clone())?;
                 }
             }
             self.left = usize::try_from(rows.end - rows.start).unwrap_or(usize::MAX);
@@ -295,7 +309,7 @@ impl Rows<'_> {
             return Ok(None);
         }
         self.left -= 1;
-        let mut room = self.reader.limits.row_bytes;
+        let mut room = self.reader.borrow().limits.row_bytes;
         let mut row = Vec::with_capacity(self.places.len());
         for place in &self.places {
             let node = &self.nodes[*place];
@@ -309,7 +323,7 @@ impl Rows<'_> {
     }
 }
 
-impl Iterator for Rows<'_> {
+impl<R: Borrow<Reader>> Iterator for Rows<R> {
     type Item = Result<Vec<Value>, Error>;
 
     fn next(&mut self) -> Option<Self::Item> {

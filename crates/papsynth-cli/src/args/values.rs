@@ -47,7 +47,12 @@ pub(super) fn grey_parser() -> impl TypedValueParser<Value = Grey> {
 pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
     let names = Format::ALL.map(|format| PossibleValue::new(format.name()).help(format.about()));
     PossibleValuesParser::new(names).try_map(|name| {
-        Format::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| format!("there is no format `{name}`"))
+        let format = Format::ALL.into_iter().find(|f| f.name() == name);
+        let format = format.ok_or_else(|| format!("there is no format `{name}`"))?;
+        match format.lacks() {
+            Some(feature) => Err(format!("the format `{name}` needs a build with `--features {feature}`")),
+            None => Ok(format),
+        }
     })
 }
 

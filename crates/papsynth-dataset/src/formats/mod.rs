@@ -7,6 +7,7 @@
 mod cellpose;
 mod flat;
 mod folder;
+pub(crate) mod huggingface;
 mod ome_tiff;
 mod qupath;
 mod stardist;
@@ -28,6 +29,7 @@ use crate::coco::Document;
 use crate::error::Error;
 use crate::files::Folder;
 use crate::layout::{self, Form, Layout};
+use crate::parquet;
 use crate::record::{FileRecord, FrameSummary, Geometry};
 use crate::splits::Split;
 use crate::write;
@@ -50,12 +52,33 @@ pub enum Format {
     YoloSeg,
     /// GeoJSON, nuclei within cells, beside OME-TIFF images.
     Qupath,
+    /// Parquet files of many frames, as the library `datasets` reads them; wants the feature `parquet`.
+    Huggingface,
 }
 
 impl Format {
-    /// All formats.
-    pub const ALL: [Self; 7] =
-        [Self::Folder, Self::Webdataset, Self::OmeTiff, Self::Cellpose, Self::Stardist, Self::YoloSeg, Self::Qupath];
+    /// All formats, also those that [need a feature](Self::lacks).
+    pub const ALL: [Self; 8] = [
+        Self::Folder,
+        Self::Webdataset,
+        Self::OmeTiff,
+        Self::Cellpose,
+        Self::Stardist,
+        Self::YoloSeg,
+        Self::Qupath,
+        Self::Huggingface,
+    ];
+
+    /// All formats that this build can write.
+    pub fn available() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|format| format.lacks().is_none())
+    }
+
+    /// The cargo feature that this build would need to write it and to look into it.
+    #[must_use]
+    pub fn lacks(self) -> Option<&'static str> {
+        (self == Self::Huggingface && !parquet::IS_HERE).then_some("parquet")
+    }
 
     /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
     #[must_use]
@@ -68,6 +91,7 @@ impl Format {
             Self::Stardist => "stardist",
             Self::YoloSeg => "yolo-seg",
             Self::Qupath => "qupath",
+            Self::Huggingface => "huggingface",
         }
     }
 
@@ -82,13 +106,14 @@ impl Format {
             Self::Stardist => "images/ and masks/, for cytoplasm and for nuclei",
             Self::YoloSeg => "images/ and labels/ by split, with polygons, and data.yaml",
             Self::Qupath => "GeoJSON with nuclei within cells, beside OME-TIFF images",
+            Self::Huggingface => "Parquet shards by split for `datasets`: images, objects with masks",
         }
     }
 
     /// Whether it keeps many frames in a file.
     #[must_use]
     pub fn is_sharded(self) -> bool {
-        self == Self::Webdataset
+        matches!(self, Self::Webdataset | Self::Huggingface)
     }
 
     /// Whether it has room for one object of a group a pixel.
@@ -107,19 +132,22 @@ impl Format {
             Self::Stardist => Box::new(stardist::Pairs::new(place)),
             Self::YoloSeg => Box::new(yolo::Polygons::new(place)),
             Self::Qupath => Box::new(qupath::Objects::new(place)),
+            Self::Huggingface => parquet::sink(place)?,
         })
     }
 
-    /// Whether the files of a frame hold what its truth says; those of a tar file follow each other in `tar`.
-    pub(crate) fn check(self, written: &Written, tar: Option<&mut Tar<'_>>) -> Result<(), Error> {
+    /// Whether the files of a frame hold what its truth says; in files of many frames they follow each other. What this build lacks a
+    /// feature for is not looked into.
+    pub(crate) fn check(self, written: &Written, shards: &mut Shards<'_>) -> Result<(), Error> {
         match self {
             Self::Folder => folder::check(written),
-            Self::Webdataset => tar.map_or(Ok(()), |tar| webdataset::check(written, tar)),
+            Self::Webdataset => shards.tar.as_mut().map_or(Ok(()), |tar| webdataset::check(written, tar)),
             Self::OmeTiff => ome_tiff::check(written),
             Self::Cellpose => cellpose::check(written),
             Self::Stardist => stardist::check(written),
             Self::YoloSeg => yolo::check(written),
             Self::Qupath => qupath::check(written),
+            Self::Huggingface => shards.frames.as_mut().map_or(Ok(()), |frames| frames.check(written)),
         }
     }
 
@@ -134,30 +162,39 @@ impl Format {
             Self::Stardist => stardist::image(Group::Cytoplasm, index),
             Self::YoloSeg => yolo::image(Split::of_slide(seed, frame.slide), index),
             Self::Qupath => qupath::image(index),
+            Self::Huggingface => huggingface::image(seed, shard, frame, form),
         }
     }
 
     /// Where the picture of a stack with everything in focus lies, if the format has it beside the planes.
-    pub(crate) fn all_in_focus(self, shard: u64, index: u64) -> Option<String> {
+    pub(crate) fn all_in_focus(self, seed: u64, shard: u64, frame: &FrameSummary) -> Option<String> {
         match self {
-            Self::Folder => Some(layout::all_in_focus(index)),
-            Self::Webdataset => Some(webdataset::all_in_focus(shard, index)),
+            Self::Folder => Some(layout::all_in_focus(frame.index)),
+            Self::Webdataset => Some(webdataset::all_in_focus(shard, frame.index)),
+            Self::Huggingface => Some(huggingface::image(seed, shard, frame, Form::Single)),
             _ => None,
         }
     }
 
     /// Whether it has all planes of a stack, rather than its picture with everything in focus alone.
     pub(crate) fn has_planes(self) -> bool {
-        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff)
+        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::Huggingface)
     }
 
-    /// Files that it has once in a data set.
-    pub(crate) fn shared(self, classes: &[String]) -> Vec<(String, Vec<u8>)> {
-        match self {
+    /// Files that it has once in a data set, frames of which fall into these splits by slide.
+    pub(crate) fn shared(self, classes: &[String], splits: &[Split]) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Ok(match self {
             Self::YoloSeg => vec![yolo::description(classes)],
+            Self::Huggingface => vec![parquet::card(classes, splits)?],
             _ => Vec::new(),
-        }
+        })
     }
+}
+
+/// Files of many frames that are read again, frame by frame.
+pub(crate) struct Shards<'a> {
+    pub(crate) tar: Option<Tar<'a>>,
+    pub(crate) frames: Option<parquet::Frames>,
 }
 
 /// Where a shard is written, and how.
