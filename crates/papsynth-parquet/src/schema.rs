@@ -33,7 +33,7 @@ pub enum Kind {
     Text,
     /// Bytes, which are not compressed again.
     Bytes,
-    /// Any number of values of one kind, none of them missing.
+    /// Any number of values of one kind, any of which may be missing, as Arrow has it.
     List(Box<Kind>),
     /// Fields, at least one.
     Struct(Vec<Column>),
@@ -101,7 +101,7 @@ fn node_type(name: &str, kind: &Kind, repetition: Repetition) -> Result<TypePtr,
         Kind::Text => leaf(Physical::BYTE_ARRAY, Some(LogicalType::String))?,
         Kind::Bytes => leaf(Physical::BYTE_ARRAY, None)?,
         Kind::List(kind) => {
-            let element = node_type("element", kind, Repetition::REQUIRED)?;
+            let element = node_type("element", kind, Repetition::OPTIONAL)?;
             let list = Type::group_type_builder("list").with_repetition(Repetition::REPEATED);
             group(Some(LogicalType::List), vec![Arc::new(list.with_fields(vec![element]).build()?)])?
         }
@@ -135,8 +135,8 @@ fn column_of(node: &Type, depth: usize) -> Result<Column, Error> {
             (true, [list]) => match list.is_group().then(|| list.get_fields()) {
                 Some([element]) if list.get_basic_info().repetition() == Repetition::REPEATED => {
                     let element = column_of(element, depth + 1)?;
-                    if element.nullable {
-                        return unknown("is a list in which values may be missing");
+                    if !element.nullable {
+                        return unknown("is a list in which no value may be missing; such lists are not read here");
                     }
                     Kind::list(element.kind)
                 }

@@ -40,7 +40,7 @@ impl Node {
         let there = definition + i16::from(column.nullable);
         let kind = match &column.kind {
             Kind::List(kind) => {
-                let element = Column { name: column.name.clone(), kind: (**kind).clone(), nullable: false };
+                let element = Column { name: column.name.clone(), kind: (**kind).clone(), nullable: true };
                 NodeKind::List(Box::new(Self::new(&element, there + 1, repetition + 1, leaves)))
             }
             Kind::Struct(fields) => {

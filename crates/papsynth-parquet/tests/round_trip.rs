@@ -32,7 +32,9 @@ fn value(kind: &Kind) -> BoxedStrategy<Value> {
         Kind::F64 => any::<f64>().prop_map(Value::F64).boxed(),
         Kind::Text => "[a-c]{0,3}|.{0,8}".prop_map(Value::Text).boxed(),
         Kind::Bytes => vec(any::<u8>(), 0..9).prop_map(Value::Bytes).boxed(),
-        Kind::List(kind) => vec(value(kind), 0..4).prop_map(Value::List).boxed(),
+        Kind::List(kind) => {
+            vec(prop_oneof![1 => Just(Value::Null), 4 => value(kind)], 0..4).prop_map(Value::List).boxed()
+        }
         Kind::Struct(fields) => row(fields).prop_map(Value::Struct).boxed(),
     }
 }

@@ -14,7 +14,7 @@ pub(super) const CLASS: &str = "category";
 
 /// An image as Hugging Face keeps it: the bytes of its file, and the name that file would have.
 pub(super) fn image() -> Kind {
-    Kind::Struct(vec![Column::new("bytes", Kind::Bytes), Column::new("path", Kind::Text)])
+    Kind::Struct(vec![Column::new("bytes", Kind::Bytes).or_null(), Column::new("path", Kind::Text).or_null()])
 }
 
 /// The text of the key `huggingface` of a file: features by name, in the order of the columns.

@@ -22,9 +22,9 @@ use crate::splits::Split;
 use crate::table::part;
 use crate::write;
 
-/// The columns, of which those with the images come last.
+/// The columns, of which those with the images come last. Nothing is missing anywhere, but `datasets` takes features from a file only where all may be.
 pub(super) fn columns() -> Vec<Column> {
-    let column = Column::new;
+    let column = |name, kind| Column::new(name, kind).or_null();
     vec![
         column("index", Kind::I64),
         column("slide", Kind::I64),
@@ -43,7 +43,7 @@ pub(super) fn columns() -> Vec<Column> {
 const IMAGES: usize = 2;
 
 fn object_columns() -> Vec<Column> {
-    let column = Column::new;
+    let column = |name, kind| Column::new(name, kind).or_null();
     vec![
         column("id", Kind::U32),
         column("part", Kind::Text),
