@@ -2,6 +2,7 @@
 //!
 //! A [`Work`] has its inputs; calling it does the work once. Inputs are fixed, seeds too, nothing runs on a second thread.
 
+#![forbid(unsafe_code)]
 #![expect(clippy::missing_panics_doc, reason = "inputs are constants: what panics is a work that is broken")]
 
 mod cell;

@@ -4,6 +4,7 @@
 //! JSON tells the CPU time of each time. The first time a work is asked for, it is done once before. Files that
 //! works write go below the folder.
 
+#![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "what it measures is its output")]
 
 use std::collections::BTreeMap;

@@ -1,5 +1,6 @@
 //! Everything that has to pass before a change is taken.
 
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
@@ -7,38 +8,31 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
-use crate::{Chore, bench, browser, dataset, deps, equations, external, publish, shell, test, wasm};
+use crate::{Chore, bench, browser, dataset, deps, equations, external, hashes, publish, shell, supply, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
     usage: "[--full]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full every reader there is, and the packages and features that take long to compile. All steps run even if one fails; each tells its time. Where CI \
-              is set, a step that cannot run for want of Python, Chromium, valgrind or the real material (PAPSYNTH_REFERENCE) is a failure.",
+              readers, the study in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give. All steps run even if one fails; each tells its time. Where CI \
+              is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
-/// Packages that take long to compile: the usual steps leave them out, with the features that bring them along; `--full` looks at them.
-pub(crate) const HEAVY: [&str; 1] = ["papsynth-parquet"];
-
-/// Features that bring them along, as `--features` wants them with the packages that have them.
-pub(crate) const HEAVY_FEATURES: &str = "papsynth-cli/parquet";
-
-/// All other features.
-const LIGHT_FEATURES: &str = "fsd-shape/serde,papsynth/threads";
-
-/// The packages that are built with heavy features.
-const WITH_HEAVY: [&str; 2] = ["papsynth-dataset", "papsynth-cli"];
-
-/// What takes the heavier packages and readers; at most 80 minutes with everything before.
-const FULL: [Step; 4] = [
-    ("heavy lints", |workspace| heavy(workspace, &["clippy", "--all-targets"], &["--", "-D", "warnings"])),
-    ("heavy tests", |workspace| heavy(workspace, &["test"], &[])),
-    ("heavy pages", |workspace| heavy(workspace, &["doc", "--lib", "--no-deps"], &[])),
+/// What takes heavy crates, the heavier readers, and other processors; at most 80 minutes with everything before.
+const FULL: [Step; 5] = [
+    ("heavy lints", |workspace| {
+        run_cargo(workspace.cargo_heavy("clippy").args(["--all-targets", "--", "-D", "warnings"]))
+    }),
+    ("heavy docs", |workspace| {
+        run_cargo(workspace.cargo_heavy("doc").args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    }),
+    ("heavy tests", |workspace| run_cargo(&mut workspace.cargo_heavy("test"))),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+    ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
 
 /// Cheap ones first. The golden images are part of the tests.
@@ -47,7 +41,11 @@ const STEPS: [Step; 14] = [
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
     ("real material", |_| real_material()),
-    ("lints", lints),
+    ("lints", |workspace| {
+        let features = workspace.light_features();
+        let mut command = workspace.cargo_light("clippy");
+        run_cargo(command.args(["--all-targets", "--features", &features, "--", "-D", "warnings"]))
+    }),
     ("documentation", documentation),
     ("tests", |workspace| chore(workspace, &test::CHORE)),
     ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
@@ -99,7 +97,11 @@ fn chore(workspace: &Workspace, chore: &Chore) -> Result<Outcome> {
 }
 
 fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<Outcome> {
-    shell::run(workspace.cargo().args(arguments))?;
+    run_cargo(workspace.cargo().args(arguments))
+}
+
+fn run_cargo(command: &mut Command) -> Result<Outcome> {
+    shell::run(command)?;
     Ok(Outcome::Done)
 }
 
@@ -123,39 +125,17 @@ fn real_material() -> Result<Outcome> {
     }
 }
 
-/// The whole workspace without what is heavy.
-pub(crate) fn light() -> impl Iterator<Item = &'static str> {
-    std::iter::once("--workspace").chain(HEAVY.into_iter().flat_map(|package| ["--exclude", package]))
-}
-
-fn lints(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = workspace.cargo();
-    command.arg("clippy").args(light()).args(["--all-targets", "--features", LIGHT_FEATURES, "--", "-D", "warnings"]);
-    shell::run(&mut command)?;
-    Ok(Outcome::Done)
-}
-
-/// What is heavy, and what is built with it.
-fn heavy(workspace: &Workspace, before: &[&str], after: &[&str]) -> Result<Outcome> {
-    let mut command = workspace.cargo();
-    let packages = HEAVY.into_iter().chain(WITH_HEAVY).flat_map(|package| ["--package", package]);
-    command.args(before).args(packages).args(["--features", HEAVY_FEATURES]).args(after);
-    shell::run(&mut command)?;
-    Ok(Outcome::Done)
-}
-
 fn documentation(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = workspace.cargo();
+    let mut command = workspace.cargo_light("doc");
     // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    command.arg("doc").args(light()).args(["--lib", "--no-deps", "--features", LIGHT_FEATURES]);
-    command.env("RUSTDOCFLAGS", "-D warnings");
-    shell::run(&mut command)?;
-    Ok(Outcome::Done)
+    command.args(["--lib", "--no-deps", "--features", &workspace.light_features()]);
+    run_cargo(command.env("RUSTDOCFLAGS", "-D warnings"))
 }
 
 fn licences(workspace: &Workspace) -> Result<Outcome> {
     if !shell::answers(workspace.cargo().args(["deny", "--version"])) {
-        return Ok(Outcome::Skipped("cargo-deny is not installed".to_owned()));
+        // Advisories alone are left out then.
+        return supply::check(workspace);
     }
     cargo(workspace, &["deny", "check"])
 }

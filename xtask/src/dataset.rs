@@ -39,13 +39,13 @@ pub(crate) fn generate<I: AsRef<OsStr>>(
     out: &Path,
     arguments: impl IntoIterator<Item = I>,
 ) -> Result<()> {
-    generate_with(workspace, &[], out, arguments)
+    generate_with(workspace, "", out, arguments)
 }
 
-/// The same with what `cargo` is told before.
+/// The same by a program with these features.
 pub(crate) fn generate_with<I: AsRef<OsStr>>(
     workspace: &Workspace,
-    build: &[&str],
+    features: &str,
     out: &Path,
     arguments: impl IntoIterator<Item = I>,
 ) -> Result<()> {
@@ -54,8 +54,7 @@ pub(crate) fn generate_with<I: AsRef<OsStr>>(
     }
     let mut command = workspace.cargo();
     command
-        .args(["run", "--quiet", "--release", "--package", "papsynth-cli"])
-        .args(build)
+        .args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features", features])
         .args(["--", "generate", "--out"])
         .arg(out)
         .args(arguments);

@@ -5,14 +5,14 @@ use anyhow::{Result, bail};
 use crate::Chore;
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
-use crate::workspace::{Package, Workspace};
+use crate::workspace::{HEAVY, Package, Workspace};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "deps",
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
-    details: "Technique crates know no one here, nor do containers of files; the engine knows techniques alone, the data set the engine and the containers, the study the data set, the \
-              judge nobody, the program all of them, the benches what they time, the chores nobody. Dependencies of tests count too, so \
+    details: "The transforms know no one here, technique crates the transforms, the engine knows techniques alone, the data set the engine and kinds of files, which know \
+              no one, the study the data set, the judge nobody, the program all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -20,6 +20,7 @@ pub(crate) const CHORE: Chore = Chore {
 /// The place of a crate in the house.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
+    Transforms,
     Technique,
     Engine,
     /// Knows how a kind of file is laid out, and nothing of what is in it.
@@ -30,11 +31,13 @@ enum Role {
     Study,
     Program,
     Benches,
+    Hashes,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 18] = [
+const PLACES: [(&str, Role); 21] = [
+    ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -45,6 +48,7 @@ const PLACES: [(&str, Role); 18] = [
     ("dye-spectra", Role::Technique),
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
+    ("papsynth-zarr", Role::Container),
     ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
@@ -52,6 +56,7 @@ const PLACES: [(&str, Role); 18] = [
     ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
     ("papsynth-benches", Role::Benches),
+    ("papsynth-hashes", Role::Hashes),
     ("xtask", Role::Chores),
 ];
 
@@ -63,9 +68,13 @@ impl Role {
     /// Whom a crate in this place may depend on.
     fn may_know(self) -> &'static [Self] {
         match self {
-            // Who judges must not know what is judged.
-            Self::Technique | Self::Container | Self::Judge | Self::Chores => &[],
+            // Who judges must not know what is judged, nor a kind of file what lies in it.
+            Self::Transforms | Self::Container | Self::Judge | Self::Chores => &[],
+            // Those that compute in frequencies share the transforms.
+            Self::Technique => &[Self::Transforms],
             Self::Engine => &[Self::Technique],
+            // It must run where files and threads do not.
+            Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
@@ -82,17 +91,32 @@ impl Role {
 /// The crates that know techniques alone, for chores that build them without the rest.
 pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
     let names = workspace.packages.iter().map(|package| package.name.as_str());
-    names.filter(|name| matches!(Role::of(name), Some(Role::Technique | Role::Engine)))
+    names.filter(|name| matches!(Role::of(name), Some(Role::Transforms | Role::Technique | Role::Engine)))
 }
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     print!("{}", picture(&workspace.packages));
-    let faults = faults(&workspace.packages);
+    let mut faults = faults(&workspace.packages);
+    faults.extend(unusual(workspace));
     if !faults.is_empty() {
         bail!("{}", faults.join("\n       "));
     }
     Ok(Outcome::Done)
+}
+
+/// Where the members that Cargo builds unasked are not all crates but the heavy ones.
+fn unusual(workspace: &Workspace) -> impl Iterator<Item = String> {
+    let crates = workspace.root.join("crates");
+    workspace.packages.iter().filter(move |package| package.folder.starts_with(&crates)).filter_map(|package| {
+        let name = &package.name;
+        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == name);
+        match (is_heavy, workspace.usual.contains(name)) {
+            (true, true) => Some(format!("`{name}` is heavy and must not be among the default-members: Cargo.toml")),
+            (false, false) => Some(format!("`{name}` must be among the default-members: Cargo.toml")),
+            _ => None,
+        }
+    })
 }
 
 /// Everything that is against the rules.
@@ -130,7 +154,14 @@ mod tests {
 
     fn package(name: &str, members: &[&str]) -> Package {
         let members = members.iter().map(|&member| member.to_owned()).collect();
-        Package { name: name.to_owned(), folder: "/".into(), members, targets: Vec::new() }
+        Package {
+            name: name.to_owned(),
+            id: name.to_owned(),
+            features: Vec::new(),
+            folder: "/".into(),
+            members,
+            targets: Vec::new(),
+        }
     }
 
     #[test]

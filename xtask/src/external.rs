@@ -8,16 +8,16 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::python::Python;
-use crate::workspace::Workspace;
-use crate::{Chore, ci, dataset, shell};
+use crate::workspace::{self, Workspace};
+use crate::{Chore, dataset, shell, supply};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "external",
     usage: "[--full]",
     about: "has other people's programs read what we write, and judge our camera",
     details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
-              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
-              frames of the camera presets; libjpeg compresses what our JPEG did. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
+              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
+              frames of the camera presets; libjpeg compresses what our JPEG did; with --full the bill of materials is held against the schema of CycloneDX, too. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
 
@@ -27,15 +27,18 @@ const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\np
 /// Heavier ones. jsonpath-rw, which mlcroissant wants, has no wheel.
 const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nopencv-python-headless\n";
 
+/// Readers of OME-Zarr; napari's reader brings the library of the format's authors along.
+const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\n";
+
 /// Those who measure cameras.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
 
 const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_px=300"];
 
-const ALL_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
+const LIGHT_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
 
-/// Those that want a feature.
-const HEAVY_FORMATS: &str = ",huggingface";
+/// Those that heavy crates write.
+const HEAVY_FORMATS: &str = "ome-zarr,huggingface";
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let full = arguments.flag("--full");
@@ -59,23 +62,61 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     }
     let pages = workspace.root.join("docs/formats");
     let mut written = Vec::new();
-    let build: &[&str] = if full { &["--features", ci::HEAVY_FEATURES] } else { &[] };
-    let formats = [ALL_FORMATS, if full { HEAVY_FORMATS } else { "" }].concat();
+    let (features, formats) = match full {
+        true => (workspace::heavy_features(), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
+        false => (String::new(), LIGHT_FORMATS.to_owned()),
+    };
+    let formats = ["--format", formats.as_str()];
     for (name, own) in [
         ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),
         ("all-stack", &["--frames", "1", "--frames-per-shard", "1", "--set", "focus.planes=3", "--flatten", "drop"]),
         ("all-colour", &[colour.as_slice(), &["--camera", "scmos", "--flatten", "max"]].concat()),
     ] {
         let out = folder.join(name);
-        let arguments = own.iter().chain(&SMALL).copied().chain(["--format", formats.as_str()]);
-        dataset::generate_with(workspace, build, &out, arguments)?;
+        dataset::generate_with(workspace, &features, &out, own.iter().chain(&SMALL).chain(&formats))?;
         shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
         written.push(out);
     }
     if full {
+        bill_of_materials(workspace)?;
+        // Of a pyramid.
+        let out = folder.join("large");
+        let own = [
+            "--frames",
+            "1",
+            "--format",
+            "folder,ome-zarr",
+            "--set",
+            "field.width_px=2101",
+            "--set",
+            "field.height_px=1000",
+        ];
+        dataset::generate_with(workspace, &features, &out, own)?;
         heavier(workspace, &written, &pages)?;
+        read_zarr(workspace, written.iter().chain([&out]), &pages)?;
     }
     measure(workspace)
+}
+
+/// Has the bill of materials validated against the schema of CycloneDX 1.5.
+fn bill_of_materials(workspace: &Workspace) -> Result<()> {
+    let python = match Python::environment(workspace, "cyclonedx", "cyclonedx-python-lib[json-validation]\n")? {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => bail!("{reason}"),
+    };
+    let path = supply::write(workspace)?;
+    let first = std::fs::read(&path)?;
+    ensure!(
+        std::fs::read(supply::write(workspace)?)? == first,
+        "the bill of materials differs from one run to the next"
+    );
+    const VALIDATE: &str = "import sys
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+found = JsonStrictValidator(SchemaVersion.V1_5).validate_str(open(sys.argv[1]).read())
+sys.exit(f'not CycloneDX 1.5: {found}') if found else print('CycloneDX 1.5:', sys.argv[1])
+";
+    shell::run(Command::new(&python).args(["-c", VALIDATE]).arg(&path))
 }
 
 fn script(workspace: &Workspace, name: &str) -> Result<PathBuf> {
@@ -101,6 +142,18 @@ fn heavier(workspace: &Workspace, written: &[PathBuf], pages: &Path) -> Result<(
         let mut command = Command::new(&python);
         command.arg(script(workspace, "external_full.py")?).arg(out).arg(pages).args(&bio_formats);
         shell::run(command.envs([("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_DISABLE_PROGRESS_BARS", "1")]))?;
+    }
+    Ok(())
+}
+
+/// Has OME-Zarr read, in an environment of its own: the others hold its packages back.
+fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBuf>, pages: &Path) -> Result<()> {
+    let python = match Python::environment(workspace, "external-zarr", &format!("{PACKAGES}{ZARR}"))? {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => bail!("{reason}"),
+    };
+    for out in written {
+        shell::run(Command::new(&python).arg(script(workspace, "external_zarr.py")?).arg(out).arg(pages))?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 //!
 //! Cargo and rustc do all the work; each chore is one file. Nothing here knows what a cell is.
 
+#![forbid(unsafe_code)]
 #![expect(clippy::print_stdout, reason = "a program that talks to whoever called it")]
 
 mod arguments;
@@ -14,12 +15,14 @@ mod equations;
 mod external;
 mod figures;
 mod golden;
+mod hashes;
 mod outcome;
 mod peers;
 mod publish;
 mod python;
 mod realism;
 mod shell;
+mod supply;
 mod test;
 mod torture;
 mod wasm;
@@ -49,6 +52,7 @@ const CHORES: &[Chore] = &[
     dataset::CHORE,
     test::CHORE,
     golden::CHORE,
+    hashes::CHORE,
     bench::CHORE,
     figures::CHORE,
     realism::CHORE,
@@ -58,6 +62,7 @@ const CHORES: &[Chore] = &[
     browser::CHORE,
     wasm::CHORE,
     publish::CHORE,
+    supply::CHORE,
     ci::CHORE,
     torture::CHORE,
 ];

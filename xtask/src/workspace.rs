@@ -8,6 +8,24 @@ use serde_json::Value;
 
 use crate::shell;
 
+/// A crate that takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
+pub(crate) struct Heavy {
+    pub(crate) package: &'static str,
+    /// The features of other crates that bring it along.
+    pub(crate) features: &'static [&'static str],
+}
+
+/// All of them; each is missing in the `default-members` of the workspace, too.
+pub(crate) const HEAVY: &[Heavy] = &[
+    Heavy { package: "papsynth-parquet", features: &["papsynth-dataset/parquet", "papsynth-cli/parquet"] },
+    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-cli/zarr"] },
+];
+
+/// The features of other crates that bring heavy ones along, as Cargo reads them.
+pub(crate) fn heavy_features() -> String {
+    HEAVY.iter().flat_map(|heavy| heavy.features).copied().collect::<Vec<_>>().join(",")
+}
+
 /// The workspace.
 pub(crate) struct Workspace {
     /// The folder of the root manifest.
@@ -16,11 +34,17 @@ pub(crate) struct Workspace {
     pub(crate) target: PathBuf,
     /// The members.
     pub(crate) packages: Vec<Package>,
+    /// The names of those that Cargo builds where none is named.
+    pub(crate) usual: Vec<String>,
 }
 
 /// One member of the workspace.
 pub(crate) struct Package {
     pub(crate) name: String,
+    /// As Cargo tells it from others.
+    pub(crate) id: String,
+    /// Its features, but the default.
+    pub(crate) features: Vec<String>,
     /// The folder of its manifest.
     pub(crate) folder: PathBuf,
     /// The members it depends on in any way, tests and build scripts included.
@@ -34,8 +58,13 @@ impl Workspace {
     pub(crate) fn load() -> Result<Self> {
         let text = shell::output(cargo_command().args(["metadata", "--no-deps", "--format-version", "1"]))?;
         let metadata: Value = serde_json::from_str(&text).context("the output of `cargo metadata`")?;
-        let packages = array(&metadata, "packages").iter().map(Package::new).collect::<Result<_>>()?;
+        let packages = array(&metadata, "packages").iter().map(Package::new).collect::<Result<Vec<_>>>()?;
+        let usual = array(&metadata, "workspace_default_members").iter().filter_map(Value::as_str);
+        // An identity names the folder and, where that has another name, the package.
+        let usual = packages.iter().filter(|package: &&Package| usual.clone().any(|id| id == package.id));
+        let usual = usual.map(|package| package.name.clone()).collect();
         Ok(Self {
+            usual,
             root: text_of(&metadata, "workspace_root")?.into(),
             target: text_of(&metadata, "target_directory")?.into(),
             packages,
@@ -47,6 +76,41 @@ impl Workspace {
         let mut command = cargo_command();
         command.current_dir(&self.root);
         command
+    }
+
+    /// `cargo NAME` of all members but the heavy ones.
+    pub(crate) fn cargo_light(&self, name: &str) -> Command {
+        let mut command = self.cargo();
+        command.args([name, "--workspace"]);
+        for heavy in HEAVY {
+            command.args(["--exclude", heavy.package]);
+        }
+        command
+    }
+
+    /// `cargo NAME` of the heavy members and of those that one of their features brings them to, with these features.
+    pub(crate) fn cargo_heavy(&self, name: &str) -> Command {
+        let mut command = self.cargo();
+        let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
+        let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
+        packages.extend(HEAVY.iter().map(|heavy| heavy.package));
+        packages.sort_unstable();
+        packages.dedup();
+        command.args([name, "--features", &heavy_features()]);
+        for package in packages {
+            command.args(["--package", package]);
+        }
+        command
+    }
+
+    /// Every feature of every member but those that bring heavy ones along, as Cargo reads them.
+    pub(crate) fn light_features(&self) -> String {
+        let all = self
+            .packages
+            .iter()
+            .flat_map(|package| package.features.iter().map(|feature| format!("{}/{feature}", package.name)));
+        let is_heavy = |feature: &String| HEAVY.iter().any(|heavy| heavy.features.contains(&feature.as_str()));
+        all.filter(|feature| !is_heavy(feature)).collect::<Vec<_>>().join(",")
     }
 
     /// A path below the target folder as a person would type it from the root folder.
@@ -79,8 +143,12 @@ impl Package {
             |target: &Value| array(target, "kind").first().and_then(Value::as_str).unwrap_or_default().to_owned();
         let targets =
             array(value, "targets").iter().map(|t| Ok((kind(t), text_of(t, "name")?))).collect::<Result<_>>()?;
+        let features = value.get("features").and_then(Value::as_object);
+        let features = features.into_iter().flat_map(|features| features.keys());
         Ok(Self {
             name: text_of(value, "name")?,
+            id: text_of(value, "id")?,
+            features: features.filter(|name| *name != "default").cloned().collect(),
             folder: manifest.parent().context("a manifest lies in a folder")?.to_owned(),
             members,
             targets,

@@ -1,10 +1,10 @@
 use core::f64::consts::PI;
 
-use rustfft::num_complex::Complex64;
+use lane_fft::{ComplexPlane, PlaneScratch};
+use num_complex::Complex64;
 
-use crate::complex_plane::ComplexPlane;
 use crate::error::{Error, require_count};
-use crate::fft::{Fft, LONGEST_SIDE, signed};
+use crate::grid::{LONGEST_SIDE, signed};
 use crate::microscope::distance;
 use crate::pupil::{Pupil, RIM, turn};
 use crate::{Layer, Microscope};
@@ -37,13 +37,11 @@ pub struct AbbeParams {
     pub height: usize,
     /// Directions of light. Default 64 Vogel points, ours.
     pub source: Source,
-    /// Which FFT runs. Default [`Fft::Fastest`], ours.
-    pub fft: Fft,
 }
 
 impl Default for AbbeParams {
     fn default() -> Self {
-        Self { width: 512, height: 512, source: Source::Vogel { points: 64 }, fft: Fft::Fastest }
+        Self { width: 512, height: 512, source: Source::Vogel { points: 64 } }
     }
 }
 
@@ -66,6 +64,36 @@ const MOST_POINTS: usize = 65_536;
 pub struct Abbe {
     microscope: Microscope,
     params: AbbeParams,
+}
+
+/// A complex image and its spectrum, in double precision. The spectrum lies column after column.
+struct Plane {
+    plan: ComplexPlane<f64, 8>,
+    field: Vec<Complex64>,
+    spectrum: Vec<Complex64>,
+    scratch: PlaneScratch<f64, 8>,
+}
+
+impl Plane {
+    fn new(width: usize, height: usize) -> Self {
+        let blank = vec![Complex64::ZERO; width * height];
+        Self {
+            plan: ComplexPlane::new(width, height),
+            field: blank.clone(),
+            spectrum: blank,
+            scratch: PlaneScratch::default(),
+        }
+    }
+
+    /// Spectrum of the field.
+    fn forward(&mut self) {
+        self.plan.forward(&self.field, &mut self.spectrum, &mut self.scratch);
+    }
+
+    /// Field of the spectrum, times the number of samples. Columns for which `is_dark` holds are taken for empty.
+    fn inverse(&mut self, is_dark: impl Fn(usize) -> bool) {
+        self.plan.inverse(&self.spectrum, is_dark, &mut self.field, &mut self.scratch);
+    }
 }
 
 /// Directions of one colour of the band, cycles/µm, and the weight of all together.
@@ -130,7 +158,7 @@ impl Abbe {
             image.fill(1.0);
             return Ok(image);
         };
-        let mut plane = ComplexPlane::new(self.params.width, self.params.height, self.params.fft);
+        let mut plane = Plane::new(self.params.width, self.params.height);
         for (value, &[re, im]) in plane.field.iter_mut().zip(first.amplitude()) {
             *value = Complex64::new(re, im);
         }
@@ -149,7 +177,7 @@ impl Abbe {
         layers: &[&Layer],
         stage_um: f64,
         entering: &[Complex64],
-        plane: &mut ComplexPlane,
+        plane: &mut Plane,
         image: &mut [f64],
     ) {
         let params = self.microscope.params();
@@ -182,7 +210,7 @@ impl Abbe {
 
     /// From the spectrum of an envelope, light from direction `s`, to the field after it passed
     /// through exp 2πi of `waves` at f + s; what has none does not pass, nor what is beyond `reach`.
-    fn filter(&self, plane: &mut ComplexPlane, s: [f64; 2], reach: f64, waves: impl Fn([f64; 2]) -> Option<f64>) {
+    fn filter(&self, plane: &mut Plane, s: [f64; 2], reach: f64, waves: impl Fn([f64; 2]) -> Option<f64>) {
         let (width, height) = (self.params.width, self.params.height);
         let pitch = self.microscope.pitch_um();
         let frequency = |i, side: usize, s| signed(i, side) / (side as f64 * pitch) + s;

@@ -2,9 +2,9 @@ use core::fmt;
 
 use crate::canvas::Canvas;
 use crate::error::{Error, require_count};
-use crate::fft::{LONGEST_SIDE, fast_length};
 use crate::filter::Filter;
-use crate::lane_fft::LanePlans;
+use crate::grid::{LONGEST_SIDE, fast_length};
+use crate::lanes::LanePlans;
 use crate::microscope::distance;
 use crate::{Microscope, Specimen, Transfer};
 

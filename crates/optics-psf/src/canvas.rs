@@ -3,8 +3,8 @@ use multiversion::multiversion;
 use crate::Microscope;
 use crate::exp::exp;
 use crate::filter::{Block, Filter, Lattice, Part};
-use crate::lane_fft::{LANES, LanePlans, Lanes, ZERO};
 use crate::lane_plane::{LanePlane, LaneScratch, LaneSupport, STRIPE};
+use crate::lanes::{LANES, LanePlans, Lanes, ZERO};
 use crate::pupil::turn;
 use crate::transfer::Transfer;
 

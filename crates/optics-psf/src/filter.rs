@@ -1,10 +1,10 @@
 use core::f64::consts::TAU;
 
 use multiversion::multiversion;
-use rustfft::num_complex::Complex32;
+use num_complex::Complex32;
 
 use crate::Microscope;
-use crate::lane_fft::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes};
 use crate::transfer::{SIDED_SAMPLES, Shape, Transfer, corners};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the

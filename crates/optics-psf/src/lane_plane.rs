@@ -1,8 +1,10 @@
 use std::sync::Arc;
 
+use lane_fft::transposed;
 use multiversion::multiversion;
 
-use crate::lane_fft::{LANES, LaneFft, LanePlans, Lanes, ZERO};
+use crate::grid::signed;
+use crate::lanes::{LANES, LaneFft, LanePlans, Lanes, ZERO};
 
 /// Columns of an image that are transformed together: two for each lane, as real and imaginary part.
 pub(crate) const STRIPE: usize = 2 * LANES;
@@ -47,6 +49,16 @@ impl LaneSupport {
         self.reach[block]
     }
 
+    /// Frequencies in cycles per sample, kx and ky of every lane, in the order of their places.
+    pub(crate) fn frequencies(&self, width: usize, height: usize) -> impl Iterator<Item = [[f64; 2]; LANES]> {
+        self.reach.iter().enumerate().flat_map(move |(block, &reach)| {
+            (0..=reach).chain(width - reach..width).map(move |x| {
+                let fx = signed(x, width) / width as f64;
+                core::array::from_fn(|l| [fx, (block * LANES + l) as f64 / height as f64])
+            })
+        })
+    }
+
     /// A block of a spectrum.
     pub(crate) fn block<'a>(&self, spectrum: &'a [Lanes], block: usize) -> &'a [Lanes] {
         &spectrum[self.start[block]..][..2 * self.reach[block] + 1]
@@ -63,8 +75,8 @@ impl LaneSupport {
 pub(crate) struct LanePlane {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    along_x: Arc<LaneFft>,
-    along_y: Arc<LaneFft>,
+    along_x: Arc<LaneFft<f32>>,
+    along_y: Arc<LaneFft<f32>>,
 }
 
 /// Working memory of [`LanePlane`].
@@ -206,18 +218,7 @@ impl LanePlane {
     }
 }
 
-type Square = [[f32; LANES]; LANES];
-
-#[inline(always)]
-fn transposed(from: &Square) -> Square {
-    let mut to = [[0.0; LANES]; LANES];
-    for (i, to) in to.iter_mut().enumerate() {
-        for (to, from) in to.iter_mut().zip(from) {
-            *to = from[i];
-        }
-    }
-    to
-}
+type Square = lane_fft::Square<f32, LANES>;
 
 /// Not by `map`, which is a function of its own, without vectors.
 #[inline(always)]

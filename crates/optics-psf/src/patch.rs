@@ -3,10 +3,10 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::canvas::{Canvas, Memory, Samples, Spectra, absorbed_of, amplitude_of, is_lit};
-use crate::fft::fast_length;
 use crate::filter::{Filter, Lattice, incoherence};
+use crate::grid::fast_length;
 use crate::ladder::Ladder;
-use crate::lane_fft::LanePlans;
+use crate::lanes::LanePlans;
 use crate::microscope::distance;
 use crate::{Error, Microscope};
 
@@ -173,16 +173,29 @@ impl PatchImager {
         Filter::new(self.microscope(), depth, stage, &self.ladder.transfer(depth, stage))
     }
 
-    fn focus_with(&self, filter: Filter, depth: f64, stage: f64) -> Focus {
+    /// The margin that a patch needs at a focus ([`Focus::margin_px`]), without anything being computed for it.
+    ///
+    /// # Errors
+    ///
+    /// As [`PatchImager::focus`].
+    pub fn margin_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Error> {
+        Ok(self.margin(distance("depth_um", depth_um)?, distance("stage_um", stage_um)?))
+    }
+
+    fn margin(&self, depth: f64, stage: f64) -> usize {
         let params = self.microscope().params();
         let cone = self.microscope().spread_um(depth, stage);
         let fringes = FRINGES + OPEN_FRINGES * incoherence(params.condenser_na / params.na);
         let reach = CONES * cone + fringes * params.wavelength_um / params.na;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a distance in pixels")]
         let pixels = (reach / params.pixel_um).ceil() as usize;
+        margin_class(pixels)
+    }
+
+    fn focus_with(&self, filter: Filter, depth: f64, stage: f64) -> Focus {
         Focus {
             filter: Arc::new(filter),
-            margin_px: margin_class(pixels),
+            margin_px: self.margin(depth, stage),
             defocus_um: self.microscope().defocus_um(depth, stage),
             plans: Arc::clone(&self.plans),
         }

@@ -2,7 +2,7 @@ use crate::BrightField;
 use crate::canvas::{Memory, Samples, Spectra, absorbed_of, amplitude, is_lit};
 use crate::exp::absorbed;
 use crate::filter::{Filter, Lattice};
-use crate::lane_fft::Lanes;
+use crate::lanes::Lanes;
 use crate::light::{lift, mean_of_pixels};
 
 /// What is on the slide, slab by slab, as the spectra of what it absorbs and delays. It is made by

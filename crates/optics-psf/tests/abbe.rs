@@ -4,7 +4,7 @@ mod support;
 
 use core::f64::consts::LN_10;
 
-use optics_psf::{Abbe, AbbeParams, Error, Fft, Layer, Source};
+use optics_psf::{Abbe, AbbeParams, Error, Layer, Source};
 use support::{SIDE, absorbing, array, microscope, phase_object, relative, shifted, single, soft_disk, worst};
 
 fn abbe(condenser_na: f64, source: Source) -> Abbe {
@@ -138,16 +138,6 @@ fn the_energy_of_coherent_light_does_not_depend_on_focus() {
     for (depth, stage) in [(1.0, 0.0), (7.0, 0.0), (0.0, -3.0), (4.0, 2.0)] {
         assert!((energy(depth, stage) - focused).abs() < 1e-12);
     }
-}
-
-#[test]
-fn the_portable_fft_gives_the_same_image() {
-    let disk = soft_disk(3.0, 0.5, 0.12);
-    let image = |fft| {
-        let params = AbbeParams { width: SIDE, height: SIDE, fft, ..AbbeParams::default() };
-        Abbe::new(&microscope(0.6), &params).unwrap().image(&[absorbing(1.0, &disk)], 0.0).unwrap()
-    };
-    assert!(worst(&image(Fft::Portable), &image(Fft::Fastest)) < 1e-12);
 }
 
 #[test]

@@ -89,7 +89,7 @@ fn in_focus_every_aperture_is_within_0_2_percent_of_many_directions() {
         for condenser_na in [0.41, 0.75, 0.9, 0.95] {
             let params = sampled(condenser_na);
             let source = optics_psf::Source::Vogel { points: 1024 };
-            let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+            let abbe = AbbeParams { width: SIDE, height: SIDE, source };
             let abbe = Abbe::new(&Microscope::new(&params).unwrap(), &abbe).unwrap();
             let reference = abbe.image(&[support::absorbing(0.0, &object)], 0.0).unwrap();
             let error = relative(&image(&field(&params, &[0.0], &[0.0]), &[&object]), &reference);
@@ -130,7 +130,7 @@ fn aberrations_with_a_side_agree_with_abbe() {
     let zernike = Zernike { coma: [0.08, -0.04], astigmatism: [0.0, 0.06], spherical: 0.03, ..Zernike::default() };
     let params = MicroscopeParams { zernike, ..sampled(0.6) };
     let source = optics_psf::Source::Lattice { stride: 2 };
-    let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+    let abbe = AbbeParams { width: SIDE, height: SIDE, source };
     let abbe = Abbe::new(&Microscope::new(&params).unwrap(), &abbe).unwrap();
     let half: Vec<f64> = asym.iter().map(|a| 0.5 * a).collect();
     let phase: Vec<f64> = half.iter().map(|a| 0.5 * a).collect();
@@ -336,7 +336,7 @@ fn binning_by_depth_costs_at_most_0_3_percent() {
         ((0..count).map(depth).collect::<Vec<f64>>(), slice)
     };
     let source = optics_psf::Source::Lattice { stride: 4 };
-    let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+    let abbe = AbbeParams { width: SIDE, height: SIDE, source };
     let abbe = Abbe::new(&Microscope::new(&sampled(0.4)).unwrap(), &abbe).unwrap();
     for centre in [0.0, 2.0, 5.0] {
         let (depths, slice) = slices(centre, 12);

@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
 
 mod args;
 mod calibrate;
@@ -22,6 +23,7 @@ mod rerender;
 mod schema;
 mod setup;
 mod share;
+mod slide;
 mod status;
 mod study;
 mod submit;
@@ -81,6 +83,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Status(args) => status::run(&args),
         Verb::Merge(args) => status::merge(&args),
         Verb::Clean(args) => verify::clean(&args),
+        Verb::Slide(args) => slide::run(args.verb),
         Verb::Study(args) => study::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();

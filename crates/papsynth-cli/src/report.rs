@@ -126,6 +126,47 @@ impl Progress {
     }
 }
 
+/// Says how far work in few large steps is.
+#[derive(Debug)]
+#[cfg(feature = "zarr")]
+pub(crate) struct Bar {
+    style: Style,
+    bar: ProgressBar,
+}
+
+#[cfg(feature = "zarr")]
+impl Bar {
+    /// Of so many steps.
+    pub(crate) fn start(quiet: bool) -> Self {
+        let style = match quiet {
+            true => Style::Quiet,
+            false if io::stderr().is_terminal() => Style::Bar,
+            false => Style::Lines,
+        };
+        let target = if style == Style::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let template = "[{bar:30}] {pos} of {len}, {elapsed} gone, about {eta} left: {msg}";
+        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self { style, bar }
+    }
+
+    /// A step is done. Whoever closed the stream that this is told on no longer wants to know.
+    pub(crate) fn say(&self, done: u64, all: u64, what: &str) {
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+        self.bar.set_message(what.to_owned());
+        if self.style == Style::Lines && is_told(done, all) {
+            let left = if done < all { format!(", about {} left", duration(self.bar.eta().as_secs())) } else { String::new() };
+            let _ = writeln!(io::stderr().lock(), "{what} ({done} of {all}{left})");
+        }
+    }
+
+    /// Takes the bar away.
+    pub(crate) fn clear(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
 /// The bar, with what follows it.
 fn look(rest: &str) -> ProgressStyle {
     let template = format!("{{msg}} [{{bar:30}}] {{pos}} of {{len}} frames, {{elapsed}} gone{rest}");

@@ -6,9 +6,13 @@ use crate::args::{Clean, Verify};
 use crate::exit::{self, Complaint, Failure};
 
 /// Findings that are printed in full; the rest is counted.
-const MOST: usize = 50;
+pub(crate) const MOST: usize = 50;
 
 pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
+    #[cfg(feature = "zarr")]
+    if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
+        return crate::slide::verify(&args.dir, args.json);
+    }
     let verdict = papsynth_dataset::verify(&args.dir, args.frames.map(|frames| 0..frames))?;
     let dir = args.dir.display();
     if args.json {

@@ -131,6 +131,36 @@ fn conversion_keeps_everything_but_the_format() {
 }
 
 #[test]
+#[cfg(not(feature = "zarr"))]
+fn a_format_of_another_build_is_refused_before_anything_is_written() {
+    let bench = Bench::new("another-build");
+    let run = bench.run("generate --out out --frames 1 --format folder,ome-zarr");
+    assert!(run.code == 2 && run.err.contains("needs a build of papsynth with `--features zarr`"), "{}", run.err);
+    assert!(!bench.path("out").exists());
+    assert!(bench.good("generate --help").out.contains("wants a build with --features zarr"));
+}
+
+#[test]
+#[cfg(feature = "zarr")]
+fn groups_of_zarr_are_made_verified_and_converted() {
+    let bench = Bench::new("zarr");
+    bench.good(&format!("generate --out out --frames 2 {TINY}"));
+    bench.good(&format!("generate --out direct --frames 2 --format ome-zarr {TINY}"));
+    bench.good("convert out --out converted --format ome-zarr");
+    assert_eq!(bench.files("direct"), bench.files("converted"));
+    root(&bench, "direct", 2);
+    bench.good("convert direct --out flat --format cellpose");
+    bench.good("convert out --out flat-too --format cellpose");
+    assert_eq!(bench.files("flat"), bench.files("flat-too"));
+    let lost = bench.path("direct/ome-zarr/000001.ome.zarr/0/c/0/0");
+    fs::remove_file(lost).unwrap();
+    let run = bench.run("verify direct");
+    assert!(run.code == 2 && run.out.contains("000001.ome.zarr/0/c/0/0"), "{} {}", run.out, run.err);
+    bench.good(&format!("generate --out direct --frames 2 --format ome-zarr --verify {TINY}"));
+    assert_eq!(bench.files("direct"), bench.files("converted"));
+}
+
+#[test]
 fn scenes_are_imaged_again_and_their_truth_stays() {
     let bench = Bench::new("rerender");
     bench.good(&format!("generate --out out --range 2..5 {TINY}"));

@@ -8,7 +8,7 @@ use crate::dataset::Dataset;
 use crate::formats::Format;
 use crate::layout;
 use crate::merge::Summary;
-use crate::record::{FileRecord, WRITER};
+use crate::record::FileRecord;
 
 /// What the card says of images that no person made: <https://spdx.org/licenses/CC0-1.0.html>.
 const LICENCE: &str = "https://creativecommons.org/publicdomain/zero/1.0/";
@@ -16,14 +16,14 @@ const LICENCE: &str = "https://creativecommons.org/publicdomain/zero/1.0/";
 const ABOUT: &str = "Synthetic bright-field microscope images of cervical smears with exact truth: complete (amodal) and visible masks of \
                      every cell, nucleus and piece of debris, with class, place, depth and stain.";
 
-/// The card, in Markdown with the head that Hugging Face reads.
-pub(crate) fn card(dataset: &Dataset, summary: &Summary) -> String {
+/// The card, in Markdown with the head that Hugging Face reads; `writer` is the program that made the data set.
+pub(crate) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String {
     let identity = &dataset.identity;
     let formats = &dataset.layout.formats;
     let mut text = format!(
         "---\nlicense: cc0-1.0\ntask_categories:\n- image-segmentation\n- object-detection\ntags:\n- synthetic\n- cytology\n- \
          microscopy\n---\n\n# Synthetic cervical smears\n\n{ABOUT}\n\n## How it was made\n\n\
-         | | |\n|---|---|\n| program | {WRITER} |\n| recipe | `recipe.toml`, SHA-256 `{}` |\n| model | `model.json`, SHA-256 \
+         | | |\n|---|---|\n| program | {writer} |\n| recipe | `recipe.toml`, SHA-256 `{}` |\n| model | `model.json`, SHA-256 \
          `{}` |\n| seed | {} |\n| version of streams | {} |\n| frames | {} |\n\nThe same recipe, model, seed and version of streams give \
          the same pixels, labels and tables again:\n\n```sh\npapsynth generate recipe.toml --model model.json --seed {} \
          --frames N --out again\n```\n",

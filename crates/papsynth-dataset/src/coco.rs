@@ -184,7 +184,14 @@ impl Annotation {
 
     /// With `ids` more before it.
     pub(crate) fn renumbered(self, ids: u64) -> Self {
-        Self { id: self.id + ids, parent_id: self.parent_id.map(|parent| parent + ids), ..self }
+        let parent_id = self.parent_id.map(|parent| parent.saturating_add(ids));
+        Self { id: self.id.saturating_add(ids), parent_id, ..self }
+    }
+
+    /// Whether it is part of another object that is in the image.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn has_parent(&self) -> bool {
+        self.parent_id.is_some()
     }
 
     /// The frame that it is in.

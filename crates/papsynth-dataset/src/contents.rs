@@ -11,7 +11,7 @@ use std::path::Path;
 
 use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
 
-use crate::coco::{Document, Image};
+use crate::coco::{Category, Document, Image, Info};
 use crate::dataset::Flaw;
 use crate::error::{Error, Problem};
 use crate::files::Folder;
@@ -26,8 +26,13 @@ use crate::shard_writer::summary;
 use crate::table::table;
 
 /// What does not fit together in a shard whose files are as its record says.
-pub(crate) fn flaw(folder: &Folder, layout: &Layout, record: &ShardRecord) -> Result<Option<Flaw>, Error> {
-    match compare(folder, layout, record) {
+pub(crate) fn flaw(
+    folder: &Folder,
+    layout: &Layout,
+    categories: &[Category],
+    record: &ShardRecord,
+) -> Result<Option<Flaw>, Error> {
+    match compare(folder, layout, categories, record) {
         Ok(()) => Ok(None),
         Err(Error::Input { path, problem }) => {
             let path = path.strip_prefix(folder.root()).unwrap_or(&path).display().to_string();
@@ -41,14 +46,19 @@ pub(crate) fn flaw(folder: &Folder, layout: &Layout, record: &ShardRecord) -> Re
     }
 }
 
-fn compare(folder: &Folder, layout: &Layout, record: &ShardRecord) -> Result<(), Error> {
-    let names = [layout::coco(record.shard), layout::table(record.shard)].map(|name| folder.path(&name));
-    let [coco, csv] = &names;
+fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &ShardRecord) -> Result<(), Error> {
+    let (coco, csv) = (&folder.path(&layout::coco(record.shard)), &folder.inside(&layout::table(record.shard))?);
     let document = document(folder, record.shard)?;
     if document.images.len() != record.frames.len() {
         return differs(coco, format!("it has {} images, the record {}", document.images.len(), record.frames.len()));
     }
-    let tar_path = folder.path(&tar(record.shard));
+    if document.info != Info::default() || !document.licenses.is_empty() {
+        return differs(coco, "it does not say what a document of a data set says of itself".to_owned());
+    }
+    if document.categories != categories {
+        return differs(coco, "its categories are not those of the data set".to_owned());
+    }
+    let tar_path = folder.inside(&tar(record.shard))?;
     let open = || match File::open(&tar_path) {
         Err(e) if e.kind() == ErrorKind::NotFound => Err(Error::input(&tar_path)(Problem::Missing { wanted: "file" })),
         opened => opened.map_err(Error::io("read", &tar_path)),
@@ -58,9 +68,9 @@ fn compare(folder: &Folder, layout: &Layout, record: &ShardRecord) -> Result<(),
         false => None,
     };
     let tar = archive.as_mut().map(|archive| Tar::new(&tar_path, archive)).transpose()?;
-    let frames = layout.has(Format::Huggingface).then(|| Frames::new(folder, record.shard));
+    let frames = layout.has(Format::Huggingface).then(|| Frames::new(folder, record.shard)).transpose()?;
     let mut shards = Shards { tar, frames };
-    let objects = folder.path(&layout::objects(record.shard));
+    let objects = folder.inside(&layout::objects(record.shard))?;
     let mut objects = layout.objects_parquet.then(|| ObjectRows::open(&objects)).transpose()?;
     let (mut rows, mut before) = (Vec::new(), 0);
     for (number, frame) in record.frames.iter().enumerate() {

@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use papsynth::Plane;
 
 use crate::coco::{Document, Image};
-use crate::dataset::{Dataset, recorded_shards, whole_record};
+use crate::dataset::{Dataset, recorded_shards};
 use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
 use crate::generate::{Outcome, Progress};
-use crate::image_of::{LIMITS, images, levels};
+use crate::image_of::{LIMITS, images, levels, pages};
 use crate::layout::{self, Form, Layout};
 use crate::merge::document;
 use crate::read::{self, LevelImage};
@@ -109,7 +109,7 @@ impl Source {
     /// A data set of the same identity.
     fn begin(&self, to: &Path, layout: &Layout) -> Result<Dataset, Error> {
         let Dataset { folder, identity, categories, map, .. } = &self.dataset;
-        let given = |name: &str| read::bytes(&folder.path(name), GIVEN_BYTES);
+        let given = |name: &str| read::bytes(&folder.inside(name)?, GIVEN_BYTES);
         let (recipe, model) = (given(layout::RECIPE)?, given(layout::MODEL)?);
         for (name, bytes, sha) in
             [(layout::RECIPE, &recipe, &identity.recipe_sha256), (layout::MODEL, &model, &identity.model_sha256)]
@@ -138,8 +138,7 @@ impl Source {
     }
 
     fn record(&self, shard: u64) -> Result<ShardRecord, Error> {
-        let Dataset { folder, identity, layout, .. } = &self.dataset;
-        match whole_record(folder, identity, layout, shard, Check::Sizes)? {
+        match self.dataset.whole_or_flaw(shard, Check::Sizes)? {
             Ok(record) => Ok(record),
             Err(flaw) => self.refuse(format!("{flaw}; `papsynth verify` says what is wrong")),
         }
@@ -163,10 +162,8 @@ impl Source {
             return self.refuse(format!("{} keeps no planes of stacks", self.dataset.layout));
         };
         let name = format.image(self.dataset.identity.seed, open.record.shard, frame);
-        let path = folder.path(&name);
-        let files = images(&self.dataset, &name)?;
         let mut noise_free = match self.dataset.layout.has(Format::Folder) {
-            true => Some(NoiseFree::open(&folder.path(&layout::noise_free(frame.index)))?),
+            true => Some(NoiseFree::open(&folder.inside(&layout::noise_free(frame.index))?, frame.planes_um.len())?),
             false => None,
         };
         let coco = folder.path(&layout::coco(open.record.shard));
@@ -174,7 +171,7 @@ impl Source {
         let saturated = image.map_or_else(|| Ok(Vec::new()), Image::saturated).map_err(Error::input(&coco))?;
         let mut index = 0;
         let mut failure = None;
-        let mut each = |page: LevelImage| {
+        let read = pages(&self.dataset, &name, frame, |page| {
             let values = frame.width * frame.height * frame.channels;
             let grey = levels(page, frame.channels);
             let done = || -> Result<(), Error> {
@@ -198,11 +195,10 @@ impl Source {
                 failure = Some(error);
                 Problem::Differs { what: String::new() }
             })
-        };
-        let read = files.iter().try_for_each(|file| LevelImage::pages(file, &LIMITS, &mut each));
+        });
         match (failure, read) {
             (Some(error), _) => Err(error),
-            (None, read) => read.map_err(Error::input(&path)),
+            (None, read) => read,
         }
     }
 
@@ -230,8 +226,8 @@ struct NoiseFree {
 }
 
 impl NoiseFree {
-    fn open(path: &Path) -> Result<Self, Error> {
-        let pages = read::float_pages(&read::bytes(path, LIMITS.max_file_bytes)?, &LIMITS);
+    fn open(path: &Path, planes: usize) -> Result<Self, Error> {
+        let pages = read::float_pages(&read::bytes(path, LIMITS.max_file_bytes)?, &LIMITS, planes);
         Ok(Self { path: path.to_owned(), pages: pages.map_err(Error::input(path))?.into_iter() })
     }
 

@@ -14,6 +14,7 @@ use crate::coco::{Category, categories};
 use crate::contents;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, is_temporary, sha256};
+use crate::formats;
 use crate::layout::{self, Layout};
 use crate::merge;
 use crate::read::{self, InputFile};
@@ -90,9 +91,8 @@ impl Dataset {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });
         }
-        if let Some((feature, what)) = layout.lacks() {
-            let message = format!("{what} needs a build with `--features {feature}`");
-            return Err(Error::Folder { path: path.to_owned(), message });
+        if let Some((feature, what)) = layout.needs() {
+            return Err(formats::missing(&what, feature, path));
         }
         let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
@@ -145,7 +145,12 @@ impl Dataset {
     /// # Errors
     /// If the system refuses to tell.
     pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
-        Ok(whole_record(&self.folder, &self.identity, &self.layout, shard, check)?.ok())
+        Ok(self.whole_or_flaw(shard, check)?.ok())
+    }
+
+    /// The same, or what the shard lacks.
+    pub(crate) fn whole_or_flaw(&self, shard: u64, check: Check) -> Result<Result<ShardRecord, Flaw>, Error> {
+        whole_record(&self.folder, &self.identity, &self.layout, &self.categories, shard, check)
     }
 
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
@@ -273,7 +278,7 @@ impl Dataset {
 }
 
 /// Something in a folder, if it is there and not empty. What was never finished does not count.
-fn stranger(path: &Path) -> Result<Option<String>, Error> {
+pub(crate) fn stranger(path: &Path) -> Result<Option<String>, Error> {
     let entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -293,7 +298,7 @@ fn stranger(path: &Path) -> Result<Option<String>, Error> {
 
 /// The record of a shard; a missing one is an [`Problem::Missing`].
 pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
-    let path = folder.path(&layout::record(shard));
+    let path = folder.inside(&layout::record(shard))?;
     let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
     if record.shard != shard {
         let message = format!("is the record of shard {}", record.shard);
@@ -320,6 +325,7 @@ pub(crate) fn whole_record(
     folder: &Folder,
     identity: &Identity,
     layout: &Layout,
+    categories: &[Category],
     shard: u64,
     check: Check,
 ) -> Result<Result<ShardRecord, Flaw>, Error> {
@@ -338,7 +344,7 @@ pub(crate) fn whole_record(
         }
     }
     if check == Check::Hashes
-        && let Some(flaw) = contents::flaw(folder, layout, &record)?
+        && let Some(flaw) = contents::flaw(folder, layout, categories, &record)?
     {
         return Ok(Err(flaw));
     }
@@ -347,7 +353,7 @@ pub(crate) fn whole_record(
 
 /// Numbers of all shards with a record, in order.
 pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let path = folder.path(layout::SHARDS);
+    let path = folder.inside(layout::SHARDS)?;
     let entries = match fs::read_dir(&path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

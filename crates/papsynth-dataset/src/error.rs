@@ -76,6 +76,9 @@ pub enum Problem {
     /// There is a folder of that name.
     #[error("is a folder; a file is expected")]
     Folder,
+    /// The file, or a folder on the way to it, is a link.
+    #[error("is or lies behind a symbolic link; links in a data set are not followed")]
+    Link,
     /// The file is of another format.
     #[error("is neither a PNG nor a TIFF file")]
     Format,

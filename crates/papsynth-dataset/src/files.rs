@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::error::Error;
+use crate::error::{Error, Problem};
 use crate::record::{Check, FileRecord};
 
 const TEMPORARY_ENDING: &str = ".tmp";
@@ -45,6 +45,21 @@ impl Folder {
         self.root.join(name)
     }
 
+    /// The path of a file that is read or written: neither it nor a folder on the way is a link, which could lead outside.
+    pub(crate) fn inside(&self, name: &str) -> Result<PathBuf, Error> {
+        let mut path = self.root.clone();
+        for part in name.split('/') {
+            path.push(part);
+            match fs::symlink_metadata(&path) {
+                Ok(found) if found.is_symlink() => return Err(Error::input(&path)(Problem::Link)),
+                Ok(_) => {}
+                // What is not there leads nowhere.
+                Err(_) => break,
+            }
+        }
+        Ok(self.path(name))
+    }
+
     /// Writes a whole file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         let pending = self.pending(name)?;
@@ -71,6 +86,10 @@ impl Folder {
 
     /// Opens a file that will have this name once it is committed.
     pub(crate) fn pending(&self, name: &str) -> Result<Pending, Error> {
+        // A link that has the name itself is replaced, and not followed.
+        if let Some((folders, _)) = name.rsplit_once('/') {
+            self.inside(folders)?;
+        }
         let path = self.path(name);
         let folder = path.parent().unwrap_or(&self.root);
         let file_name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -93,7 +112,10 @@ impl Folder {
 
     /// What is wrong with a file, if anything is.
     pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
-        let path = self.path(&record.path);
+        let path = match self.inside(&record.path) {
+            Err(Error::Input { problem, .. }) => return Ok(Some(problem.to_string())),
+            path => path?,
+        };
         let size = match fs::metadata(&path) {
             Ok(found) if found.is_file() => found.len(),
             Ok(_) => return Ok(Some("is no file".to_owned())),
@@ -113,7 +135,7 @@ impl Folder {
 
     /// Size and hash of a file that is there.
     pub(crate) fn record(&self, name: &str) -> Result<FileRecord, Error> {
-        let path = self.path(name);
+        let path = self.inside(name)?;
         let measured = File::open(&path).and_then(|mut file| measure(&mut file));
         let (bytes, sha256) = measured.map_err(Error::io("read", &path))?;
         Ok(FileRecord { path: name.to_owned(), bytes, sha256 })
@@ -155,7 +177,10 @@ impl Folder {
                 if !is_temporary(&entry.file_name().to_string_lossy()) {
                     continue;
                 }
-                let abandoned = File::options().write(true).open(entry.path()).is_ok_and(|f| f.try_lock().is_ok());
+                // A link is nobody's work, and what it leads to is none of ours.
+                let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
+                let is_free = || File::options().write(true).open(entry.path()).is_ok_and(|f| f.try_lock().is_ok());
+                let abandoned = is_link || is_free();
                 // Gone already is as good.
                 removed += u64::from(abandoned && fs::remove_file(entry.path()).is_ok());
             }
@@ -291,16 +316,6 @@ impl Output {
     }
 }
 
-impl Write for Output {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.writer.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
-}
-
 /// Writes to a pending file.
 #[derive(Debug)]
 pub(crate) struct Handle(File);
@@ -393,17 +408,12 @@ mod tests {
 
     use super::*;
     use crate::support::{SEED, Scratch, contents, frame, recipe};
-    use crate::{Dataset, DatasetInfo, Layout};
+    use crate::{Dataset, DatasetInfo, Format, Layout};
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {
-        let info = DatasetInfo {
-            recipe: &recipe(),
-            model: &Model::builtin(),
-            seed: SEED,
-            map: None,
-            layout: &Layout::default(),
-        };
+        let layout = Layout::new([Format::Folder, Format::OmeZarr].into_iter().filter(|f| f.needs().is_none()));
+        let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
         let dataset = Dataset::create_or_resume(path, &info)?;
         if dataset.whole(0, Check::Sizes)?.is_none() {
             let frame = frame(0, 2, 8, 1);

@@ -5,9 +5,16 @@ use std::io::{BufReader, Read};
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Problem};
+#[cfg(not(feature = "zarr"))]
+use crate::formats::Format;
+use crate::formats::ZARR_GROUP;
+#[cfg(feature = "zarr")]
+use crate::formats::read_planes;
 use crate::parquet;
 use crate::read::{self, LevelImage, Limits};
 use crate::record::FrameSummary;
+#[cfg(feature = "zarr")]
+use crate::record::Geometry;
 
 /// What was written for one frame is read whole.
 pub(crate) const LIMITS: Limits =
@@ -19,18 +26,35 @@ pub(crate) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Re
     let [image, all_in_focus] = dataset.images_of(frame, shard);
     let name = all_in_focus.or(image).unwrap_or_default();
     let path = dataset.folder.path(&name);
-    let files = images(dataset, &name)?;
     let (mut number, mut middle) = (0, None);
-    let mut take = |page| {
+    pages(dataset, &name, frame, |page| {
         if number <= frame.planes_um.len() / 2 {
             middle = Some(page);
         }
         number += 1;
         Ok(())
-    };
-    let read = files.iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut take));
-    read.map_err(Error::input(&path))?;
+    })?;
     middle.ok_or_else(|| Error::input(&path)(Problem::NoImages))
+}
+
+/// Hands over the pages of an image of a frame, one after the other.
+pub(crate) fn pages(
+    dataset: &Dataset,
+    name: &str,
+    frame: &FrameSummary,
+    mut take: impl FnMut(LevelImage) -> Result<(), Problem>,
+) -> Result<(), Error> {
+    if !name.ends_with(ZARR_GROUP) {
+        let read = images(dataset, name)?.iter().try_for_each(|file| LevelImage::pages(file, &LIMITS, &mut take));
+        return read.map_err(Error::input(&dataset.folder.path(name)));
+    }
+    #[cfg(feature = "zarr")]
+    return read_planes(&dataset.folder, &Geometry::of_summary(frame, dataset.identity.seed), &mut take);
+    #[cfg(not(feature = "zarr"))]
+    {
+        let _ = (frame, &mut take);
+        Err(Format::OmeZarr.missing(dataset.path()))
+    }
 }
 
 /// The levels of a page with as many channels as the frame has: a picture in colour whose pixels are all grey is read as grey.
@@ -44,7 +68,7 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
 /// The files that make up an image of the data set: one, or one for each plane.
 pub(crate) fn images(dataset: &Dataset, name: &str) -> Result<Vec<Vec<u8>>, Error> {
     match name.split_once(".parquet/") {
-        Some((file, image)) => parquet::images(&dataset.folder.path(&format!("{file}.parquet")), image),
+        Some((file, image)) => parquet::images(&dataset.folder.inside(&format!("{file}.parquet"))?, image),
         None => Ok(vec![bytes(dataset, name)?]),
     }
 }
@@ -52,9 +76,9 @@ pub(crate) fn images(dataset: &Dataset, name: &str) -> Result<Vec<Vec<u8>>, Erro
 /// The bytes of a file, or of one in a tar file of the data set.
 fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
     let Some((tar, entry)) = name.split_once(".tar/") else {
-        return read::bytes(&dataset.folder.path(name), LIMITS.max_file_bytes);
+        return read::bytes(&dataset.folder.inside(name)?, LIMITS.max_file_bytes);
     };
-    let path = dataset.folder.path(&format!("{tar}.tar"));
+    let path = dataset.folder.inside(&format!("{tar}.tar"))?;
     let failed = |e| Error::io("read", &path)(e);
     let mut archive = tar::Archive::new(BufReader::new(File::open(&path).map_err(failed)?));
     for file in archive.entries().map_err(failed)? {

@@ -57,7 +57,7 @@ pub struct Defect {
 pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     let folder = Folder::new(path);
     let manifest = Manifest::read(&folder)?;
-    let identity = manifest.identity.clone();
+    let (identity, categories) = (manifest.identity.clone(), manifest.categories.clone());
     let mut overview = Overview {
         manifest,
         frames: 0,
@@ -77,7 +77,7 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     }
     let mut next = 0;
     for shard in recorded_shards(&folder)? {
-        let record = match whole_record(&folder, &identity, &overview.manifest.layout, shard, check)? {
+        let record = match whole_record(&folder, &identity, &overview.manifest.layout, &categories, shard, check)? {
             Ok(record) => record,
             Err(flaw) => {
                 overview.defects.push(Defect { shard, message: flaw.to_string() });

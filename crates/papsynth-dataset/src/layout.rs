@@ -5,6 +5,7 @@ use std::fmt::{self, Formatter};
 use papsynth::truth::Group;
 use serde::{Deserialize, Serialize};
 
+use crate::error::Problem;
 use crate::flatten::Flatten;
 use crate::formats::Format;
 use crate::record::FrameSummary;
@@ -19,6 +20,9 @@ pub(crate) const SHEET: &str = "contact-sheet.png";
 pub(crate) const CARD: &str = "README.md";
 pub(crate) const CROISSANT: &str = "croissant.json";
 pub(crate) const SPLITS: &str = "splits.csv";
+
+/// Most frames of a shard.
+const MOST_FRAMES_PER_SHARD: u64 = 1_000_000_000;
 
 /// Records and truth of all shards.
 pub(crate) const SHARDS: &str = "shards";
@@ -63,6 +67,19 @@ impl Layout {
         Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: crate::parquet::IS_HERE }
     }
 
+    /// A layout that was read is one that can be written.
+    pub(crate) fn check(&self) -> Result<(), Problem> {
+        let message = match self.frames_per_shard {
+            1..=MOST_FRAMES_PER_SHARD if self.formats.is_empty() => "the layout names no format".to_owned(),
+            1..=MOST_FRAMES_PER_SHARD if !self.formats.is_sorted_by(|a, b| a < b) => {
+                "the formats of the layout are not in order, each once".to_owned()
+            }
+            1..=MOST_FRAMES_PER_SHARD => return Ok(()),
+            frames => format!("frames_per_shard is {frames}; expected 1 to {MOST_FRAMES_PER_SHARD}"),
+        };
+        Err(Problem::Broken { format: "JSON", message })
+    }
+
     /// Whether every frame is a shard of its own.
     pub(crate) fn is_by_frame(&self) -> bool {
         self.frames_per_shard == 1
@@ -76,9 +93,8 @@ impl Layout {
     }
 
     /// The feature without which this build cannot write it, and what wants it.
-    pub(crate) fn lacks(&self) -> Option<(&'static str, String)> {
-        let format =
-            self.formats.iter().find_map(|format| Some((format.lacks()?, format!("the format `{}`", format.name()))));
+    pub(crate) fn needs(&self) -> Option<(&'static str, String)> {
+        let format = self.formats.iter().find_map(|format| Some((format.needs()?, format.title())));
         let table = (self.objects_parquet && !crate::parquet::IS_HERE)
             .then(|| ("parquet", "the table of objects as Parquet".to_owned()));
         format.or(table)

@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
 
 mod card;
 mod coco;
@@ -24,6 +25,8 @@ pub mod read;
 mod record;
 pub mod rle;
 mod shard_writer;
+#[cfg(feature = "zarr")]
+pub mod slide;
 mod splits;
 #[cfg(test)]
 #[path = "../tests/support/mod.rs"]
@@ -46,4 +49,5 @@ pub use layout::Layout;
 pub use picture::Picture;
 pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 pub use shard_writer::ShardWriter;
+pub use picture::write_png;
 pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};

@@ -7,9 +7,9 @@ use sha2::{Digest, Sha256};
 
 use crate::card::{card, croissant};
 use crate::coco::{Annotation, Document, Info};
-use crate::dataset::{Dataset, read_record, recorded_shards, whole_record};
+use crate::dataset::{Dataset, read_record, recorded_shards};
 use crate::error::Error;
-use crate::files::{Folder, Output, hex};
+use crate::files::{Folder, hex};
 use crate::formats::Format;
 use crate::image_of::picture;
 use crate::layout;
@@ -36,57 +36,114 @@ pub struct Summary {
 /// What was written for one shard is read whole.
 const SHARD_FILE_BYTES: u64 = 1 << 32;
 
+/// Takes the content of a file piece by piece.
+pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
+
+/// Does with a file of this name and content what is to be done, and says how it is.
+type Keep<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
+
 pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
     let folder = &dataset.folder;
-    let mut summary = Summary { frames: 0, objects: BTreeMap::new(), damaged: Vec::new(), lost_px: BTreeMap::new() };
-    let (mut shards, mut sharded, mut split) = (Vec::new(), Vec::new(), BTreeSet::new());
-    for shard in recorded_shards(folder)? {
-        let record = whole_record(folder, &dataset.identity, &dataset.layout, shard, Check::Sizes)?;
-        let Ok(record) = record else {
-            summary.damaged.push(shard);
-            continue;
-        };
-        shards.push(shard);
-        summary.frames += record.frames.len() as u64;
-        for frame in record.frames {
-            add(&mut summary.objects, frame.objects);
-            add(&mut summary.lost_px, frame.lost_px);
-            split.insert(Split::of_slide(dataset.identity.seed, frame.slide));
+    let whole = Whole::find(dataset)?;
+    let given = given(dataset).map(|name| folder.record(name)).collect::<Result<Vec<_>, _>>()?;
+    let merged = files(dataset, &whole, WRITER, given, &mut |name, fill| {
+        folder.write_if_new(name, |out| fill(&mut |bytes| out.bytes(bytes)))
+    })?;
+    folder.sync_names(&merged)?;
+    let manifest = write_manifest(dataset, &merged, &whole.shards, whole.summary.frames)?;
+    folder.sync_names([&manifest])?;
+    Ok(whole.summary)
+}
+
+/// The files of no shard as they would be merged now, with the words of the program that wrote the data set; none is written.
+pub(crate) fn expected(dataset: &Dataset, writer: &str, given: Vec<FileRecord>) -> Result<Vec<FileRecord>, Error> {
+    files(dataset, &Whole::find(dataset)?, writer, given, &mut |name, fill| {
+        let (mut hash, mut count) = (Sha256::new(), 0);
+        fill(&mut |bytes| {
+            hash.update(bytes);
+            count += bytes.len() as u64;
+            Ok(())
+        })?;
+        Ok(FileRecord { path: name.to_owned(), bytes: count, sha256: hex(&hash.finalize()) })
+    })
+}
+
+/// Names of the files that a data set is begun with.
+pub(crate) fn given(dataset: &Dataset) -> impl Iterator<Item = &str> {
+    [layout::MODEL, layout::RECIPE].into_iter().chain(dataset.map.as_deref())
+}
+
+/// The shards that are whole, and what their records say.
+struct Whole {
+    shards: Vec<u64>,
+    /// Files of formats that keep many frames in a file.
+    sharded: Vec<FileRecord>,
+    /// The splits by slide that frames fall into, in order.
+    splits: Vec<Split>,
+    summary: Summary,
+}
+
+impl Whole {
+    fn find(dataset: &Dataset) -> Result<Self, Error> {
+        let folder = &dataset.folder;
+        let summary = Summary { frames: 0, objects: BTreeMap::new(), damaged: Vec::new(), lost_px: BTreeMap::new() };
+        let mut whole = Self { shards: Vec::new(), sharded: Vec::new(), splits: Vec::new(), summary };
+        let mut splits = BTreeSet::new();
+        for shard in recorded_shards(folder)? {
+            let Ok(record) = dataset.whole_or_flaw(shard, Check::Sizes)? else {
+                whole.summary.damaged.push(shard);
+                continue;
+            };
+            whole.shards.push(shard);
+            whole.summary.frames += record.frames.len() as u64;
+            for frame in record.frames {
+                add(&mut whole.summary.objects, frame.objects);
+                add(&mut whole.summary.lost_px, frame.lost_px);
+                splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
+            }
+            whole.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
-        sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
+        whole.splits.extend(splits);
+        Ok(whole)
     }
-    let given = [layout::MODEL, layout::RECIPE].into_iter().chain(dataset.map.as_deref());
-    let mut merged = given.map(|name| folder.record(name)).collect::<Result<Vec<_>, _>>()?;
+}
+
+/// Makes every file that follows from the shards, and lists it with those that were given.
+fn files(
+    dataset: &Dataset,
+    Whole { shards, sharded, splits: splits_there, summary }: &Whole,
+    writer: &str,
+    given: Vec<FileRecord>,
+    keep: &mut Keep,
+) -> Result<Vec<FileRecord>, Error> {
+    let folder = &dataset.folder;
+    let mut merged = given;
     if !shards.is_empty() {
         if dataset.layout.is_by_frame() {
-            merged.push(folder.write_if_new(layout::TABLE, |out| tables(folder, &shards, out))?);
-            merged.push(folder.write_if_new(layout::COCO, |out| documents(dataset, &shards, out))?);
+            merged.push(keep(layout::TABLE, &|out| tables(folder, shards, out))?);
+            merged.push(keep(layout::COCO, &|out| documents(dataset, shards, out))?);
             if dataset.layout.objects_parquet {
-                merged.push(parquet::merge(folder, &shards)?);
+                merged.push(keep(layout::OBJECTS, &|out| parquet::merge(folder, shards, out))?);
             }
         }
-        merged.push(folder.write_if_new(layout::SPLITS, |out| splits(dataset, &shards, out))?);
-        merged.push(contact_sheet(dataset, &shards)?);
+        merged.push(keep(layout::SPLITS, &|out| splits(dataset, shards, out))?);
+        let sheet = contact_sheet(dataset, shards)?;
+        merged.push(keep(layout::SHEET, &|out| out(&sheet))?);
         let classes: Vec<String> = dataset.categories.iter().map(|category| category.name.clone()).collect();
-        let split: Vec<Split> = split.into_iter().collect();
         for format in &dataset.layout.formats {
-            for (name, bytes) in format.shared(&classes, &split)? {
-                merged.push(folder.keep(&name, &bytes)?);
+            for (name, bytes) in format.shared(&classes, splits_there)? {
+                merged.push(keep(&name, &|out| out(&bytes))?);
             }
         }
-    }
-    if !shards.is_empty() {
-        merged.push(folder.keep(layout::CARD, card(dataset, &summary).as_bytes())?);
-        let described: Vec<FileRecord> = merged.iter().chain(&sharded).cloned().collect();
+        let card = card(dataset, writer, summary);
+        merged.push(keep(layout::CARD, &|out| out(card.as_bytes()))?);
+        let described: Vec<FileRecord> = merged.iter().chain(sharded).cloned().collect();
         let text = serde_json::to_vec_pretty(&croissant(dataset, &described));
         let text = text.map_err(|e| Error::io("encode", &folder.path(layout::CROISSANT))(e.into()))?;
-        merged.push(folder.keep(layout::CROISSANT, &text)?);
+        merged.push(keep(layout::CROISSANT, &|out| out(&text))?);
     }
     merged.sort_by(|a, b| a.path.cmp(&b.path));
-    folder.sync_names(&merged)?;
-    let manifest = write_manifest(dataset, &merged, &shards, summary.frames)?;
-    folder.sync_names([&manifest])?;
-    Ok(summary)
+    Ok(merged)
 }
 
 /// Whether a file is one of a format that keeps many frames in a file.
@@ -104,63 +161,69 @@ fn add(sums: &mut BTreeMap<String, u64>, counts: BTreeMap<String, u64>) {
 }
 
 /// Which split each frame falls into, by itself and by its slide.
-fn splits(dataset: &Dataset, shards: &[u64], out: &mut Output) -> Result<(), Error> {
-    out.bytes(b"image,slide,by_field,by_slide\n")?;
+fn splits(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
+    out(b"image,slide,by_field,by_slide\n")?;
     let seed = dataset.identity.seed;
     for &shard in shards {
         for frame in read_record(&dataset.folder, shard)?.frames {
             let (index, slide) = (frame.index, frame.slide);
             let [by_field, by_slide] = [Split::of_field(seed, index), Split::of_slide(seed, slide)].map(Split::name);
-            out.bytes(format!("{index},{slide},{by_field},{by_slide}\n").as_bytes())?;
+            out(format!("{index},{slide},{by_field},{by_slide}\n").as_bytes())?;
         }
     }
     Ok(())
 }
 
 /// The tables one below the other, under the header of the first.
-fn tables(folder: &Folder, shards: &[u64], out: &mut Output) -> Result<(), Error> {
+fn tables(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     for (i, &index) in shards.iter().enumerate() {
-        let text = read::bytes(&folder.path(&layout::table(index)), SHARD_FILE_BYTES)?;
+        let text = read::bytes(&folder.inside(&layout::table(index))?, SHARD_FILE_BYTES)?;
         let header = text.iter().position(|&b| b == b'\n').map_or(text.len(), |end| end + 1);
-        out.bytes(if i == 0 { &text } else { &text[header..] })?;
+        out(if i == 0 { &text } else { &text[header..] })?;
     }
     Ok(())
 }
 
-fn documents(dataset: &Dataset, shards: &[u64], out: &mut Output) -> Result<(), Error> {
+fn documents(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     let folder = &dataset.folder;
-    out.bytes(b"{\"info\":")?;
-    out.json(&Info::default())?;
-    out.bytes(b",\"licenses\":[],\"categories\":")?;
-    out.json(&dataset.categories)?;
-    out.bytes(b",\"images\":[")?;
-    let images = shards.iter().flat_map(|&index| match document(folder, index) {
-        Ok(document) => document.images.into_iter().map(Ok).collect(),
-        Err(error) => vec![Err(error)],
-    });
-    out.json_lines(images)?;
-    out.bytes(b"],\"annotations\":[")?;
-    let mut before = 0;
-    let annotations = shards.iter().flat_map(|&shard| match document(folder, shard) {
-        Ok(document) => {
-            let count = document.annotations.len() as u64;
-            let renumbered = document.annotations.into_iter().map(|a| Ok(a.renumbered(before))).collect::<Vec<_>>();
-            before += count;
-            renumbered
+    out(b"{\"info\":")?;
+    json(folder, &Info::default(), out)?;
+    out(b",\"licenses\":[],\"categories\":")?;
+    json(folder, &dataset.categories, out)?;
+    out(b",\"images\":[")?;
+    let mut first = true;
+    for &shard in shards {
+        for image in document(folder, shard)?.images {
+            out(if std::mem::take(&mut first) { b"\n" } else { b",\n" })?;
+            json(folder, &image, out)?;
         }
-        Err(error) => vec![Err(error)],
-    });
-    out.json_lines(annotations)?;
-    out.bytes(b"]}\n")
+    }
+    out(b"],\"annotations\":[")?;
+    let mut before = 0;
+    for &shard in shards {
+        let annotations = document(folder, shard)?.annotations;
+        let count = annotations.len() as u64;
+        for (i, annotation) in annotations.into_iter().enumerate() {
+            out(if before == 0 && i == 0 { b"\n" } else { b",\n" })?;
+            json(folder, &annotation.renumbered(before), out)?;
+        }
+        before += count;
+    }
+    out(b"]}\n")
+}
+
+fn json(folder: &Folder, value: &impl Serialize, out: &mut Sink) -> Result<(), Error> {
+    let text = serde_json::to_vec(value);
+    out(&text.map_err(|e| Error::io("encode", &folder.path(layout::COCO))(e.into()))?)
 }
 
 pub(crate) fn document(folder: &Folder, shard: u64) -> Result<Document, Error> {
-    let path = folder.path(&layout::coco(shard));
+    let path = folder.inside(&layout::coco(shard))?;
     let bytes = read::bytes(&path, SHARD_FILE_BYTES)?;
     serde_json::from_slice(&bytes).map_err(|e| Error::input(&path)(broken(e)))
 }
 
-fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<FileRecord, Error> {
+fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
     let folder = &dataset.folder;
     let frames = shards.iter().map(|&shard| read_record(folder, shard).map(|record| record.frames.len()));
     let count = frames.take(ContactSheet::MAX_FRAMES).sum::<Result<usize, _>>()?;
@@ -181,9 +244,7 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<FileRecord, Error>
         }
         left = left.saturating_sub(record.frames.len());
     }
-    let picture = sheet.into_picture();
-    let png = picture.to_png().map_err(Error::io("encode", &folder.path(layout::SHEET)))?;
-    folder.write_if_new(layout::SHEET, |out| out.bytes(&png))
+    sheet.into_picture().to_png().map_err(Error::io("encode", &folder.path(layout::SHEET)))
 }
 
 /// The head, then every file: those of no shard, then shard by shard, each record after the files it vouches for.
@@ -195,16 +256,16 @@ pub(crate) fn write_manifest(
 ) -> Result<FileRecord, Error> {
     dataset
         .folder
-        .write_if_new(layout::MANIFEST, |out| manifest(dataset, merged, shards, frames, &mut |bytes| out.bytes(bytes)))
+        .write_if_new(layout::MANIFEST, |out| manifest(dataset, WRITER, merged, shards, frames, &mut |b| out.bytes(b)))
 }
 
 /// The SHA-256 of the manifest of all shards that are recorded.
-pub(crate) fn manifest_sha256(dataset: &Dataset, merged: &[FileRecord]) -> Result<String, Error> {
+pub(crate) fn manifest_sha256(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<String, Error> {
     let shards = recorded_shards(&dataset.folder)?;
     let frames = shards.iter().map(|&shard| Ok(read_record(&dataset.folder, shard)?.frames.len() as u64));
     let frames = frames.sum::<Result<u64, Error>>()?;
     let mut hash = Sha256::new();
-    manifest(dataset, merged, &shards, frames, &mut |bytes| {
+    manifest(dataset, writer, merged, &shards, frames, &mut |bytes| {
         hash.update(bytes);
         Ok(())
     })?;
@@ -213,16 +274,17 @@ pub(crate) fn manifest_sha256(dataset: &Dataset, merged: &[FileRecord]) -> Resul
 
 fn manifest(
     dataset: &Dataset,
+    writer: &str,
     merged: &[FileRecord],
     shards: &[u64],
     frames: u64,
-    out: &mut dyn FnMut(&[u8]) -> Result<(), Error>,
+    out: &mut Sink,
 ) -> Result<(), Error> {
     let folder = &dataset.folder;
     let head = ManifestHead {
         format: FORMAT,
         version: FORMAT_VERSION,
-        writer: WRITER,
+        writer,
         identity: &dataset.identity,
         layout: &dataset.layout,
         frames,

@@ -1,5 +1,5 @@
-//! What stands for `parquet.rs` in a build without the feature of that name. Nothing is written that needs it; what is read is left to hashes, but for
-//! images, without which there is nothing to go on with.
+//! What stands for `parquet.rs` in a build without the feature of that name. What wants it says so, so that nothing counts as whole that
+//! nobody has looked into.
 
 use std::path::Path;
 
@@ -7,31 +7,30 @@ use papsynth::truth::Truth;
 
 use crate::error::Error;
 use crate::files::{Folder, Pending};
-use crate::formats::{Place, Sink, Written};
-use crate::record::FileRecord;
+use crate::formats::{Format, Place, Sink, Written, huggingface, missing};
+use crate::merge;
 use crate::splits::Split;
 
 pub(crate) const IS_HERE: bool = false;
 
-fn lacks<T>(path: &Path) -> Result<T, Error> {
-    let message = "it is a Parquet file; that needs a build with `--features parquet`".to_owned();
-    Err(Error::Folder { path: path.to_owned(), message })
+fn table<T>(path: &Path) -> Result<T, Error> {
+    Err(missing("the table of objects as Parquet", "parquet", path))
 }
 
 pub(crate) fn sink(place: Place<'_>) -> Result<Box<dyn Sink + '_>, Error> {
-    lacks(place.folder.root())
+    Err(Format::Huggingface.missing(place.folder.root()))
 }
 
 pub(crate) fn images(path: &Path, _: &str) -> Result<Vec<Vec<u8>>, Error> {
-    lacks(path)
+    Err(Format::Huggingface.missing(path))
 }
 
-pub(crate) fn merge(folder: &Folder, _: &[u64]) -> Result<FileRecord, Error> {
-    lacks(folder.root())
+pub(crate) fn merge(folder: &Folder, _: &[u64], _: &mut merge::Sink) -> Result<(), Error> {
+    table(folder.root())
 }
 
 pub(crate) fn card(_: &[String], _: &[Split]) -> Result<(String, Vec<u8>), Error> {
-    lacks(Path::new(crate::formats::huggingface::CARD))
+    Err(Format::Huggingface.missing(Path::new(huggingface::CARD)))
 }
 
 /// A table that is not written.
@@ -39,7 +38,7 @@ pub(crate) enum ObjectTable {}
 
 impl ObjectTable {
     pub(crate) fn begin(pending: Pending) -> Result<Self, Error> {
-        lacks(pending.path())
+        table(pending.path())
     }
 
     pub(crate) fn add(&mut self, _: &Truth, _: u64) -> Result<(), Error> {
@@ -51,41 +50,36 @@ impl ObjectTable {
     }
 }
 
-/// A table that is not looked into.
-pub(crate) struct ObjectRows;
+/// A table that is not read.
+pub(crate) enum ObjectRows {}
 
 impl ObjectRows {
-    #[expect(clippy::unnecessary_wraps, reason = "with the feature it fails")]
-    pub(crate) fn open(_: &Path) -> Result<Self, Error> {
-        Ok(Self)
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        table(path)
     }
 
-    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "with the feature it fails")]
     pub(crate) fn check(&mut self, _: &Truth, _: u64) -> Result<(), Error> {
-        Ok(())
+        match *self {}
     }
 
-    #[expect(clippy::unnecessary_wraps, reason = "with the feature it fails")]
     pub(crate) fn end(self) -> Result<(), Error> {
-        Ok(())
+        match self {}
     }
 }
 
-/// Frames that are not looked into.
-pub(crate) struct Frames;
+/// Frames that are not read.
+pub(crate) enum Frames {}
 
 impl Frames {
-    pub(crate) fn new(_: &Folder, _: u64) -> Self {
-        Self
+    pub(crate) fn new(folder: &Folder, _: u64) -> Result<Self, Error> {
+        Err(Format::Huggingface.missing(folder.root()))
     }
 
-    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "with the feature it fails")]
     pub(crate) fn check(&mut self, _: &Written) -> Result<(), Error> {
-        Ok(())
+        match *self {}
     }
 
-    #[expect(clippy::unnecessary_wraps, reason = "with the feature it fails")]
     pub(crate) fn end(self) -> Result<(), Error> {
-        Ok(())
+        match self {}
     }
 }

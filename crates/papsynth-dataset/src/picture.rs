@@ -217,3 +217,19 @@ fn fitted([width, height]: [usize; 2], [most_width, most_height]: [usize; 2]) ->
         [(width * most_height / height).max(1), most_height]
     }
 }
+
+/// Writes grey levels, row by row, the channels of a pixel side by side, as a PNG.
+///
+/// # Errors
+/// If the system refuses; then there is no such file, or still the former one.
+pub fn write_png(
+    path: &std::path::Path,
+    levels: &[u16],
+    width: usize,
+    channels: usize,
+    bits: u32,
+    pixel_um: f64,
+) -> Result<(), crate::error::Error> {
+    let bytes = crate::write::png(levels, width, channels, bits, pixel_um).map_err(crate::error::Error::io("write", path))?;
+    crate::files::write_file(path, &bytes)
+}

@@ -27,6 +27,12 @@ pub(crate) const FORMAT: &str = "papsynth-dataset";
 /// `stream_version`, but not always the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
 
+/// Largest side of an image, as wide as a field may be.
+const LARGEST_SIDE_PX: usize = 1 << 15;
+
+/// Most planes of a stack, as many as a recipe may ask for.
+const MOST_PLANES: usize = 1024;
+
 /// How carefully files are looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Check {
@@ -183,10 +189,38 @@ impl ShardRecord {
         let record: Self = serde_json::from_slice(bytes).map_err(broken)?;
         version(record.version)?;
         inside(&record.files)?;
+        record.layout.check()?;
+        record.check_frames()?;
         if record.sealed().sha256 != record.sha256 {
             return Err(json("is not as it was written: its own SHA-256 is another".to_owned()));
         }
         Ok(record)
+    }
+
+    /// Frames must be of this shard, in order, and of sizes that there are: what is read of them is allocated by these numbers.
+    fn check_frames(&self) -> Result<(), Problem> {
+        let each = self.layout.frames_per_shard;
+        let room = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);
+        let wrong = |index: u64, what: &str| Err(json(format!("frame {index}: {what}")));
+        let mut before = None;
+        for frame in &self.frames {
+            let FrameSummary { index, width, height, bits, channels, .. } = *frame;
+            let side = 1..=LARGEST_SIDE_PX;
+            if !room.contains(&index) || before.is_some_and(|before| before >= index) {
+                return wrong(index, "is none of this shard, or not in order");
+            }
+            if !side.contains(&width) || !side.contains(&height) {
+                return wrong(index, &format!("{width} x {height} pixels; expected 1 to {LARGEST_SIDE_PX} a side"));
+            }
+            if ![1, 3].contains(&channels) || !(1..=16).contains(&bits) {
+                return wrong(index, &format!("{channels} channels of {bits} bits; expected 1 or 3 of 1 to 16"));
+            }
+            if frame.planes_um.is_empty() || frame.planes_um.len() > MOST_PLANES {
+                return wrong(index, &format!("{} planes; expected 1 to {MOST_PLANES}", frame.planes_um.len()));
+            }
+            before = Some(index);
+        }
+        Ok(())
     }
 
     /// The record with its own hash.
@@ -207,8 +241,9 @@ impl ShardRecord {
 
 /// Paths must be relative and stay below where they start.
 fn inside(files: &[FileRecord]) -> Result<(), Problem> {
-    let lies_inside =
-        |path: &str| !path.is_empty() && Path::new(path).components().all(|c| matches!(c, Component::Normal(_)));
+    // A name as it stands is one part of a path: no `.`, `..`, drive or root, and nothing between two slashes.
+    let is_name = |part: &str| Path::new(part).components().eq([Component::Normal(part.as_ref())]);
+    let lies_inside = |path: &str| !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name);
     match files.iter().find(|file| !lies_inside(&file.path)) {
         Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),
         None => Ok(()),
@@ -322,7 +357,7 @@ impl Manifest {
 
     /// The manifest in a folder.
     pub(crate) fn read(folder: &Folder) -> Result<Self, Error> {
-        let path = folder.path(layout::MANIFEST);
+        let path = folder.inside(layout::MANIFEST)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::Folder {
                 path: folder.root().to_owned(),
@@ -340,6 +375,7 @@ impl Manifest {
         }
         version(raw.version)?;
         inside(&raw.files)?;
+        raw.layout.check()?;
         let head = ManifestHead {
             format: &raw.format,
             version: raw.version,

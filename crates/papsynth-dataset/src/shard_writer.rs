@@ -54,6 +54,7 @@ impl<'a> ShardWriter<'a> {
     pub(crate) fn new(dataset: &'a Dataset, shard: u64) -> Result<Self, Error> {
         let folder = &dataset.folder;
         // From now on the shard is not whole, whatever it was before.
+        folder.inside(layout::SHARDS)?;
         let record = folder.path(&layout::record(shard));
         match fs::remove_file(&record) {
             Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound) => return Err(Error::io("remove", &record)(e)),

@@ -5,14 +5,22 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
+use papsynth::key::STREAM_VERSION;
+use papsynth::recipe::{self, Recipe};
 use serde::Serialize;
 
-use crate::dataset::{Dataset, read_record, recorded_shards, whole_record};
+use crate::coco::categories;
+use crate::dataset::{Dataset, Flaw, read_record, recorded_shards};
 use crate::error::{Error, Problem};
-use crate::files::{Folder, is_temporary};
+use crate::files::{Folder, is_temporary, sha256};
+use crate::formats::huggingface;
 use crate::layout;
 use crate::merge;
-use crate::record::{Check, Manifest};
+use crate::read;
+use crate::record::{Check, FileRecord, Manifest, WRITER};
+
+/// Largest recipe that is read back.
+const GIVEN_BYTES: u64 = 1 << 28;
 
 /// What is wrong with a data set, if anything is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -49,7 +57,7 @@ pub enum Mend {
     Clean,
 }
 
-/// Reads every file of a data set. With `expected`, every frame of that range must be there; without, every frame up to the last.
+/// Reads every file of a data set, compares the files of each shard with each other, and makes again what is merged of them. With `expected`, every frame of that range must be there; without, every frame up to the last.
 ///
 /// # Errors
 /// If there is no data set, or the system refuses to read.
@@ -67,11 +75,12 @@ pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Erro
         Err(error) => return Err(error),
     };
     let manifest = folder.record(layout::MANIFEST)?;
+    let Manifest { writer, files: merged, .. } = Manifest::read(&folder)?;
     let mut listed: BTreeSet<String> = BTreeSet::from([layout::MANIFEST.to_owned()]);
-    let (mut frames, mut there) = (0, Vec::new());
+    let (mut frames, mut there, mut is_damaged) = (0, Vec::new(), false);
     for shard in recorded_shards(&folder)? {
         listed.insert(layout::record(shard));
-        match whole_record(&folder, &dataset.identity, &dataset.layout, shard, Check::Hashes)? {
+        match dataset.whole_or_flaw(shard, Check::Hashes)? {
             Ok(record) => {
                 frames += record.frames.len() as u64;
                 there.extend(record.frames.iter().map(|frame| frame.index));
@@ -83,6 +92,7 @@ pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Erro
                 if let Ok(record) = read_record(&folder, shard) {
                     listed.extend(record.files.into_iter().map(|file| file.path));
                 }
+                is_damaged = true;
                 find(flaw.path, flaw.message, Mend::Generate);
             }
         }
@@ -95,15 +105,28 @@ pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Erro
         };
         find(layout::record(gap.start / dataset.layout.frames_per_shard), message, Mend::Generate);
     }
-    let merged = Manifest::read(&folder)?.files;
     for file in &merged {
         listed.insert(file.path.clone());
         if let Some(message) = folder.flaw(file, Check::Hashes)? {
             find(file.path.clone(), message, Mend::Generate);
         }
     }
-    // The list of files is made again and compared, if all are there to make it from.
-    if findings.is_empty() && merge::manifest_sha256(&dataset, &merged)? != manifest.sha256 {
+    let given = given_flaws(&dataset, &merged)?;
+    let is_known = given.is_empty();
+    for Flaw { path, message } in given {
+        find(path, message, Mend::Generate);
+    }
+    // What is merged is made again and compared, and then the list of files, if all are there to make them from.
+    if is_known && !is_damaged && !merged.is_empty() {
+        let found: BTreeSet<String> = findings.iter().map(|finding| finding.path.clone()).collect();
+        for Flaw { path, message } in merged_flaws(&dataset, &writer, &merged)? {
+            listed.insert(path.clone());
+            if !found.contains(&path) {
+                findings.push(Finding { path, message, mend: Mend::Generate });
+            }
+        }
+    }
+    if findings.is_empty() && merge::manifest_sha256(&dataset, &writer, &merged)? != manifest.sha256 {
         let message = "does not name the files that are there".to_owned();
         findings.push(Finding { path: layout::MANIFEST.to_owned(), message, mend: Mend::Generate });
     }
@@ -120,6 +143,78 @@ pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Erro
     findings.sort();
     let root = findings.is_empty().then_some(manifest.sha256);
     Ok(Verdict { root, frames, files, findings })
+}
+
+/// What is wrong with the files that the data set was begun with, and with what the manifest says of them.
+fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Error> {
+    let folder = &dataset.folder;
+    let record = |name: &str| merged.iter().find(|file| file.path == name);
+    let mut flaws = Vec::new();
+    let flaw = |path: &str, message: &str| Flaw { path: path.to_owned(), message: message.to_owned() };
+    let identity = &dataset.identity;
+    for (name, sha256) in [(layout::RECIPE, &identity.recipe_sha256), (layout::MODEL, &identity.model_sha256)] {
+        // A data set that was only begun lists none; of one that is merged, none is left out.
+        if !merged.is_empty() && record(name).is_none_or(|file| file.sha256 != *sha256) {
+            flaws.push(flaw(name, "is not what the manifest says the data set is made from"));
+        }
+    }
+    if !flaws.is_empty() || merged.is_empty() || identity.stream_version != STREAM_VERSION {
+        return Ok(flaws);
+    }
+    // Of these streams the recipe is one that this program reads: what there may be in the images follows from it.
+    let path = folder.inside(layout::RECIPE)?;
+    let text = match read::bytes(&path, GIVEN_BYTES) {
+        Ok(text) if sha256(&text) == identity.recipe_sha256 => text,
+        // It is missing or damaged, which has been found already.
+        Ok(_) | Err(Error::Input { .. }) => return Ok(flaws),
+        Err(failure) => return Err(failure),
+    };
+    let Ok(recipe) = toml::from_str::<Recipe>(&String::from_utf8_lossy(&text)) else {
+        flaws.push(flaw(layout::RECIPE, "is no recipe that this program reads"));
+        return Ok(flaws);
+    };
+    if dataset.categories != categories(&recipe) {
+        flaws.push(flaw(layout::MANIFEST, "names other categories than the recipe gives"));
+    }
+    let named = match &recipe.layout {
+        recipe::Layout::Map { path } | recipe::Layout::Labels { path, .. } => Some(path),
+        _ => None,
+    };
+    match (named, &dataset.map) {
+        (Some(named), None) => flaws.push(flaw(named, "is missing from the list of files")),
+        (_, Some(kept)) if named != Some(kept) => flaws.push(flaw(kept, "follows neither from recipe nor from shards")),
+        // The name of a map begins with the hash of its content.
+        (Some(named), Some(_))
+            if record(named).is_some_and(|file| !named.contains(&format!("{:.16}", file.sha256))) =>
+        {
+            flaws.push(flaw(named, "is another map than the recipe names"));
+        }
+        _ => {}
+    }
+    Ok(flaws)
+}
+
+/// Merged files that are not as the shards make them.
+fn merged_flaws(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Flaw>, Error> {
+    let given: Vec<&str> = merge::given(dataset).collect();
+    let given = merged.iter().filter(|file| given.contains(&file.path.as_str())).cloned().collect();
+    let expected = merge::expected(dataset, writer, given)?;
+    let mut flaws = Vec::new();
+    for file in &expected {
+        // The words of a card and the bytes of what is compressed are those of one program.
+        let of_program = [layout::CARD, layout::CROISSANT, layout::SHEET, layout::OBJECTS, huggingface::CARD];
+        let is_ours = writer == WRITER || !of_program.contains(&file.path.as_str());
+        let message = match merged.iter().find(|found| found.path == file.path) {
+            Some(found) if found == file || !is_ours => continue,
+            Some(_) => "is not what the shards make it",
+            None => "is missing from the list of files",
+        };
+        flaws.push(Flaw { path: file.path.clone(), message: message.to_owned() });
+    }
+    for file in merged.iter().filter(|file| expected.iter().all(|expected| expected.path != file.path)) {
+        flaws.push(Flaw { path: file.path.clone(), message: "follows neither from recipe nor from shards".to_owned() });
+    }
+    Ok(flaws)
 }
 
 /// The parts of a range that are not among these indices, which are sorted.

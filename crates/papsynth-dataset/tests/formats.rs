@@ -11,6 +11,8 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::Frame;
 use papsynth::model::Model;
+#[cfg(feature = "zarr")]
+use papsynth::scene::View;
 use papsynth::truth::{Group, Part};
 use papsynth_dataset::read::{GreyImage, Limits, label_map, read_label_map};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, Layout, convert, verify};
@@ -42,7 +44,7 @@ fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
 }
 
 fn all(frames_per_shard: u64) -> Layout {
-    Layout { frames_per_shard, ..Layout::new(Format::available()) }
+    Layout { frames_per_shard, ..Layout::new(Format::built()) }
 }
 
 fn to(from: &Path, target: &Path, layout: &Layout) -> Result<u64, Error> {
@@ -221,6 +223,80 @@ fn polygons_are_fractions_of_the_image_and_classes_are_named() {
     let splits = fs::read_to_string(scratch.join("splits.csv")).unwrap();
     let of_first: Vec<&str> = splits.lines().skip(1).take(16).map(|line| line.rsplit(',').next().unwrap()).collect();
     assert!(of_first.windows(2).all(|pair| pair[0] == pair[1]) && splits.lines().count() == 41);
+}
+
+/// A frame of many tiles, with more objects than fit into one layer.
+#[cfg(feature = "zarr")]
+fn large(width: usize, height: usize) -> Frame {
+    let mut frame = colour_frame(0, 1, 12);
+    frame.finished.scene.view = View { width, height, pixel_um: 0.25 };
+    (frame.finished.truth.width, frame.finished.truth.height) = (width, height);
+    let grey = |i: usize| ((i as u64).wrapping_mul(6_364_136_223_846_793_005) >> 52) as u16;
+    frame.planes[0].grey = (0..width * height * 3).map(grey).collect();
+    frame.planes[0].noise_free = vec![0.0; width * height * 3];
+    frame.finished.all_in_focus = vec![0.0; width * height * 3];
+    // Runs do not know how wide the image is: the masks stay where they are.
+    frame
+}
+
+#[test]
+#[cfg(feature = "zarr")]
+fn groups_of_zarr_hold_every_pixel_at_every_size_and_every_mask_whole() {
+    use papsynth_zarr::{Form, Kind, Pyramid, Shard, ShardReader, Tiling, halved, halved_labels};
+    let scratch = Scratch::new("zarr-large");
+    let (width, height) = (2101, 61);
+    let frame = large(width, height);
+    write(scratch.path(), &Layout::new([Format::OmeZarr]), std::slice::from_ref(&frame));
+    assert!(verify(scratch.path(), Some(0..1)).unwrap().findings.is_empty());
+    let group = scratch.join("ome-zarr/000000.ome.zarr");
+    let open = |pyramid: &Pyramid, level: usize, path: &Path, file: &str| {
+        let file = fs::File::open(path.join(level.to_string()).join(file)).unwrap();
+        ShardReader::open(&pyramid.levels()[level], Shard::default(), file).unwrap()
+    };
+    let tiling = Tiling { chunk: 512, shard: 4096, planes: 1 };
+    let form = Form { kind: Kind::U16, channels: Some(3), planes: None, height, width, tiling, levels: 4 };
+    let image = Pyramid::new(&form).unwrap();
+    for channel in 0..3 {
+        let mut expected: Vec<u16> = frame.planes[0].grey.iter().skip(channel).step_by(3).copied().collect();
+        let mut side = width;
+        for level in 0..4 {
+            let found = open(&image, level, &group, "c/0/0/0").plane::<u16>(channel, 0).unwrap();
+            assert!(found == expected, "channel {channel} of level {level}");
+            (expected, side) = (halved(&expected, side), side.div_ceil(2));
+        }
+    }
+    assert!(!group.join("4").exists());
+    // Two cells overlap: two layers, each with one of them whole, and what is known of it.
+    let labels = Pyramid::new(&Form { channels: None, ..form }).unwrap();
+    for (layer, id) in [(0, 1), (1, 2)] {
+        let path = group.join(format!("labels/cytoplasm-{layer}"));
+        let object = |o: &&papsynth::truth::ObjectTruth| o.id == id && o.part == Part::Cytoplasm;
+        let object = frame.finished.truth.objects.iter().find(object).unwrap();
+        let mut expected = vec![0_u16; width * height];
+        object.amodal.pixels(width).for_each(|pixel| expected[pixel] = id as u16);
+        let mut side = width;
+        for level in 0..4 {
+            assert!(open(&labels, level, &path, "c/0/0").plane::<u16>(0, 0).unwrap() == expected, "{layer} {level}");
+            (expected, side) = (halved_labels(&expected, side), side.div_ceil(2));
+        }
+        let known = &json(&path.join("zarr.json"))["attributes"]["ome"]["image-label"]["properties"];
+        assert_eq!(known.as_array().unwrap().len(), 1);
+        assert_eq!((&known[0]["label-value"], &known[0]["parent"]), (&Value::from(id), &Value::Null));
+        assert_eq!(known[0]["area_px"], object.amodal.area());
+    }
+    let nuclei = json(&group.join("labels/nucleus-0/zarr.json"));
+    assert_eq!(nuclei["attributes"]["ome"]["image-label"]["properties"][1]["parent"], 2);
+}
+
+#[test]
+#[cfg(not(feature = "zarr"))]
+fn a_build_without_zarr_says_so_and_never_calls_such_a_data_set_whole() {
+    let scratch = Scratch::new("no-zarr");
+    let says = "the format `ome-zarr` needs a build of papsynth with `--features zarr`";
+    let error = begin(scratch.path(), &Layout::new([Format::OmeZarr])).unwrap_err().to_string();
+    assert!(error.ends_with(says), "{error}");
+    assert!(contents(scratch.path()).is_empty());
+    assert!(Format::built().all(|format| format != Format::OmeZarr));
 }
 
 #[test]

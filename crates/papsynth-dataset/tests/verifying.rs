@@ -8,18 +8,27 @@ use std::fs;
 use std::path::Path;
 
 use papsynth::model::Model;
-use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, Mend, ShardRecord, Verdict, clean, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Mend, ShardRecord, Verdict, clean, verify};
 use sha2::{Digest, Sha256};
 use support::{SEED, Scratch, contents, frame, recipe};
 
 /// A data set in all formats, of a stack and two images.
 fn make(name: &str) -> Scratch {
     let scratch = Scratch::new(name);
-    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::available()) };
+    fill(scratch.path(), 2);
+    scratch
+}
+
+/// Begins it, or goes on with it, and merges.
+fn fill(path: &Path, frames_per_shard: usize) {
+    let layout = Layout { frames_per_shard: frames_per_shard as u64, ..Layout::new(Format::built()) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
-    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let dataset = Dataset::create_or_resume(path, &info).unwrap();
     let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1), frame(2, 1, 12, 1)];
-    for (shard, frames) in [(0, &frames[..2]), (1, &frames[2..])] {
+    for (shard, frames) in (0..).zip(frames.chunks(frames_per_shard)) {
+        if dataset.whole(shard, Check::Hashes).unwrap().is_some() {
+            continue;
+        }
         let mut writer = dataset.shard_writer(shard).unwrap();
         for frame in frames {
             writer.begin(&frame.finished.scene).unwrap();
@@ -29,7 +38,6 @@ fn make(name: &str) -> Scratch {
         writer.commit().unwrap();
     }
     dataset.finish().unwrap();
-    scratch
 }
 
 fn look(path: &Path) -> Verdict {
@@ -275,6 +283,53 @@ fn parquet_lies<'f>(files: &'f [(String, Vec<u8>)], lies: &mut Vec<(&'f str, Vec
     lies.push((name, frames[..frames.len() / 2].to_vec()));
 }
 
+/// Shards of other labels, planes or frames, and documents that say something else; each is a file as whole as the right one.
+#[cfg(feature = "zarr")]
+fn lies_of_zarr(files: &[(String, Vec<u8>)]) -> Vec<(&str, Vec<u8>)> {
+    let [stack, image] = ["ome-zarr/000000.ome.zarr", "ome-zarr/000001.ome.zarr"];
+    let file = |group: &str, name: &str| {
+        let name = format!("{group}/{name}");
+        let (name, bytes) = files.iter().find(|(found, _)| *found == name).expect(&name);
+        (name.as_str(), bytes.as_slice())
+    };
+    let mut lies = Vec::new();
+    for name in ["0/c/0/0/0", "labels/cytoplasm-1/0/c/0/0"] {
+        let (name, bytes) = file(stack, name);
+        lies.extend([50, 75, 95].map(|percent| (name, bytes[..bytes.len() * percent / 100].to_vec())));
+        lies.push((name, Vec::new()));
+    }
+    for (to, from) in [
+        ("labels/cytoplasm-0/0/c/0/0", "labels/cytoplasm-1/0/c/0/0"),
+        ("labels/nucleus-0/0/c/0/0", "labels/debris-0/0/c/0/0"),
+        ("labels/nucleus-0/zarr.json", "labels/debris-0/zarr.json"),
+        ("labels/zarr.json", "zarr.json"),
+        ("0/zarr.json", "labels/debris-0/0/zarr.json"),
+    ] {
+        lies.push((file(image, to).0, file(image, from).1.to_vec()));
+    }
+    lies.push((file(image, "labels/cytoplasm-0/0/c/0/0").0, file(stack, "labels/cytoplasm-0/0/c/0/0").1.to_vec()));
+    for (name, from, to) in [
+        ("zarr.json", "micrometer", "nanometer"),
+        ("zarr.json", "\"end\": 255.0", "\"end\": 155.0"),
+        ("0/zarr.json", "uint8", "uint16"),
+        ("labels/cytoplasm-0/zarr.json", "NILM", "HSIL"),
+        ("labels/nucleus-0/zarr.json", "\"parent\": 1", "\"parent\": 2"),
+        ("labels/zarr.json", "\"debris-0\"", "\"debris-1\""),
+    ] {
+        let (name, bytes) = file(stack, name);
+        lies.push((name, replaced(bytes, from, to)));
+    }
+    // The planes in another order.
+    let (name, bytes) = file(stack, "0/c/0/0/0");
+    let [index, checksum] = [bytes.len() - 36, bytes.len() - 4];
+    let entries = [&bytes[index + 16..checksum], &bytes[index..index + 16]].concat();
+    let crc = !entries.iter().fold(!0_u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0x82F6_3B78 } else { crc >> 1 })
+    });
+    lies.push((name, [&bytes[..index], &entries, &crc.to_le_bytes()].concat()));
+    lies
+}
+
 /// What readers overlook, planted by somebody who mends every hash.
 #[test]
 fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
@@ -363,6 +418,8 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
     // Parquet.
     #[cfg(feature = "parquet")]
     parquet_lies(&files, &mut lies);
+    #[cfg(feature = "zarr")]
+    lies.extend(lies_of_zarr(&files));
     for (number, (name, bytes)) in lies.iter().enumerate() {
         lie(&scratch, 0, name, bytes);
         let verdict = look(scratch.path());
@@ -408,4 +465,102 @@ fn a_record_that_lies_is_found() {
         restore(&scratch, &files);
     }
     assert!(look(scratch.path()).root.is_some());
+}
+
+/// Changes a file that is no shard's, or takes it away, and mends the list of files.
+fn lie_in_merged(scratch: &Scratch, name: &str, bytes: Option<&[u8]>) {
+    let manifest = fs::read_to_string(scratch.join("manifest.json")).unwrap();
+    let (head, list) = manifest.split_once("\"files\":[\n").unwrap();
+    let own = format!("{{\"path\":\"{name}\",");
+    let entry = |bytes: &[u8]| format!("{own}\"bytes\":{},\"sha256\":\"{}\"}}", bytes.len(), sha256(bytes));
+    let lines = list.trim_end().trim_end_matches("]}").split(",\n");
+    let lines = lines.filter_map(|line| match line.starts_with(&own) {
+        true => bytes.map(entry),
+        false => Some(line.to_owned()),
+    });
+    let list = lines.collect::<Vec<_>>().join(",\n");
+    assert!(bytes.is_none() || list.contains(&own), "{name} is listed");
+    fs::write(scratch.join("manifest.json"), format!("{head}\"files\":[\n{list}]}}\n")).unwrap();
+    match bytes {
+        Some(bytes) => fs::write(scratch.join(name), bytes).unwrap(),
+        None => fs::remove_file(scratch.join(name)).unwrap(),
+    }
+}
+
+#[test]
+fn what_is_merged_is_made_again_and_compared() {
+    for frames_per_shard in [1, 2] {
+        let scratch = Scratch::new(&format!("merged-{frames_per_shard}"));
+        fill(scratch.path(), frames_per_shard);
+        let files = contents(scratch.path());
+        let whole = look(scratch.path());
+        assert!(whole.root.is_some(), "{whole:?}");
+        let text =
+            String::from_utf8(files.iter().find(|(name, _)| name == "manifest.json").unwrap().1.clone()).unwrap();
+        let of_no_shard = text.lines().skip(1).filter(|line| !line.contains("\"shard\":"));
+        let merged: Vec<&str> = of_no_shard.map(|line| line.split('"').nth(3).unwrap()).collect();
+        let by_frame = ["coco.json", "objects.csv"];
+        let always = ["README.md", "contact-sheet.png", "croissant.json", "model.json", "recipe.toml", "splits.csv"];
+        assert!(always.iter().all(|name| merged.contains(name)), "{merged:?}");
+        assert!(by_frame.iter().all(|name| merged.contains(name) == (frames_per_shard == 1)), "{merged:?}");
+        let of = |name: &str| files.iter().find(|(n, _)| n == name).unwrap().1.as_slice();
+        let mut lies: Vec<(&str, Option<Vec<u8>>)> = Vec::new();
+        for &name in &merged {
+            lies.push((name, None));
+            lies.push((name, Some([of(name), b"\n"].concat())));
+        }
+        // Lies that a reader would believe.
+        let lie = |name, from: &str, to: &str| (name, Some(replaced(of(name), from, to)));
+        lies.push(lie("splits.csv", "train", "test"));
+        lies.push(lie("README.md", "| frames | 3 |", "| frames | 4 |"));
+        lies.push(lie("README.md", "cc0-1.0", "mit"));
+        lies.push(lie("croissant.json", "sc:Integer", "sc:Text"));
+        lies.push(lie("recipe.toml", "pixel_um", "pixel_um = 0.5 #"));
+        if frames_per_shard == 1 {
+            lies.push(lie("coco.json", "\"area\":", "\"area\":1"));
+            lies.push(lie("coco.json", "intermediate nucleus", "superficial nucleus"));
+            lies.push(lie("coco.json", "\"id\":1", "\"id\":2"));
+            lies.push(lie("objects.csv", "NILM", "HSIL"));
+        }
+        for (name, bytes) in lies {
+            lie_in_merged(&scratch, name, bytes.as_deref());
+            let verdict = look(scratch.path());
+            assert!(is_found(&verdict, name), "{name}: {verdict:?}");
+            assert!(verdict.findings.iter().all(|finding| finding.mend == Mend::Generate), "{verdict:?}");
+            // What makes it again mends it.
+            fill(scratch.path(), frames_per_shard);
+            assert_eq!(contents(scratch.path()), files, "{name}");
+        }
+        assert_eq!(look(scratch.path()), whole);
+    }
+}
+
+#[test]
+fn categories_are_those_of_the_recipe_everywhere() {
+    let scratch = make("categories");
+    let files = contents(scratch.path());
+    // In the document of a shard: of a category that nothing is of, so that no object tells.
+    let coco = "shards/000000.coco.json";
+    let text = files.iter().find(|(name, _)| name == coco).unwrap();
+    for (from, to) in [("\"mucus\"", "\"nucleus\""), ("\"debris\"", "\"nucleus\""), ("synthetic", "real")] {
+        lie(&scratch, 0, coco, &replaced(&text.1, from, to));
+        assert!(is_found(&look(scratch.path()), coco), "{from}");
+        restore(&scratch, &files);
+    }
+    // In every document and the head of the manifest, whose own hash is mended.
+    for shard in 0..2 {
+        let coco = format!("shards/{shard:06}.coco.json");
+        let text = fs::read(scratch.join(&coco)).unwrap();
+        lie(&scratch, shard, &coco, &replaced(&text, "\"mucus\"", "\"sulcum\""));
+    }
+    let manifest = fs::read_to_string(scratch.join("manifest.json")).unwrap();
+    let (head, list) = manifest.split_once(",\"files\":").unwrap();
+    let seal = "\"head_sha256\":\"";
+    let (head, _) = head.split_once(seal).unwrap();
+    let head = format!("{}{seal}", head.replace("\"mucus\"", "\"sulcum\""));
+    let hash = sha256(format!("{head}\"}}").as_bytes());
+    fs::write(scratch.join("manifest.json"), format!("{head}{hash}\",\"files\":{list}")).unwrap();
+    let verdict = look(scratch.path());
+    assert!(is_found(&verdict, "manifest.json"), "{verdict:?}");
+    assert!(verdict.findings[0].message.contains("categories"), "{verdict:?}");
 }

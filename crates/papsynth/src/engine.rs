@@ -14,26 +14,14 @@ use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 use crate::transmit::Lenses;
 
-/// What a recipe names but does not hold, and how numbers are computed.
+/// What a recipe names but does not hold.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
     /// The image that `layout.path` names, for [`Layout::Map`](crate::recipe::Layout::Map): brightness 0 to 1;
     /// for [`Layout::Labels`](crate::recipe::Layout::Labels): 1 where a label lies, else 0.
     pub weight_map: Option<WeightMap>,
-    /// On which machines the bytes are the same.
-    pub arithmetic: Arithmetic,
     /// What adds up how long the stages take.
     pub profile: Option<Arc<Profile>>,
-}
-
-/// On which machines the same recipe gives the same bytes. This is the one place that decides it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Arithmetic {
-    /// On every machine of one instruction set, such as x86-64 with AVX2.
-    #[default]
-    Fastest,
-    /// On every machine: Fourier transforms, the only thing that differs, run in scalar code.
-    Portable,
 }
 
 /// Makes images of one recipe and one model.
@@ -59,23 +47,15 @@ impl Engine {
             return Err(Error::Recipe(problems));
         }
         model.check().map_err(Error::Model)?;
-        let fft = match inputs.arithmetic {
-            Arithmetic::Fastest => spectral_field::Fft::Fastest,
-            Arithmetic::Portable => spectral_field::Fft::Portable,
-        };
         scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
-        let lenses = Lenses::new(match inputs.arithmetic {
-            Arithmetic::Fastest => optics_psf::Fft::Fastest,
-            Arithmetic::Portable => optics_psf::Fft::Portable,
-        });
         let watch = Watch(inputs.profile.clone());
-        let studio = Studio::new(recipe, model, fft, watch).map_err(Error::Model)?;
+        let studio = Studio::new(recipe, model, watch).map_err(Error::Model)?;
         Ok(Self {
             recipe: recipe.clone(),
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
             studio,
-            lenses,
+            lenses: Lenses::default(),
             desks: Mutex::default(),
         })
     }
@@ -120,14 +100,32 @@ impl Engine {
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |message| E::from(Error::Image { index, message });
-        let desk = self.desks().pop().unwrap_or_default();
-        let mut rendering = Rendering::new(&self.studio, &self.lenses, scene, threads, desk).map_err(fail)?;
+        let mut rendering = self.rendering(scene, threads).map_err(fail)?;
         for plane in 0..rendering.planes() {
             sink(rendering.plane(plane).map_err(fail)?)?;
         }
         let (finished, desk) = rendering.finish().map_err(fail)?;
         self.desks().push(desk);
         Ok(finished)
+    }
+
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
+    }
+
+    pub(crate) fn lenses(&self) -> &Lenses {
+        &self.lenses
+    }
+
+    /// A scene on its way, in the memory of finished ones.
+    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, String> {
+        let desk = self.desks().pop().unwrap_or_default();
+        Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
+    }
+
+    /// Takes the memory of a scene back.
+    pub(crate) fn give_back(&self, rendering: Rendering) {
+        self.desks().push(rendering.into_desk());
     }
 
     fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {

@@ -25,6 +25,22 @@ pub struct Key {
 }
 
 impl Key {
+    /// The key of a plot of a whole slide, whose own key this is.
+    pub(crate) fn plot(self, number: u32) -> Self {
+        self.part(0, number)
+    }
+
+    /// The key of a frame of a whole slide, whose own key this is.
+    pub(crate) fn frame(self, number: u32) -> Self {
+        self.part(1, number)
+    }
+
+    /// The upper bit tells parts of slides from images; slides are numbered below 2³⁰.
+    fn part(self, kind: u64, number: u32) -> Self {
+        let slide = self.index & ((1 << 30) - 1);
+        Self { seed: self.seed, index: 1 << 63 | kind << 62 | slide << 32 | u64::from(number) }
+    }
+
     /// The stream of one purpose of one object.
     ///
     /// `kind` names the kind of object ("cell", "speckle", …, or "field" for what belongs to the whole image),

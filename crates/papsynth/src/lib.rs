@@ -23,11 +23,13 @@ mod render;
 mod rendition;
 mod restore;
 pub mod scene;
+pub mod slide;
 mod threads;
 mod transmit;
 pub mod truth;
 
-pub use engine::{Arithmetic, Engine, Inputs};
+pub use engine::{Engine, Inputs};
 pub use error::Error;
 pub use frame::{Finished, Frame, Plane};
+pub use slide::Slide;
 pub use threads::Threads;

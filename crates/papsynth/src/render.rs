@@ -55,9 +55,14 @@ impl Rendering {
         let objects: Vec<&Object> = scene.objects.iter().collect();
         let batches: Vec<&[&Object]> = objects.chunks(phantom::BATCH).collect();
         let made = threads::map(threads, &batches, |batch| phantom::make(studio, &scene, &pools, batch));
-        let mut phantoms = Vec::with_capacity(objects.len());
+        let mut phantoms: Vec<Phantom> = Vec::with_capacity(objects.len());
         for batch in made {
             phantoms.extend(batch?);
+        }
+        if scene.frame.is_some() {
+            let (view, n) = (scene.view, scene.oversampling());
+            let moved = scene.objects.iter().zip(phantoms).map(|(object, phantom)| phantom.on_slide(object, view, n));
+            phantoms = moved.collect();
         }
         let (masks, covered) = watch.time(Stage::Masks, || masks(&scene, &phantoms, threads));
         let slide = Slide { scene: &scene, phantoms: &phantoms, masks: &masks };
@@ -129,6 +134,52 @@ impl Rendering {
         let mut ids = core::mem::take(&mut self.desk.ids);
         let truth = watch.time(Stage::Truth, || self.truth(&mut ids));
         Ok((Finished { scene: self.scene, truth, all_in_focus }, Desk { ids, ..self.desk }))
+    }
+
+    /// The truth of a frame of a slide, and that of the objects whose middle is `within` it, whole: their masks are those on the
+    /// slide of that many columns and rows.
+    pub(crate) fn on_slide(
+        &mut self,
+        size_px: [u32; 2],
+        within: impl Fn([f64; 2]) -> bool,
+    ) -> (Truth, Vec<ObjectTruth>) {
+        let watch = self.watch.clone();
+        watch.time(Stage::Truth, || {
+            let mut ids = core::mem::take(&mut self.desk.ids);
+            let truth = self.truth(&mut ids);
+            self.desk.ids = ids;
+            let origin_px = self.scene.frame.map_or([0; 2], |frame| frame.origin_px);
+            let n = self.scene.oversampling();
+            let mut rows = Vec::new();
+            let mut number = 0;
+            for (object, phantom) in self.scene.objects.iter().zip(&self.phantoms) {
+                let own = within(self.scene.place_um(object)) && !object.body.kind().is_layer();
+                for piece in &phantom.pieces {
+                    if own {
+                        let cover = piece.cover_of_pixels(n);
+                        let at = [0, 1].map(|axis| cover.origin[axis] + origin_px[axis]);
+                        let inside = |share: f32| share >= COVERED;
+                        let [width, height] = size_px.map(|side| side as usize);
+                        let mask = Mask::from_tile(&cover.values, cover.width, at, width, height, inside);
+                        let covered = cover.values.iter().filter(|share| inside(**share)).count() as u64;
+                        if !mask.is_empty() {
+                            let mut row = self.row(object, phantom, piece, &mask, number);
+                            row.truncated = mask.area() < covered;
+                            let corner = origin_px.map(|at| at as f64 * self.scene.view.pixel_um);
+                            row.centre_um = [0, 1].map(|axis| row.centre_um[axis] + corner[axis]);
+                            rows.push(row);
+                        }
+                    }
+                    number += 1;
+                }
+            }
+            (truth, rows)
+        })
+    }
+
+    /// The memory for the next image.
+    pub(crate) fn into_desk(self) -> Desk {
+        self.desk
     }
 
     fn all_in_focus(&mut self) -> Result<Vec<f32>, String> {
@@ -222,7 +273,7 @@ impl Rendering {
             bethesda: object.bethesda.clone(),
             traits: phantom.traits.join(";"),
             cluster: object.cluster,
-            centre_um: object.centre_um,
+            centre_um: self.scene.place_um(object),
             depth_um: object.depth_um,
             stain,
             tint,
@@ -282,7 +333,7 @@ impl<'a> Exposure<'a> {
         // By where the stage stands, so that other planes before it make no difference: to a millionth of a micrometre.
         #[expect(clippy::cast_possible_truncation, reason = "a few metres at most")]
         let place = libm::round(plane.stage_um * 1e6) as i64;
-        let key = |purpose: &str| rendering.scene.key.stream("plane", place.cast_unsigned(), purpose).next_u64();
+        let key = |purpose: &str| rendering.scene.own_key().stream("plane", place.cast_unsigned(), purpose).next_u64();
         let keys = match rendering.scene.channels() {
             1 => vec![key("camera")],
             _ => ["camera.red", "camera.green", "camera.blue"].map(key).to_vec(),

@@ -17,6 +17,24 @@ pub(crate) fn map<T: Sync, R: Send>(threads: Threads, items: &[T], work: impl Fn
     }
 }
 
+/// How many items are worked on side by side.
+pub(crate) fn count(threads: Threads) -> usize {
+    match threads {
+        Threads::One => 1,
+        Threads::All => all(),
+    }
+}
+
+#[cfg(feature = "threads")]
+fn all() -> usize {
+    rayon::current_num_threads()
+}
+
+#[cfg(not(feature = "threads"))]
+fn all() -> usize {
+    1
+}
+
 #[cfg(feature = "threads")]
 fn map_all<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     use rayon::prelude::*;

@@ -3,7 +3,7 @@
 //! `cargo xtask golden` runs this, `cargo xtask golden --bless` writes the images anew.
 //!
 //! Tolerance: no pixel may differ by more than one grey level and no more than one in a hundred may differ at all.
-//! Fourier transforms round differently on different instruction sets; everything else is exact.
+//! A routine may become faster and round differently; `fixtures/hashes.txt` tells every bit.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 

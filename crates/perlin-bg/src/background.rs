@@ -80,6 +80,8 @@ pub struct Background {
     shade: Shade,
     noise: Fractal,
     window: Window,
+    /// Pixel of the noise that the field of view begins at.
+    at: [i64; 2],
     scale: f32,
     offset: f32,
 }
@@ -110,6 +112,7 @@ impl Background {
             scale: noise.unit_scale(),
             offset: 0.5,
             noise,
+            at: [0; 2],
             window: Window {
                 // Keeps the corner pixel, where all fields would be zero, off the lattice.
                 origin: [0, 1].map(|axis| hash::unit(hash::derive(!key, axis))),
@@ -122,6 +125,15 @@ impl Background {
             background.offset = -low * background.scale;
         }
         Ok(background)
+    }
+
+    /// The same light over another part of the slide: the scatter is that of a field of view that begins at pixel `at`
+    /// (column, row) of one without end, so that neighbouring fields of one key go on in each other. Scatter that is
+    /// stretched to each image's extremes does not.
+    #[must_use]
+    pub fn on_slide(mut self, at: [i64; 2]) -> Self {
+        self.at = at;
+        self
     }
 
     /// Fills `image` with transmitted light (Eqs. 8 and 9), above 0 and at most level times the brightest
@@ -170,7 +182,8 @@ impl Background {
 
     fn scatter_rows(&self, width: usize, first: [usize; 2]) -> (FractalRows<'_>, Window) {
         // No field of view reaches 2^63 pixels.
-        let window = self.window.tile(first.map(|pixel| i64::try_from(pixel).unwrap_or(i64::MAX)));
+        let first = [0, 1].map(|axis| self.at[axis].saturating_add_unsigned(first[axis] as u64));
+        let window = self.window.tile(first);
         (self.noise.rows(width, &window, 1.0), window)
     }
 

@@ -14,7 +14,7 @@ mod source;
 mod spectral;
 
 pub use error::Error;
-pub use params::{Acceptance, CentreBias, Fft, QuiltParams, Seam, Search};
+pub use params::{Acceptance, CentreBias, QuiltParams, Seam, Search};
 pub use quilter::{Origin, Quilter, Texture};
 pub use rand_core::Rng;
 pub use source::Source;

@@ -17,8 +17,6 @@ pub struct QuiltParams {
     /// How all candidates are compared. Default [`Search::Auto`] (ours). Has no effect on
     /// [`Acceptance::Threshold`], which tries some and compares the rest directly.
     pub search: Search,
-    /// Which FFT [`Search::Fft`] runs. Default [`Fft::Fastest`] (ours).
-    pub fft: Fft,
 }
 
 impl Default for QuiltParams {
@@ -30,7 +28,6 @@ impl Default for QuiltParams {
             seam: Seam::MinCut { feather_px: 0 },
             centre_bias: CentreBias::Weighted { strength: 0.5 },
             search: Search::Auto,
-            fft: Fft::Fastest,
         }
     }
 }
@@ -166,15 +163,6 @@ pub enum Search {
     Fft,
     /// Whichever should be faster for a source.
     Auto,
-}
-
-/// Which FFT runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Fft {
-    /// The best instruction set of the machine at hand. The last bits differ between machines.
-    Fastest,
-    /// Scalar code in one fixed order: the same bits wherever it runs.
-    Portable,
 }
 
 #[cfg(test)]

@@ -98,7 +98,7 @@ impl<'a> Quilter<'a> {
                 Search::Fft => true,
                 Search::Auto => Spectral::is_faster(source, &candidates, params),
             };
-            Ok(Donor { source, candidates, spectral: spectral.then(|| Spectral::new(source, params.fft)) })
+            Ok(Donor { source, candidates, spectral: spectral.then(|| Spectral::new(source)) })
         };
         let donors = sources.iter().enumerate().map(donor).collect::<Result<Vec<_>, _>>()?;
         let count: usize = sources.iter().map(|s| s.count).sum();

@@ -1,16 +1,13 @@
-use core::fmt;
-use std::sync::Arc;
-
-use rustfft::num_complex::Complex64;
-use rustfft::{Fft as Transform, FftPlanner, FftPlannerScalar};
+use lane_fft::{ComplexPlane, PlaneScratch};
+use num_complex::Complex64;
 
 use crate::candidates::Candidates;
 use crate::scan::{LANES, Template};
-use crate::{Fft, QuiltParams, Source};
+use crate::{QuiltParams, Source};
 
 /// Compares a template with all places of one source at once by Fourier transforms:
 /// Σ m (s - t)² = Σ m t² - 2 (s ⋆ m t) + (s² ⋆ m), ⋆ a correlation.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(crate) struct Spectral {
     /// Sides of the transform: those of the source, rounded up.
     grid: [usize; 2],
@@ -19,14 +16,7 @@ pub(crate) struct Spectral {
     /// Transforms of s and s², columns of frequencies contiguous.
     plain: Vec<Complex64>,
     squared: Vec<Complex64>,
-    plans: [Plan; 2],
-}
-
-/// Forward and inverse transform of one length.
-#[derive(Clone)]
-struct Plan {
-    forward: Arc<dyn Transform<f64>>,
-    inverse: Arc<dyn Transform<f64>>,
+    plan: ComplexPlane<f64, 8>,
 }
 
 impl Spectral {
@@ -45,18 +35,8 @@ impl Spectral {
         }
     }
 
-    pub(crate) fn new(source: &Source, fft: Fft) -> Self {
+    pub(crate) fn new(source: &Source) -> Self {
         let grid = Self::grid(source);
-        let plans = match fft {
-            Fft::Fastest => {
-                let mut planner = FftPlanner::new();
-                grid.map(|n| Plan { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) })
-            }
-            Fft::Portable => {
-                let mut planner = FftPlannerScalar::new();
-                grid.map(|n| Plan { forward: planner.plan_fft_forward(n), inverse: planner.plan_fft_inverse(n) })
-            }
-        };
         let known = || (0..).zip(&source.known).filter(|&(_, &known)| known).map(|(i, _): (usize, _)| i);
         let [x, y] = [|i: usize, w: usize| i % w, |i: usize, w: usize| i / w];
         let value = |i| {
@@ -65,13 +45,14 @@ impl Spectral {
         };
         #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
         let mean = known().map(value).sum::<f64>() / source.count as f64;
-        let mut spectral = Self { grid, mean, plain: Vec::new(), squared: Vec::new(), plans };
+        let mut spectral =
+            Self { grid, mean, plain: Vec::new(), squared: Vec::new(), plan: ComplexPlane::new(grid[0], grid[1]) };
         let transform = |of: &dyn Fn(f64) -> f64| {
             let mut image = vec![Complex64::ZERO; grid[0] * grid[1]];
             for i in known() {
                 image[y(i, source.width) * grid[0] + x(i, source.width)].re = of(value(i) - mean);
             }
-            spectral.forward(image)
+            spectral.forward(&image, &mut PlaneScratch::default())
         };
         let (plain, squared) = (transform(&|v| v), transform(&|v| v * v));
         spectral.plain = plain;
@@ -126,7 +107,8 @@ impl Spectral {
             image[y * width + x] = Complex64::new(t, 1.0);
             constant += t * t;
         }
-        let both = self.forward(image);
+        let mut scratch = PlaneScratch::default();
+        let both = self.forward(&image, &mut scratch);
         let mut product = vec![Complex64::ZERO; width * height];
         for kx in 0..width {
             for ky in 0..height {
@@ -140,46 +122,15 @@ impl Spectral {
         }
         #[expect(clippy::cast_precision_loss, reason = "far below 2^53 pixels")]
         let scale = 1.0 / (width * height) as f64;
-        self.inverse(product).iter().map(|z| constant + scale * z.re).collect()
+        self.plan.inverse(&product, |_| false, &mut image, &mut scratch);
+        image.iter().map(|z| constant + scale * z.re).collect()
     }
 
-    fn forward(&self, mut image: Vec<Complex64>) -> Vec<Complex64> {
-        let [width, height] = self.grid;
-        self.plans[0].forward.process(&mut image);
-        let mut columns = transposed(&image, width, height);
-        self.plans[1].forward.process(&mut columns);
-        columns
+    fn forward(&self, image: &[Complex64], scratch: &mut PlaneScratch<f64, 8>) -> Vec<Complex64> {
+        let mut spectrum = vec![Complex64::ZERO; image.len()];
+        self.plan.forward(image, &mut spectrum, scratch);
+        spectrum
     }
-
-    fn inverse(&self, mut columns: Vec<Complex64>) -> Vec<Complex64> {
-        let [width, height] = self.grid;
-        self.plans[1].inverse.process(&mut columns);
-        let mut image = transposed(&columns, height, width);
-        self.plans[0].inverse.process(&mut image);
-        image
-    }
-}
-
-impl fmt::Debug for Spectral {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Spectral").field("grid", &self.grid).finish_non_exhaustive()
-    }
-}
-
-/// An image of `width` x `height`, its columns laid out as rows; in blocks, for the cache.
-fn transposed(image: &[Complex64], width: usize, height: usize) -> Vec<Complex64> {
-    const BLOCK: usize = 8;
-    let mut out = vec![Complex64::ZERO; image.len()];
-    for y0 in (0..height).step_by(BLOCK) {
-        for x0 in (0..width).step_by(BLOCK) {
-            for x in x0..(x0 + BLOCK).min(width) {
-                for y in y0..(y0 + BLOCK).min(height) {
-                    out[x * height + y] = image[y * width + x];
-                }
-            }
-        }
-    }
-    out
 }
 
 /// The next length of the form 2^a 3^b.
@@ -204,21 +155,19 @@ mod tests {
     #[test]
     fn squares_equal_brute_force() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        for fft in [Fft::Fastest, Fft::Portable] {
-            for (width, height, patch, overlap) in [(40, 40, 7, 2), (61, 23, 9, 3), (7, 7, 3, 1)] {
-                let source = disc(width, height, &mut rng);
-                let spectral = Spectral::new(&source, fft);
-                let candidates = Candidates::new(&source, patch);
-                let mut template = template(patch, overlap, &mut rng);
-                template.weight = 0.0;
-                let squares = spectral.squares(&template);
-                let largest = squares.iter().copied().fold(0.0, f64::max);
-                for &place in &candidates.places {
-                    let (x, y) = (place % source.stride(), place / source.stride());
-                    let fast = squares[y * spectral.grid[0] + x];
-                    let slow = slow_cost(&source, patch, &template, place);
-                    assert!((fast - slow).abs() < 1e-10 * largest, "{fast}, {slow}");
-                }
+        for (width, height, patch, overlap) in [(40, 40, 7, 2), (61, 23, 9, 3), (7, 7, 3, 1)] {
+            let source = disc(width, height, &mut rng);
+            let spectral = Spectral::new(&source);
+            let candidates = Candidates::new(&source, patch);
+            let mut template = template(patch, overlap, &mut rng);
+            template.weight = 0.0;
+            let squares = spectral.squares(&template);
+            let largest = squares.iter().copied().fold(0.0, f64::max);
+            for &place in &candidates.places {
+                let (x, y) = (place % source.stride(), place / source.stride());
+                let fast = squares[y * spectral.grid[0] + x];
+                let slow = slow_cost(&source, patch, &template, place);
+                assert!((fast - slow).abs() < 1e-10 * largest, "{fast}, {slow}");
             }
         }
     }
@@ -231,7 +180,7 @@ mod tests {
         let template = template(8, 3, &mut rng);
         let mut costs = vec![f32::NAN; candidates.slots];
         let mut least = f32::INFINITY;
-        Spectral::new(&source, Fft::Fastest).costs(&source, &candidates, 8, &template, &mut least, &mut costs);
+        Spectral::new(&source).costs(&source, &candidates, 8, &template, &mut least, &mut costs);
         assert_eq!(least, costs.iter().copied().fold(f32::INFINITY, f32::min));
         for (slot, &cost) in costs.iter().enumerate() {
             let place = candidates.place_of_slot(slot);

@@ -1,26 +1,31 @@
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
-use core::fmt;
-use std::sync::Arc;
 
+use lane_fft::{LaneFft, ZERO, transposed};
+use multiversion::multiversion;
 use rand_core::Rng;
-use rustfft::{Fft as Transform, FftPlanner, FftPlannerScalar, num_complex::Complex32};
 
 use crate::normal::Ziggurat;
-use crate::{Error, Fft, FieldParams};
+use crate::{Error, FieldParams};
 
 /// Amplitudes below this part of the largest are zero: they are lost in the rounding of the FFT,
 /// and smooth spectra then need only a corner of the grid.
 const NEGLIGIBLE: f64 = 1e-7;
 
-/// Rows gathered at a time: as many complex numbers of a column as one cache line holds.
-const ROWS: usize = 8;
+/// Columns of frequencies that are transformed together: a cache line of single precision.
+const LANES: usize = 16;
+
+/// Rows that are transformed together: two in each lane, as real and imaginary part.
+const ROWS: usize = 2 * LANES;
+
+/// A complex number of each lane.
+type Lanes = lane_fft::Lanes<f32, LANES>;
 
 /// Gaussian random fields of one size and spectrum: planned once, drawn often.
 ///
 /// A draw colours white noise in the frequency domain: field(x) = Σ_k A_k W_k exp(2πi k·x), with
 /// A_k² the spectrum on the FFT grid, Σ A_k² = 1, and W_k independent complex normal deviates.
 /// Only half of the plane of frequencies is drawn, as the field is real.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct SpectralField {
     width: usize,
     height: usize,
@@ -31,8 +36,8 @@ pub struct SpectralField {
     amplitude: Vec<f32>,
     /// For each column, the largest |ky| with an amplitude.
     reach: Vec<usize>,
-    columns: Arc<dyn Transform<f32>>,
-    rows: Arc<dyn Transform<f32>>,
+    columns: LaneFft<f32>,
+    rows: LaneFft<f32>,
     normal: Ziggurat,
 }
 
@@ -44,16 +49,6 @@ impl SpectralField {
     /// If a side is 0 or too long, or a number of the spectrum is not finite or out of range.
     pub fn new(params: &FieldParams) -> Result<Self, Error> {
         let grid = params.grid()?;
-        let (rows, columns) = match params.fft {
-            Fft::Fastest => {
-                let mut planner = FftPlanner::new();
-                (planner.plan_fft_inverse(grid[0]), planner.plan_fft_inverse(grid[1]))
-            }
-            Fft::Portable => {
-                let mut planner = FftPlannerScalar::new();
-                (planner.plan_fft_inverse(grid[0]), planner.plan_fft_inverse(grid[1]))
-            }
-        };
         let (amplitude, reach) = amplitudes(params, grid);
         Ok(Self {
             width: params.width,
@@ -61,8 +56,8 @@ impl SpectralField {
             grid,
             amplitude,
             reach,
-            columns,
-            rows,
+            columns: LaneFft::new(grid[1]),
+            rows: LaneFft::new(grid[0]),
             normal: Ziggurat::new(),
         })
     }
@@ -107,23 +102,12 @@ impl SpectralField {
             self.height
         );
         let spectrum = self.coloured_columns(rng);
-        let grid_width = self.grid[0];
-        let mut pairs = vec![Complex32::ZERO; ROWS / 2 * grid_width];
-        let mut scratch = vec![Complex32::ZERO; self.rows.get_inplace_scratch_len()];
-        for (block, lines) in field.chunks_mut(ROWS * self.width).enumerate() {
-            let first = block * ROWS;
-            let used = pairs.len().min((lines.len() / self.width).div_ceil(2) * grid_width);
-            self.gather(&spectrum, first, &mut pairs[..used]);
-            self.rows.process_with_scratch(&mut pairs[..used], &mut scratch);
-            for (pair, two) in pairs.chunks(grid_width).zip(lines.chunks_mut(2 * self.width)) {
-                let (upper, lower) = two.split_at_mut(self.width);
-                for (out, z) in upper.iter_mut().zip(pair) {
-                    *out = z.re;
-                }
-                for (out, z) in lower.iter_mut().zip(pair) {
-                    *out = z.im;
-                }
-            }
+        let mut line = vec![ZERO; self.grid[0]];
+        let mut spare = line.clone();
+        for (block, rows) in field.chunks_mut(ROWS * self.width).enumerate() {
+            gather(&spectrum, self.amplitude.len() / self.grid[1], block * ROWS, &mut line);
+            self.rows.process(&mut line, &mut spare);
+            scatter(&line, rows, self.width);
         }
     }
 
@@ -149,57 +133,80 @@ impl SpectralField {
         sum
     }
 
-    /// The columns of frequencies, coloured and transformed along y.
-    fn coloured_columns<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<Complex32> {
-        let height = self.grid[1];
-        let mut spectrum = vec![Complex32::ZERO; self.amplitude.len()];
-        let mut scratch = vec![Complex32::ZERO; self.columns.get_inplace_scratch_len()];
-        let columns = spectrum.chunks_mut(height).zip(self.amplitude.chunks(height));
-        for ((column, amplitude), &reach) in columns.zip(&self.reach) {
-            let mut colour = |from: usize, to: usize| {
-                for (z, &a) in column[from..to].iter_mut().zip(&amplitude[from..to]) {
-                    let [re, im] = self.normal.pair(rng);
-                    *z = Complex32::new(a * re, a * im);
-                }
-            };
-            colour(0, reach + 1);
-            colour((reach + 1).max(height - reach), height);
-            self.columns.process_with_scratch(column, &mut scratch);
-        }
-        spectrum
-    }
-
-    /// Lays rows `first`, `first + 1` of the spectrum into the first line of `pairs` as
-    /// Z = A + iB, the next two into the next: one complex transform then yields two real rows.
-    fn gather(&self, spectrum: &[Complex32], first: usize, pairs: &mut [Complex32]) {
+    /// The columns of frequencies, coloured and transformed along y: blocks of them side by side.
+    fn coloured_columns<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<Vec<Lanes>> {
         #[expect(clippy::cast_possible_truncation, reason = "a constant")]
         const ROOT: f32 = SQRT_2 as f32;
         let [width, height] = self.grid;
-        pairs.fill(Complex32::ZERO);
-        for (kx, column) in spectrum.chunks(height).enumerate() {
-            let column = &column[first..];
-            for (pair, two) in pairs.chunks_mut(width).zip(column.chunks(2)) {
-                let (a, b) = (two[0], two.get(1).copied().unwrap_or_default());
-                if is_own_mirror(kx, width) {
-                    // A real field needs a mirrored column, Z(-k) = Z*(k): the real part of its
-                    // transform is that of the mirrored one, at half the variance.
-                    pair[kx] = Complex32::new(ROOT * a.re, ROOT * b.re);
-                } else {
-                    pair[kx] = Complex32::new(a.re - b.im, a.im + b.re);
-                    pair[width - kx] = Complex32::new(a.re + b.im, b.re - a.im);
+        let mut spare = vec![ZERO; height];
+        let mut blocks = Vec::new();
+        for (first, reaches) in (0..).step_by(LANES).zip(self.reach.chunks(LANES)) {
+            let mut block = vec![ZERO; height];
+            let amplitudes = self.amplitude[first * height..].chunks(height);
+            for (l, (amplitude, &reach)) in amplitudes.zip(reaches).enumerate() {
+                for ky in (0..=reach).chain((reach + 1).max(height - reach)..height) {
+                    let [re, im] = self.normal.pair(rng);
+                    // The inverse transform is the forward one of the reversed sequence.
+                    let z = &mut block[if ky == 0 { 0 } else { height - ky }];
+                    (z[0][l], z[1][l]) = (amplitude[ky] * re, amplitude[ky] * im);
                 }
             }
+            self.columns.process(&mut block, &mut spare);
+            for l in (0..reaches.len()).filter(|l| is_own_mirror(first + l, width)) {
+                // A real field needs a mirrored column, Z(-k) = Z*(k): the real part of its
+                // transform is that of the mirrored one, at half the variance.
+                block.iter_mut().for_each(|z| (z[0][l], z[1][l]) = (ROOT * z[0][l], 0.0));
+            }
+            block.resize(height.next_multiple_of(ROWS), ZERO);
+            blocks.push(block);
+        }
+        blocks
+    }
+}
+
+/// Lays spectra of rows from the `first` on, reversed, into `line`, Z = A + iB of two in each lane: one complex transform
+/// then yields two real rows. The first `columns` have a frequency.
+#[multiversion(targets = "simd")]
+fn gather(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lanes]) {
+    let width = line.len();
+    line.fill(ZERO);
+    for (kx, block) in (0..).step_by(LANES).zip(spectrum) {
+        let mut parts = [[[0.0; LANES]; LANES]; 4];
+        let (a, b) = block[first..first + ROWS].split_at(LANES);
+        for l in 0..LANES {
+            [parts[0][l], parts[1][l]] = a[l];
+            [parts[2][l], parts[3][l]] = b[l];
+        }
+        let [a_re, a_im] = [transposed(&parts[0]), transposed(&parts[1])];
+        let [b_re, b_im] = [transposed(&parts[2]), transposed(&parts[3])];
+        for i in 0..LANES.min(columns - kx) {
+            let (mut z, mut mirrored) = (ZERO, ZERO);
+            for l in 0..LANES {
+                z[0][l] = a_re[i][l] - b_im[i][l];
+                z[1][l] = a_im[i][l] + b_re[i][l];
+                mirrored[0][l] = a_re[i][l] + b_im[i][l];
+                mirrored[1][l] = b_re[i][l] - a_im[i][l];
+            }
+            // The two are one where they have one place.
+            line[kx + i] = mirrored;
+            line[if kx + i == 0 { 0 } else { width - kx - i }] = z;
         }
     }
 }
 
-impl fmt::Debug for SpectralField {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SpectralField")
-            .field("width", &self.width)
-            .field("height", &self.height)
-            .field("grid", &self.grid)
-            .finish_non_exhaustive()
+/// Writes at most [`ROWS`] rows of `width`: real parts, then imaginary parts.
+#[multiversion(targets = "simd")]
+fn scatter(line: &[Lanes], rows: &mut [f32], width: usize) {
+    for (left, values) in (0..width).step_by(LANES).zip(line.chunks(LANES)) {
+        let mut parts = [[[0.0; LANES]; LANES]; 2];
+        for (i, value) in values.iter().enumerate() {
+            [parts[0][i], parts[1][i]] = *value;
+        }
+        let parts = [transposed(&parts[0]), transposed(&parts[1])];
+        let right = width.min(left + LANES);
+        for (row, part) in rows.chunks_exact_mut(width).zip(parts.as_flattened()) {
+            row[left..right].copy_from_slice(&part[..right - left]);
+        }
     }
 }
 

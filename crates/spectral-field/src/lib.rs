@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
+#![forbid(unsafe_code)]
 
 mod error;
 mod field;
@@ -9,6 +10,6 @@ mod spectrum;
 
 pub use error::Error;
 pub use field::SpectralField;
-pub use params::{Fft, FieldParams, Padding};
+pub use params::{FieldParams, Padding};
 pub use rand_core::Rng;
 pub use spectrum::Spectrum;

@@ -16,21 +16,13 @@ pub struct FieldParams {
     /// How variance is spread over spatial frequencies.
     /// Default [`Spectrum::BROWNIAN`] (the paper's, "Texture synthesis").
     pub spectrum: Spectrum,
-    /// Which FFT runs. Default [`Fft::Fastest`] (ours).
-    pub fft: Fft,
     /// Whether the field tiles. Default [`Padding::Decorrelated`] (ours).
     pub padding: Padding,
 }
 
 impl Default for FieldParams {
     fn default() -> Self {
-        Self {
-            width: 256,
-            height: 256,
-            spectrum: Spectrum::BROWNIAN,
-            fft: Fft::Fastest,
-            padding: Padding::Decorrelated,
-        }
+        Self { width: 256, height: 256, spectrum: Spectrum::BROWNIAN, padding: Padding::Decorrelated }
     }
 }
 
@@ -61,15 +53,6 @@ impl FieldParams {
         };
         Ok([side("width", self.width)?, side("height", self.height)?])
     }
-}
-
-/// Which FFT runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Fft {
-    /// The best instruction set of the machine at hand. The last bits differ between machines.
-    Fastest,
-    /// Scalar code in one fixed order: the same bits wherever it runs, about twice as slow.
-    Portable,
 }
 
 /// How much of the periodic FFT grid a field shows.

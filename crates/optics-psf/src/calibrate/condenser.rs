@@ -1,9 +1,8 @@
-use rustfft::num_complex::Complex32;
-
 use super::{Window, lowest, mean_difference, sharpest, stack_height};
 use crate::error::require;
-use crate::fft::{Fft, Plans, fast_length};
-use crate::real_plane::{PlaneScratch, RealPlane, Support};
+use crate::grid::fast_length;
+use crate::lane_plane::{LanePlane, LaneScratch, LaneSupport};
+use crate::lanes::{LANES, LanePlans, Lanes};
 use crate::{Border, Error, Microscope, MicroscopeParams};
 
 /// Pixels around the window that the transfer functions see.
@@ -62,20 +61,22 @@ pub fn condenser(
 
     // Reflected, so that the seam of the periodic grid has no step.
     let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
-    let plane = RealPlane::new(wide, high, &Plans::new(Fft::Portable));
-    let support = Support::new(wide, high, 1.0);
-    let (mut scratch, mut spectrum) = (PlaneScratch::default(), Vec::new());
+    let plane = LanePlane::new(wide, high, &LanePlans::default());
+    let support = LaneSupport::new(wide, high, 1.0);
+    let (mut scratch, mut spectrum) = (LaneScratch::default(), Vec::new());
     let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
-    let fill = |y: usize, row: &mut [f32]| {
-        let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
-        for (x, value) in row.iter_mut().enumerate() {
-            *value = from[reflected(x, outer.width)];
+    let fill = |left: usize, stripe: &mut [Lanes]| {
+        for (y, row) in stripe.iter_mut().enumerate() {
+            let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
+            for (x, value) in row.as_flattened_mut().iter_mut().enumerate() {
+                *value = if left + x < wide { from[reflected(left + x, outer.width)] } else { 0.0 };
+            }
         }
         true
     };
-    plane.forward(&support, 0..high, fill, &mut spectrum, &mut scratch);
-    let frequencies: Vec<[f64; 2]> =
-        support.frequencies(wide, high).map(|f| f.map(|f| f / microscope.pixel_um)).collect();
+    plane.forward(&support, fill, &mut spectrum, &mut scratch);
+    let frequencies: Vec<[[f64; 2]; LANES]> =
+        support.frequencies(wide, high).map(|f| f.map(|f| f.map(|f| f / microscope.pixel_um))).collect();
 
     let mut tried = Vec::new();
     for i in 0..TRIED {
@@ -85,26 +86,31 @@ pub fn condenser(
         let mut sum = 0.0;
         for (k, target) in targets.iter().enumerate().filter(|(k, _)| *k != focused) {
             let transfer = candidate.transfer(0.0, step_um * (k as f64 - focused as f64))?;
-            let filtered: Vec<_> = spectrum
-                .iter()
-                .zip(&frequencies)
-                .map(|(value, &f)| {
+            let mut filtered = spectrum.clone();
+            for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
+                for (l, &f) in frequencies.iter().enumerate() {
                     let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));
                     #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
                     let ratio = (now * then * (1.0 + NOISE * NOISE) / (then * then + NOISE * NOISE)) as f32;
-                    value * (ratio * plane.norm())
-                })
-                .collect();
+                    value[0][l] *= ratio * plane.norm();
+                    value[1][l] *= ratio * plane.norm();
+                }
+            }
             let mut image = vec![0.0; outer.width * outer.height];
-            let fill = |x: usize, to: [&mut [Complex32]; 2]| {
-                for (to, from) in to.into_iter().zip(support.column(&filtered, x, high)) {
-                    to.copy_from_slice(from);
+            let fill = |block: usize, line: &mut [Lanes]| {
+                let (from, reach) = (support.block(&filtered, block), support.reach(block));
+                line[..=reach].copy_from_slice(&from[..=reach]);
+                let below = line.len() - reach;
+                line[below..].copy_from_slice(&from[reach + 1..]);
+            };
+            let keep = |left: usize, stripe: &[Lanes]| {
+                for (row, stripe) in image.chunks_exact_mut(outer.width).zip(stripe) {
+                    for (to, from) in row[left..].iter_mut().zip(stripe.as_flattened()) {
+                        *to = *from;
+                    }
                 }
             };
-            let keep = |y: usize, row: &[f32]| {
-                image[y * outer.width..(y + 1) * outer.width].copy_from_slice(&row[..outer.width]);
-            };
-            plane.inverse(&support, fill, outer.height, keep, &mut scratch);
+            plane.inverse(&support, fill, outer.width, keep, &mut scratch);
             sum += mean_difference(&inner.crop(&image, outer.width), target);
         }
         tried.push([condenser_na, sum / (stack.len() - 1) as f64]);

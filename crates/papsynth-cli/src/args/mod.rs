@@ -2,6 +2,7 @@
 
 mod real;
 mod sets;
+mod slide;
 mod values;
 
 use std::ops::Range;
@@ -14,6 +15,7 @@ pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
 pub(crate) use sets::{
     Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
 };
+pub(crate) use slide::{Slide, SlideFinalize, SlideMake, SlideTile, SlideVerb};
 use values::{camera_parser, parse_range, preset_parser};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
@@ -58,6 +60,7 @@ pub(crate) enum Verb {
     Status(Status),
     Merge(Merge),
     Clean(Clean),
+    Slide(Box<Slide>),
     Study(Box<Study>),
     Schema(SchemaArgs),
     Completions(Completions),
@@ -135,8 +138,8 @@ pub(crate) fn threads(asked: Option<u16>) -> usize {
 
 /// Make images and their truth.
 ///
-/// The same recipe, model and seed give the same bytes, whatever the number of threads and however the frames are
-/// split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
+/// The same recipe, model and seed give the same pixels, labels and tables on any machine, whatever the number of threads and
+/// however the frames are split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
 Examples:

@@ -69,7 +69,7 @@ pub(crate) struct ShareArgs {
 /// Read every file of a data set and say what is wrong.
 ///
 /// Finds every bit that has changed, every file that is cut, missing or too many, every frame that is missing, and masks, boxes, areas, tables
-/// and label images that do not fit together. `papsynth generate --verify` with the same recipe mends what is found.
+/// and label images that do not fit together; what `papsynth merge` writes is made again and compared. `papsynth generate --verify` with the same recipe mends what is found.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

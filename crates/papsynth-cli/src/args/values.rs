@@ -45,13 +45,16 @@ pub(super) fn grey_parser() -> impl TypedValueParser<Value = Grey> {
 
 /// Names of formats, each with what it is.
 pub(super) fn format_parser() -> impl TypedValueParser<Value = Format> {
-    let names = Format::ALL.map(|format| PossibleValue::new(format.name()).help(format.about()));
-    PossibleValuesParser::new(names).try_map(|name| {
+    let named = |format: Format| {
+        let needs = format.needs().map(|feature| format!(" (wants a build with --features {feature})"));
+        PossibleValue::new(format.name()).help(format!("{}{}", format.about(), needs.unwrap_or_default()))
+    };
+    PossibleValuesParser::new(Format::ALL.map(named)).try_map(|name| {
         let format = Format::ALL.into_iter().find(|f| f.name() == name);
         let format = format.ok_or_else(|| format!("there is no format `{name}`"))?;
-        match format.lacks() {
-            Some(feature) => Err(format!("the format `{name}` needs a build with `--features {feature}`")),
+        match format.needs() {
             None => Ok(format),
+            Some(feature) => Err(format!("`--format {name}` needs a build of papsynth with `--features {feature}`")),
         }
     })
 }
@@ -89,6 +92,14 @@ pub(super) fn parse_range(text: &str) -> Result<Range<u64>, String> {
         return Err(format!("no frame lies in it; {expected}"));
     }
     Ok(range)
+}
+
+/// Two whole numbers.
+pub(super) fn parse_pair(text: &str) -> Result<[u32; 2], String> {
+    let expected = "expected two whole numbers, such as 1024,768";
+    let (first, second) = text.split_once([',', 'x']).ok_or(expected)?;
+    let number = |part: &str| part.trim().parse::<u32>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    Ok([number(first)?, number(second)?])
 }
 
 /// A name that can stand in a recipe without quotes.

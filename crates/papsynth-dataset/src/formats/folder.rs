@@ -36,8 +36,8 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
         written.file(&layout::all_in_focus(index), |bytes| written.picture(bytes))?;
     }
     written.file(&layout::noise_free(index), |bytes| {
-        let pages = read::float_pages(bytes, &LIMITS)?;
         let due = geometry.planes_um.len();
+        let pages = read::float_pages(bytes, &LIMITS, due)?;
         if pages.len() != due {
             return differs(&format!("it has {} planes, the record says {due}", pages.len()));
         }

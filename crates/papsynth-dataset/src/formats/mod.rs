@@ -9,17 +9,22 @@ mod flat;
 mod folder;
 pub(crate) mod huggingface;
 mod ome_tiff;
-mod qupath;
+#[cfg(feature = "zarr")]
+mod ome_zarr;
+pub(crate) mod qupath;
 mod stardist;
 mod webdataset;
 mod written;
 mod yolo;
 
+#[cfg(feature = "zarr")]
+pub(crate) use ome_zarr::read_planes;
 pub(crate) use webdataset::{Tar, tar};
 pub(crate) use written::Written;
 
 use std::cell::OnceCell;
 use std::io;
+use std::path::Path;
 
 use papsynth::Plane;
 use papsynth::truth::{Group, Truth};
@@ -52,13 +57,15 @@ pub enum Format {
     YoloSeg,
     /// GeoJSON, nuclei within cells, beside OME-TIFF images.
     Qupath,
-    /// Parquet files of many frames, as the library `datasets` reads them; wants the feature `parquet`.
+    /// OME-Zarr groups with their labels; of builds with the feature `zarr`.
+    OmeZarr,
+    /// Parquet files of many frames, as the library `datasets` reads them; of builds with the feature `parquet`.
     Huggingface,
 }
 
 impl Format {
-    /// All formats, also those that [need a feature](Self::lacks).
-    pub const ALL: [Self; 8] = [
+    /// All formats, also those that this build cannot write ([`needs`](Self::needs)).
+    pub const ALL: [Self; 9] = [
         Self::Folder,
         Self::Webdataset,
         Self::OmeTiff,
@@ -66,18 +73,34 @@ impl Format {
         Self::Stardist,
         Self::YoloSeg,
         Self::Qupath,
+        Self::OmeZarr,
         Self::Huggingface,
     ];
 
-    /// All formats that this build can write.
-    pub fn available() -> impl Iterator<Item = Self> {
-        Self::ALL.into_iter().filter(|format| format.lacks().is_none())
+    /// The formats that this build writes and reads.
+    pub fn built() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|format| format.needs().is_none())
     }
 
-    /// The cargo feature that this build would need to write it and to look into it.
+    /// The feature that a build must have to write and read it, if this one has it not.
     #[must_use]
-    pub fn lacks(self) -> Option<&'static str> {
-        (self == Self::Huggingface && !parquet::IS_HERE).then_some("parquet")
+    pub fn needs(self) -> Option<&'static str> {
+        match self {
+            Self::OmeZarr if !cfg!(feature = "zarr") => Some("zarr"),
+            Self::Huggingface if !parquet::IS_HERE => Some("parquet"),
+            _ => None,
+        }
+    }
+
+    /// How it is called where it is missing.
+    pub(crate) fn title(self) -> String {
+        format!("the format `{}`", self.name())
+    }
+
+    /// What to say of a data set where a format is missing.
+    #[cfg_attr(all(feature = "zarr", feature = "parquet"), expect(dead_code, reason = "no format is missing"))]
+    pub(crate) fn missing(self, path: &Path) -> Error {
+        missing(&self.title(), self.needs().unwrap_or_default(), path)
     }
 
     /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
@@ -91,6 +114,7 @@ impl Format {
             Self::Stardist => "stardist",
             Self::YoloSeg => "yolo-seg",
             Self::Qupath => "qupath",
+            Self::OmeZarr => "ome-zarr",
             Self::Huggingface => "huggingface",
         }
     }
@@ -106,6 +130,7 @@ impl Format {
             Self::Stardist => "images/ and masks/, for cytoplasm and for nuclei",
             Self::YoloSeg => "images/ and labels/ by split, with polygons, and data.yaml",
             Self::Qupath => "GeoJSON with nuclei within cells, beside OME-TIFF images",
+            Self::OmeZarr => "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap",
             Self::Huggingface => "Parquet shards by split for `datasets`: images, objects with masks",
         }
     }
@@ -132,12 +157,15 @@ impl Format {
             Self::Stardist => Box::new(stardist::Pairs::new(place)),
             Self::YoloSeg => Box::new(yolo::Polygons::new(place)),
             Self::Qupath => Box::new(qupath::Objects::new(place)),
+            #[cfg(feature = "zarr")]
+            Self::OmeZarr => Box::new(ome_zarr::Images::new(place)),
+            #[cfg(not(feature = "zarr"))]
+            Self::OmeZarr => return Err(self.missing(place.folder.root())),
             Self::Huggingface => parquet::sink(place)?,
         })
     }
 
-    /// Whether the files of a frame hold what its truth says; in files of many frames they follow each other. What this build lacks a
-    /// feature for is not looked into.
+    /// Whether the files of a frame hold what its truth says; in files of many frames they follow each other.
     pub(crate) fn check(self, written: &Written, shards: &mut Shards<'_>) -> Result<(), Error> {
         match self {
             Self::Folder => folder::check(written),
@@ -147,6 +175,10 @@ impl Format {
             Self::Stardist => stardist::check(written),
             Self::YoloSeg => yolo::check(written),
             Self::Qupath => qupath::check(written),
+            #[cfg(feature = "zarr")]
+            Self::OmeZarr => ome_zarr::check(written),
+            #[cfg(not(feature = "zarr"))]
+            Self::OmeZarr => Err(self.missing(written.folder.root())),
             Self::Huggingface => shards.frames.as_mut().map_or(Ok(()), |frames| frames.check(written)),
         }
     }
@@ -162,6 +194,7 @@ impl Format {
             Self::Stardist => stardist::image(Group::Cytoplasm, index),
             Self::YoloSeg => yolo::image(Split::of_slide(seed, frame.slide), index),
             Self::Qupath => qupath::image(index),
+            Self::OmeZarr => zarr_group(index),
             Self::Huggingface => huggingface::image(seed, shard, frame, form),
         }
     }
@@ -178,7 +211,7 @@ impl Format {
 
     /// Whether it has all planes of a stack, rather than its picture with everything in focus alone.
     pub(crate) fn has_planes(self) -> bool {
-        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::Huggingface)
+        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::OmeZarr | Self::Huggingface)
     }
 
     /// Files that it has once in a data set, frames of which fall into these splits by slide.
@@ -191,11 +224,25 @@ impl Format {
     }
 }
 
+/// What to say of a data set that has something which this build misses for want of a feature.
+pub(crate) fn missing(what: &str, feature: &str, path: &Path) -> Error {
+    let message = format!("{what} needs a build of papsynth with `--features {feature}`");
+    Error::Folder { path: path.to_owned(), message }
+}
+
 /// Files of many frames that are read again, frame by frame.
 pub(crate) struct Shards<'a> {
     pub(crate) tar: Option<Tar<'a>>,
     pub(crate) frames: Option<parquet::Frames>,
 }
+
+/// The folder of a frame that is a group of Zarr.
+pub(crate) fn zarr_group(index: u64) -> String {
+    format!("ome-zarr/{index:06}{ZARR_GROUP}")
+}
+
+/// How the name of such a folder ends.
+pub(crate) const ZARR_GROUP: &str = ".ome.zarr";
 
 /// Where a shard is written, and how.
 #[derive(Debug, Clone, Copy)]

@@ -103,7 +103,7 @@ fn feature(object: &ObjectTruth, nucleus: Option<&ObjectTruth>, geometry: &Geome
 }
 
 /// A polygon, or several where the mask falls apart.
-fn shape(mask: &Mask) -> Value {
+pub(crate) fn shape(mask: &Mask) -> Value {
     let mut parts = polygons(mask);
     // A ring ends where it begins.
     for ring in parts.iter_mut().flatten() {
@@ -118,7 +118,11 @@ fn shape(mask: &Mask) -> Value {
 /// A name that no other object of any data set has, the same whenever it is made.
 fn uuid(geometry: &Geometry, object: &ObjectTruth) -> String {
     let key = geometry.key;
-    let name = format!("papsynth {} {} {} {:?}", key.seed, key.index, object.id, object.part);
+    uuid_of(&format!("papsynth {} {} {} {:?}", key.seed, key.index, object.id, object.part))
+}
+
+/// The same of any name.
+pub(crate) fn uuid_of(name: &str) -> String {
     let hex = crate::files::sha256(name.as_bytes());
     // Version 8: made as the maker likes; variant 8: RFC 9562.
     format!("{}-{}-8{}-8{}-{}", &hex[..8], &hex[8..12], &hex[13..16], &hex[17..20], &hex[20..32])

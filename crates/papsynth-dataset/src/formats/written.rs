@@ -29,7 +29,7 @@ impl<'a> Written<'a> {
 
     /// Reads a file and looks at it.
     pub(super) fn file(&self, name: &str, look: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
-        let path = self.folder.path(name);
+        let path = self.folder.inside(name)?;
         look(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
     }
 
@@ -57,9 +57,31 @@ impl<'a> Written<'a> {
         planes: usize,
         seen: &OnceCell<Vec<String>>,
     ) -> Result<(), Problem> {
+        self.compare(planes, seen, |take| {
+            files.into_iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut *take))
+        })
+    }
+
+    /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
+    #[cfg(feature = "zarr")]
+    pub(super) fn shown(
+        &self,
+        planes: usize,
+        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
+        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
+        self.compare(planes, seen, read)
+    }
+
+    fn compare(
+        &self,
+        planes: usize,
+        seen: &OnceCell<Vec<String>>,
+        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
+    ) -> Result<(), Problem> {
         let geometry = self.field.geometry;
         let mut found = Vec::new();
-        let mut look = |page: LevelImage| {
+        read(&mut |page| {
             if [page.width, page.height()] != [geometry.view.width, geometry.view.height] {
                 return differs("it has not the size that the record says");
             }
@@ -67,10 +89,12 @@ impl<'a> Written<'a> {
             if levels.len() != geometry.values() {
                 return differs("it has not the channels that the record says");
             }
+            if found.len() >= planes {
+                return differs(&format!("it has more planes than the {planes} that the record says"));
+            }
             found.push(sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>()));
             Ok(())
-        };
-        files.into_iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut look))?;
+        })?;
         if found.len() != planes {
             return differs(&format!("it has {} planes, the record says {planes}", found.len()));
         }
@@ -88,7 +112,7 @@ impl<'a> Written<'a> {
 
     /// Layers of labels are what the masks give.
     pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), Problem> {
-        let found = read::label_pages(bytes, &LIMITS)?;
+        let found = read::label_pages(bytes, &LIMITS, layers.len().max(1))?;
         is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
     }
 

@@ -243,15 +243,16 @@ pub(crate) struct Frames {
 }
 
 impl Frames {
-    pub(crate) fn new(folder: &Folder, shard: u64) -> Self {
-        Self { folder: folder.clone(), shard, files: BTreeMap::new() }
+    #[expect(clippy::unnecessary_wraps, reason = "without the feature it fails")]
+    pub(crate) fn new(folder: &Folder, shard: u64) -> Result<Self, Error> {
+        Ok(Self { folder: folder.clone(), shard, files: BTreeMap::new() })
     }
 
     /// The next row of its split is a frame.
     pub(crate) fn check(&mut self, written: &Written) -> Result<(), Error> {
         let split = split(written.field);
         if !self.files.contains_key(&split) {
-            let path = self.folder.path(&file(split, self.shard));
+            let path = self.folder.inside(&file(split, self.shard))?;
             let rows = Self::rows(&path, written.field)?;
             self.files.insert(split, (path, rows));
         }

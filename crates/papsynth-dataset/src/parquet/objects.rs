@@ -1,5 +1,6 @@
 //! The table of objects: the columns of the CSV with their types, and the masks.
 
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use papsynth::truth::{ObjectTruth, Truth};
@@ -9,7 +10,7 @@ use super::{Writer, begin, failed, open};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Pending};
 use crate::layout;
-use crate::record::FileRecord;
+use crate::merge::Sink;
 use crate::rle;
 use crate::table::{COLUMNS, Cell, Sort, cells};
 
@@ -78,19 +79,44 @@ impl ObjectTable {
 }
 
 /// The tables of these shards in one.
-pub(crate) fn merge(folder: &Folder, shards: &[u64]) -> Result<FileRecord, Error> {
+pub(crate) fn merge(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
+    let mut pieces = Pieces { out, failure: None };
+    let merged = write_merged(folder, shards, &mut pieces);
+    pieces.failure.map_or(merged, Err)
+}
+
+fn write_merged(folder: &Folder, shards: &[u64], pieces: &mut Pieces) -> Result<(), Error> {
     let path = folder.path(layout::OBJECTS);
-    folder.write_if_new(layout::OBJECTS, |out| {
-        let mut writer = papsynth_parquet::Writer::new(out, &columns(), &[]).map_err(failed("write", &path))?;
-        for &shard in shards {
-            let from = folder.path(&layout::objects(shard));
-            for row in rows(open(&from)?, &from)? {
-                writer.row(row.map_err(failed("read", &from))?).map_err(failed("write", &path))?;
+    let mut writer = papsynth_parquet::Writer::new(pieces, &columns(), &[]).map_err(failed("write", &path))?;
+    for &shard in shards {
+        let from = folder.inside(&layout::objects(shard))?;
+        for row in rows(open(&from)?, &from)? {
+            writer.row(row.map_err(failed("read", &from))?).map_err(failed("write", &path))?;
+        }
+    }
+    writer.finish().map(|_| ()).map_err(failed("write", &path))
+}
+
+/// Hands on what is written piece by piece, and keeps the first error, of which the writer knows only that there is one.
+struct Pieces<'a, 's> {
+    out: &'a mut Sink<'s>,
+    failure: Option<Error>,
+}
+
+impl Write for Pieces<'_, '_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match (self.out)(bytes) {
+            Ok(()) => Ok(bytes.len()),
+            Err(error) => {
+                self.failure.get_or_insert(error);
+                Err(io::Error::other("what was written is not taken"))
             }
         }
-        writer.finish().map_err(failed("write", &path))?;
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
         Ok(())
-    })
+    }
 }
 
 fn rows(reader: Reader, path: &Path) -> Result<Rows<Reader>, Error> {

@@ -185,7 +185,8 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     }
     let mut fields = Vec::new();
     for shard in recorded_shards(&folder)? {
-        let whole = whole_record(&folder, &manifest.identity, &manifest.layout, shard, Check::Sizes)?;
+        let Manifest { identity, layout, categories, .. } = &manifest;
+        let whole = whole_record(&folder, identity, layout, categories, shard, Check::Sizes)?;
         let record = whole.map_err(|flaw| {
             let message =
                 format!("shard {shard} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
@@ -202,8 +203,8 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
                 group: String::new(),
                 pixel_um: Some(frame.pixel_um),
                 slide: Some(frame.slide),
-                image: folder.path(&image),
-                nuclei: NucleiFile::Labels(folder.path(&layout::labels(papsynth::truth::Group::Nucleus, index))),
+                image: folder.inside(&image)?,
+                nuclei: NucleiFile::Labels(folder.inside(&layout::labels(papsynth::truth::Group::Nucleus, index))?),
                 white: Some(white(frame.bits)),
             });
         }

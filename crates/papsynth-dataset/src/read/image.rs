@@ -144,10 +144,13 @@ pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
     labels(decode(bytes, limits, Meaning::Labels)?)
 }
 
-/// The label images of a TIFF file, one a page.
-pub(crate) fn label_pages(bytes: &[u8], limits: &Limits) -> Result<Vec<LabelMap>, Problem> {
+/// The label images of a TIFF file, one a page; more than `most` are refused.
+pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<LabelMap>, Problem> {
     let mut pages = Vec::new();
     tiff::pages(bytes, limits, |raster| {
+        if pages.len() >= most {
+            return Err(tiff::too_many(most));
+        }
         pages.push(labels(raster)?);
         Ok(())
     })?;

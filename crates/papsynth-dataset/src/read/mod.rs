@@ -19,6 +19,7 @@ mod png;
 mod raster;
 mod stack;
 mod tiff;
+mod truths;
 mod weights;
 
 use std::fs::File;
@@ -33,6 +34,7 @@ pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
 pub use stack::{Stack, natural_order};
 pub(crate) use tiff::{description, float_pages};
+pub use truths::truths;
 pub use weights::{InputFile, label_weights, read_inputs, weights};
 
 use crate::error::{Error, Problem};

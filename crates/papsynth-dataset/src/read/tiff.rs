@@ -53,8 +53,9 @@ pub(super) fn pages(
     }
 }
 
-/// The pages of a file of 32-bit floating-point numbers, whatever their channels.
-pub(crate) fn float_pages(bytes: &[u8], limits: &Limits) -> Result<Vec<Vec<f32>>, Problem> {
+/// The pages of a file of 32-bit floating-point numbers, whatever their channels. A short file may have very many, all in the same place: more
+/// than `most` are refused.
+pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<Vec<f32>>, Problem> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     let mut pages = Vec::new();
     loop {
@@ -71,8 +72,15 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits) -> Result<Vec<Vec<f32>>
         if !decoder.more_images() {
             return Ok(pages);
         }
+        if pages.len() >= most {
+            return Err(too_many(most));
+        }
         decoder.next_image().map_err(problem)?;
     }
+}
+
+pub(super) fn too_many(most: usize) -> Problem {
+    Problem::Differs { what: format!("it has more than {most} pages") }
 }
 
 /// What the first page of a file says that it shows, if it says anything.

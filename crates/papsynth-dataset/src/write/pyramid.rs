@@ -12,7 +12,7 @@ use super::tiff::resolution;
 const TILE: usize = 512;
 
 /// From this side on an image is written as a pyramid.
-pub(super) const LARGE: usize = 2048;
+pub(crate) const LARGE: usize = 2048;
 
 /// Grey levels of 8 or of 16 bits.
 pub(super) trait Level: Copy + Default {

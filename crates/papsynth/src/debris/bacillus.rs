@@ -133,6 +133,10 @@ impl Thing for Bacillus {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        self.rods.max(1) as f64 * (1.2 * self.length_um + self.width_um)
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let half_width = 0.5 * site.px(self.width_um);
         let length = site.px((self.length_um - self.width_um).max(0.0));

@@ -114,6 +114,10 @@ impl Thing for BareNucleus {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let stretch = self.elongation.sqrt();

@@ -90,6 +90,10 @@ impl Thing for Bubble {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        1.1 * self.radius_um + 1.0
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         // Surface tension keeps it round.

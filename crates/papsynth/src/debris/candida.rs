@@ -178,6 +178,14 @@ impl Thing for Candida {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        match self.growth {
+            // Half of its length, and a branch of two segments from an end of it that bends back.
+            Growth::Hypha => (0.8 * self.segments as f64 + 3.0) * self.segment_um + 2.0 * self.yeast_um + self.width_um,
+            Growth::Yeast => 2.5 * self.width_um,
+        }
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let mut strokes = Vec::new();

@@ -115,7 +115,7 @@ const RIM_UM: f64 = 2.0;
 /// Lays its coat on a cell.
 pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: &mut Phantom) {
     let (Some(coat), Some(cell)) = (&object.coat, phantom.pieces.first()) else { return };
-    let mut rng = scene.key.stream("cell", object.number, "coat.shape");
+    let mut rng = scene.stream("cell", object, "coat.shape");
     let pixel_um = scene.grid().pixel_um;
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
     let whole = cell.coverage.clone().repeated(cell.cover_step);

@@ -126,6 +126,14 @@ impl Thing for Colony {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        if self.chain {
+            0.8 * self.cocci.min(LONGEST_CHAIN) as f64 * self.diameter_um * self.elongation + self.diameter_um
+        } else {
+            (1.0 + CLUMP_WIDTH) * FARTHEST * self.cloud_um + 2.0 * self.diameter_um * self.elongation
+        }
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let places = if self.chain { self.chain(&mut rng) } else { self.cloud(&mut rng) };

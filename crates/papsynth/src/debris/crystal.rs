@@ -91,6 +91,10 @@ impl Thing for Crystal {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        0.7 * self.diameter_um + 1.0
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let outline = site.places(&shard(0.5 * self.diameter_um, 5 + random::below(3, &mut rng), 0.3, &mut rng));

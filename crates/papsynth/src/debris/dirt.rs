@@ -130,6 +130,10 @@ impl Thing for Fleck {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        self.length_um + self.width_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         // A crumb: a few strokes one after the other, each with its own width and heading.

@@ -75,6 +75,10 @@ impl Thing for Grain {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        0.65 * self.diameter_um + 1.0
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let outline = site.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));

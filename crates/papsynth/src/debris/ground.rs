@@ -1,6 +1,6 @@
 //! The slide on which debris is strewn: where its cells lie, and the clusters that lie among them.
 
-use super::ClueCells;
+use super::{ClueCells, Kind};
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
@@ -15,7 +15,20 @@ pub(crate) struct Ground<'a> {
     /// The name of the kind that is drawn, and of its section.
     kind: &'static str,
     section: &'static str,
+    lies_on_glass: bool,
+    /// What may lie on a part of a slide: how much there is relative to a field, and where it stays.
+    sieve: Option<Sieve<'a>>,
     objects: &'a mut Vec<Object>,
+}
+
+/// What is strewn on a part of a slide.
+pub(crate) struct Sieve<'a> {
+    /// How large the part is, in fields.
+    pub(crate) share: f64,
+    /// How many more are tried of what came with the cells.
+    pub(crate) most: f64,
+    /// The probability that one of those stays at a place, µm.
+    pub(crate) stays: &'a dyn Fn([f64; 2]) -> f64,
 }
 
 /// Where a cell lies, for what lies on it.
@@ -60,7 +73,12 @@ impl<'a> Ground<'a> {
             _ => None,
         };
         let cells = objects.iter().filter_map(place).collect();
-        Self { field, stain, size_um: view.size_um(), cells, kind: "", section: "", objects }
+        Self { field, stain, size_um: view.size_um(), cells, kind: "", section: "", lies_on_glass: false, sieve: None, objects }
+    }
+
+    /// The same for a part of a slide.
+    pub(crate) fn through(self, sieve: Sieve<'a>) -> Self {
+        Self { sieve: Some(sieve), ..self }
     }
 
     /// Gives cells their coats.
@@ -68,13 +86,18 @@ impl<'a> Ground<'a> {
         clue_cells.draw(self.field, self.objects);
     }
 
-    pub(super) fn begin(&mut self, kind: &'static str, section: &'static str) {
-        (self.kind, self.section) = (kind, section);
+    pub(super) fn begin(&mut self, kind: Kind, section: &'static str) {
+        (self.kind, self.section, self.lies_on_glass) = (kind.name(), section, kind.lies_on_glass());
     }
 
     /// A number of the section that is drawn once a field, as a count.
     pub(super) fn count(&self, name: &str, number: &Number) -> u64 {
-        self.field.count(&format!("debris.{}.{name}", self.section), number) as u64
+        let path = format!("debris.{}.{name}", self.section);
+        let Some(sieve) = &self.sieve else { return self.field.count(&path, number) as u64 };
+        let more = if self.lies_on_glass { 1.0 } else { sieve.most };
+        let wanted = self.field.draw(&path, number).max(0.0) * sieve.share * more;
+        let further = random::chance(wanted - wanted.floor(), &mut self.field.key.stream("field", 1, &path));
+        wanted as u64 + u64::from(further)
     }
 
     /// The stream of a purpose of one object of the kind.
@@ -135,11 +158,18 @@ impl<'a> Ground<'a> {
     /// Lets an object lie there; what is alone is of cluster 0.
     pub(super) fn add(&mut self, number: u64, cluster: u32, lie: Lie, thing: impl Into<Body>) {
         let Lie { centre_um, depth_um, rotation_deg } = lie;
-        let body = thing.into();
+        let body: Body = thing.into();
+        if let Some(sieve) = self.sieve.as_ref().filter(|_| !self.lies_on_glass) {
+            let mut rng = self.field.key.stream(self.kind, number, "stays");
+            if !random::chance((sieve.stays)(centre_um), &mut rng) {
+                return;
+            }
+        }
         self.objects.push(Object {
             id: 0,
             number,
             cluster,
+            plot: None,
             centre_um,
             depth_um,
             rotation_deg,

@@ -227,6 +227,10 @@ impl Thing for Leukocyte {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        (1.3 * self.cell_um).max((2.0 + 2.0 * self.alpha) * self.radius_um)
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         match self.form {
             NucleusForm::Round => round::make(self, site),

@@ -45,7 +45,7 @@ pub use crystal::{Crystal, Crystals};
 pub use dirt::{Dirt, Fleck};
 pub use dust::{Dust, Grain};
 pub use fibre::{Fibre, Fibres};
-pub(crate) use ground::Ground;
+pub(crate) use ground::{Ground, Sieve};
 pub use leukocyte::{Leukocyte, Leukocytes, NucleusForm};
 pub use mucus::{Mucus, Strand};
 pub use out_of_focus::{Blob, OutOfFocus};
@@ -73,6 +73,9 @@ trait Kinds {
 trait Thing {
     /// The strength of its stain.
     fn absorbance(&self) -> f64;
+
+    /// How far it may reach from its middle, µm, where pixels have that size.
+    fn reach_um(&self, pixel_um: f64) -> f64;
 
     /// What it absorbs where it lies.
     fn phantom(&self, site: &Site<'_>) -> Phantom;
@@ -127,6 +130,11 @@ macro_rules! kinds {
             pub fn is_layer(self) -> bool {
                 self == Self::Dirt
             }
+
+            /// Whether it comes with the glass and not with the cells: it lies anywhere on a slide.
+            pub(crate) fn lies_on_glass(self) -> bool {
+                matches!(self, Self::Dust | Self::Fibre | Self::Bubble | Self::Scratch)
+            }
         }
 
         impl Body {
@@ -136,6 +144,14 @@ macro_rules! kinds {
                 match self {
                     Self::Cell(_) => Kind::Cell,
                     $(Self::$Kind(_) => Kind::$Kind,)*
+                }
+            }
+
+            /// How far it may reach from its middle, µm, where pixels have that size.
+            pub(crate) fn reach_um(&self, pixel_um: f64) -> f64 {
+                match self {
+                    Self::Cell(cell) => cell.reach_um(),
+                    $(Self::$Kind(thing) => thing.reach_um(pixel_um),)*
                 }
             }
 
@@ -177,7 +193,7 @@ macro_rules! kinds {
             pub(crate) fn draw(&self, ground: &mut Ground<'_>) {
                 ground.dress(&self.clue_cells);
                 $(
-                    ground.begin($name, stringify!($field));
+                    ground.begin(Kind::$Kind, stringify!($field));
                     self.$field.draw(ground);
                 )*
             }

@@ -99,6 +99,10 @@ impl Thing for Blob {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        (1.2 + 1.5 * self.alpha) * self.radius_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius = site.px(self.radius_um);

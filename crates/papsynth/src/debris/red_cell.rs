@@ -127,6 +127,10 @@ impl Thing for RedCell {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        0.6 * self.diameter_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius_um = 0.5 * self.diameter_um;

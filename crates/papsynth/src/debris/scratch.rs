@@ -98,6 +98,10 @@ impl Thing for Scratch {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        0.6 * self.length_um + self.width_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let step = self.length_um / PARTS as f64;

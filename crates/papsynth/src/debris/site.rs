@@ -26,7 +26,7 @@ impl<'a> Site<'a> {
 
     /// The object's own stream for a purpose.
     pub(super) fn stream(&self, purpose: &str) -> Stream {
-        self.scene.key.stream(self.object.body.kind().name(), self.object.number, purpose)
+        self.scene.stream(self.object.body.kind().name(), self.object, purpose)
     }
 
     /// A length in points of the grid.

@@ -129,6 +129,10 @@ impl Thing for Smudge {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (REACH - 1.0) * self.ragged.min(1.5))
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius_um = 0.5 * self.diameter_um;

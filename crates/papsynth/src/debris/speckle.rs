@@ -97,6 +97,10 @@ impl Thing for Speckle {
         self.absorbance
     }
 
+    fn reach_um(&self, pixel_um: f64) -> f64 {
+        (self.dilations as f64 + 3.0) * pixel_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let pixel = site.scene.oversampling() as f64;

@@ -33,7 +33,7 @@ fn draw(debris: &Debris) -> Scene {
 
 /// The phantoms of everything but cells.
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
-    let maker = PoolMaker::new(spectral_field::Fft::Portable).unwrap();
+    let maker = PoolMaker::new().unwrap();
     let pools = maker.make(scene.key);
     let made = |object: &Object| Some((object.body.kind(), phantom(scene, &pools, object)?));
     scene.objects.iter().filter_map(made).collect()
@@ -247,4 +247,73 @@ proptest! {
             }
         }
     }
+}
+
+/// How far from its middle something of a phantom lies, µm.
+fn reach_um(scene: &Scene, object: &Object, phantom: &Phantom) -> f64 {
+    let n = scene.oversampling();
+    let mut farthest = 0.0_f64;
+    for piece in &phantom.pieces {
+        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.cover_step)] {
+            let grid = crate::scene::View { pixel_um: scene.view.pixel_um / step as f64, ..scene.view };
+            let centre = grid.to_px(object.centre_um);
+            let mut index = 0;
+            tile.clone().for_each(|p, value| {
+                if *value != 0.0 && tile.values[index] != 0.0 {
+                    let off = (p[0] - centre[0]).abs().max((p[1] - centre[1]).abs());
+                    farthest = farthest.max(off * grid.pixel_um);
+                }
+                index += 1;
+            });
+        }
+    }
+    farthest
+}
+
+#[test]
+fn hardly_anything_reaches_farther_than_it_says() {
+    for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Cell) {
+        let mut debris = Debris::none();
+        counted(&mut debris, kind, 150.0);
+        let scene = draw(&debris);
+        let maker = PoolMaker::new(spectral_field::Fft::Portable).unwrap();
+        let pools = maker.make(scene.key);
+        let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
+        for object in &scene.objects {
+            let Some(phantom) = phantom(&scene, &pools, object) else { continue };
+            let says = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
+            let share = reach_um(&scene, object, &phantom) / says;
+            (told, most) = (told + 1, most.max(share));
+            beyond += usize::from(share > 1.0);
+        }
+        println!("{}: {most:.2} of what it says, {beyond} of {told} beyond", kind.name());
+        // What reaches farther is cut off on slides.
+        assert!(beyond * 100 <= told, "{}: {beyond} of {told}", kind.name());
+        assert!(most > 0.25, "{}: {most}", kind.name());
+    }
+}
+
+#[test]
+fn hardly_a_cell_reaches_farther_than_it_says() {
+    let mut beyond = 0;
+    let (mut told, mut most) = (0, 0.0_f64);
+    for preset in [Preset::Lbc, Preset::HighGrade, Preset::Endocervical, Preset::Oral, Preset::Atrophic] {
+        let mut recipe = preset.recipe();
+        (recipe.field.width_px, recipe.field.height_px) = (800.0.into(), 600.0.into());
+        recipe.field.pixel_um = 0.5.into();
+        recipe.debris = Debris::none();
+        let model = Model::builtin();
+        let scene = scene::draw(&recipe, &model, None, KEY).unwrap();
+        let watch = crate::profile::Watch(None);
+        let studio = crate::phantom::Studio::new(&recipe, &model, spectral_field::Fft::Portable, watch).unwrap();
+        let pools = studio.pools.make(scene.key);
+        let objects: Vec<&Object> = scene.objects.iter().collect();
+        for (object, phantom) in objects.iter().zip(crate::phantom::make(&studio, &scene, &pools, &objects).unwrap()) {
+            let share = reach_um(&scene, object, &phantom) / object.body.reach_um(scene.view.pixel_um);
+            (told, most) = (told + 1, most.max(share));
+            beyond += usize::from(share > 1.0);
+        }
+    }
+    println!("{most:.2} of what they say, {beyond} of {told} beyond");
+    assert!(beyond * 200 <= told && most > 0.6, "{beyond} of {told}, {most}");
 }

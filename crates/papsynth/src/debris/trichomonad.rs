@@ -130,6 +130,10 @@ impl Thing for Trichomonad {
         self.absorbance
     }
 
+    fn reach_um(&self, _pixel_um: f64) -> f64 {
+        1.1 * self.length_um
+    }
+
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let (a, b) = (0.5 * self.length_um, 0.5 * self.length_um * self.width);

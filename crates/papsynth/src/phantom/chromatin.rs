@@ -2,7 +2,7 @@
 
 use fsd_shape::ShapeModel;
 use quilt_texture::{QuiltParams, Quilter, Source};
-use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
+use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
 use super::tile::{Point, Tile};
 use crate::key::{Key, Stream};
@@ -41,8 +41,8 @@ struct FieldSource {
 
 impl Donors {
     /// The donors of a class: learned ones where there are some, else made from the spectrum.
-    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel, fft: Fft) -> Result<Self, String> {
-        let field = FieldSource::new(&nucleus.chromatin, fft)?;
+    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, String> {
+        let field = FieldSource::new(&nucleus.chromatin)?;
         let imaged = !nucleus.donors.is_empty();
         let (sources, pixel_um) = match nucleus.donors.first() {
             Some(first) => {
@@ -135,11 +135,11 @@ fn made(
 }
 
 impl FieldSource {
-    fn new(chromatin: &ChromatinStatistics, fft: Fft) -> Result<Self, String> {
+    fn new(chromatin: &ChromatinStatistics) -> Result<Self, String> {
         /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
         const SIDE: usize = 128;
         let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / MADE_PIXEL_UM };
-        let params = FieldParams { width: SIDE, height: SIDE, spectrum, fft, padding: Padding::Periodic };
+        let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
         Ok(Self {
             field: SpectralField::new(&params).map_err(|e| e.to_string())?,
             skewness: chromatin.skewness,

@@ -17,7 +17,7 @@ use dye_spectra::Amounts;
 
 use crate::debris;
 use crate::profile::Stage;
-use crate::scene::{Body, Object, Scene};
+use crate::scene::{Body, Object, Scene, View};
 use crate::truth::Part;
 
 pub(crate) use pools::Pools;
@@ -98,6 +98,24 @@ pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
 pub(crate) const BATCH: usize = 16;
 
 impl Phantom {
+    /// The phantom of an object of a plot, made as if the plot were the image: cut off where the object may reach no further, then
+    /// moved to where the plot lies. `n` are the grid points along a pixel.
+    pub(crate) fn on_slide(mut self, object: &Object, view: View, n: usize) -> Self {
+        let Some(plot) = object.plot else { return self };
+        let reach_px = object.body.reach_um(view.pixel_um) / view.pixel_um + 2.0;
+        let grid = |step: usize| View { pixel_um: view.pixel_um / step as f64, ..view };
+        for piece in &mut self.pieces {
+            for (tile, step) in [(&mut piece.absorbance, n), (&mut piece.coverage, n / piece.cover_step)] {
+                let centre = grid(step).to_px(object.centre_um);
+                *tile = core::mem::take(tile).within(centre, reach_px * step as f64);
+                for axis in 0..2 {
+                    tile.origin[axis] += plot.at_px[axis] * step as i64;
+                }
+            }
+        }
+        self
+    }
+
     /// A phantom without parts of its own.
     pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
         let piece = Piece {

@@ -41,7 +41,7 @@ pub(super) fn make(
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
     let cell_centre = scene.grid().to_px(object.centre_um);
-    let mut shape_rng = scene.key.stream("cell", object.number, "nucleus.shape");
+    let mut shape_rng = scene.stream("cell", object, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
     let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
@@ -59,7 +59,7 @@ pub(super) fn make(
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
     inner.cover(&grown(&outline, centre, shrink));
 
-    let mut rng = scene.key.stream("cell", object.number, "nucleus.texture");
+    let mut rng = scene.stream("cell", object, "nucleus.texture");
     let mut texture = match studio.recipe.nucleus.chromatin {
         Chromatin::Quilt => {
             let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
@@ -69,7 +69,7 @@ pub(super) fn make(
     };
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
-        let own = &mut scene.key.stream("cell", object.number, "nucleus.clumps");
+        let own = &mut scene.stream("cell", object, "nucleus.clumps");
         clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own)?;
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
@@ -91,7 +91,7 @@ pub(super) fn make(
         let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
-    let mut own = scene.key.stream("cell", object.number, "nucleoli");
+    let mut own = scene.stream("cell", object, "nucleoli");
     for _ in 0..nucleus.nucleoli {
         add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
     }

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use rand_core::Rng;
-use spectral_field::{Fft, FieldParams, Padding, SpectralField, Spectrum};
+use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
 use super::tile::Point;
 use crate::key::Key;
@@ -67,9 +67,9 @@ pub(crate) struct Look {
 const BETWEEN: f64 = 0.211_324_865_405_187_1;
 
 impl PoolMaker {
-    pub(crate) fn new(fft: Fft) -> Result<Self, String> {
+    pub(crate) fn new() -> Result<Self, String> {
         let maker = |spectrum| {
-            let params = FieldParams { width: SIDE, height: SIDE, spectrum, fft, padding: Padding::Periodic };
+            let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
             SpectralField::new(&params).map_err(|e| e.to_string())
         };
         Ok(Self {

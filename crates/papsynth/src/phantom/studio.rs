@@ -6,7 +6,6 @@ use std::sync::OnceLock;
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::ShapeModel;
 use quilt_texture::QuiltParams;
-use spectral_field::Fft;
 use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
 
 use super::chromatin::Donors;
@@ -58,18 +57,18 @@ pub(crate) struct ClassStudio {
 }
 
 impl Studio {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, fft: Fft, watch: Watch) -> Result<Self, String> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, watch: Watch) -> Result<Self, String> {
         let mut classes = BTreeMap::new();
         for name in recipe.cells.keys() {
             let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
-            classes.insert(name.clone(), ClassStudio::new(name, class, recipe, fft)?);
+            classes.insert(name.clone(), ClassStudio::new(name, class, recipe)?);
         }
         Ok(Self {
             recipe: recipe.clone(),
             classes,
             cloth: cloth(recipe)?,
             cytoskeletons: Cytoskeletons::new()?,
-            pools: PoolMaker::new(fft)?,
+            pools: PoolMaker::new()?,
             watch,
         })
     }
@@ -107,7 +106,7 @@ fn cloth(recipe: &Recipe) -> Result<Option<Cloth>, String> {
 }
 
 impl ClassStudio {
-    fn new(name: &str, class: &CellClass, recipe: &Recipe, fft: Fft) -> Result<Self, String> {
+    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, String> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
             let statistics = match spread {
                 ShapeSpread::Correlated => &shapes.correlated,
@@ -117,14 +116,14 @@ impl ClassStudio {
         };
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
-        let donors = Donors::new(name, &class.nucleus, &nucleus, fft)?;
-        let quilt = quilt(recipe, class, donors.pixel_um(), fft);
+        let donors = Donors::new(name, &class.nucleus, &nucleus)?;
+        let quilt = quilt(recipe, class, donors.pixel_um());
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
     }
 }
 
 /// The quilting that a recipe asks for, on donors with pixels of a size.
-fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64, fft: Fft) -> QuiltParams {
+fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {
     let nucleus = &recipe.nucleus;
     let pixels = |um: f64, least: usize| random::count(um / pixel_um).max(least);
     // Patch and overlap are those in the middle of their range: a quilt has patches of one size.
@@ -146,10 +145,6 @@ fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64, fft: Fft) -> QuiltPa
         seam: match nucleus.seam {
             Seam::MinCut => default.seam,
             Seam::Feather => quilt_texture::Seam::Feather,
-        },
-        fft: match fft {
-            Fft::Fastest => quilt_texture::Fft::Fastest,
-            Fft::Portable => quilt_texture::Fft::Portable,
         },
         ..default
     }

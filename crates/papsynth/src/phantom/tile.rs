@@ -9,7 +9,7 @@ use multiversion::multiversion;
 pub(crate) type Point = [f64; 2];
 
 /// A small image whose upper left pixel is pixel `origin` of the large one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Tile {
     pub(crate) origin: [i64; 2],
     pub(crate) width: usize,
@@ -47,6 +47,22 @@ impl Tile {
         };
         let ((x, width), (y, height)) = (bound(0), bound(1));
         Self { origin: [x, y], width, values: vec![0.0; width * height] }
+    }
+
+    /// The part of it within a square about a point, `reach` pixels to each side.
+    pub(crate) fn within(self, centre: Point, reach: f64) -> Self {
+        let low = centre.map(|at| (at - reach).floor() as i64);
+        let high = centre.map(|at| (at + reach).ceil() as i64 + 1);
+        let end = [self.origin[0] + self.width as i64, self.origin[1] + self.height() as i64];
+        if (0..2).all(|axis| self.origin[axis] >= low[axis] && end[axis] <= high[axis]) {
+            return self;
+        }
+        let origin = [0, 1].map(|axis| self.origin[axis].clamp(low[axis], high[axis] - 1));
+        let length = |axis: usize| usize::try_from(end[axis].min(high[axis]) - origin[axis]).unwrap_or(0).max(1);
+        let (width, height) = (length(0), length(1));
+        let mut part = Self { origin, width, values: vec![0.0; width * height] };
+        lay_at(&mut part.values, width, origin, self.as_ref(), |row, values| row.copy_from_slice(values));
+        part
     }
 
     /// A tile of zeros of the same size at the same place.

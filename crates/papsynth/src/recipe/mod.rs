@@ -10,6 +10,7 @@ mod imaging;
 mod number;
 mod presets;
 mod print;
+mod scan;
 mod specimen;
 
 use std::collections::BTreeMap;
@@ -27,6 +28,7 @@ pub use imaging::{Background, Field, Focus, Illumination, Imaging, Light, Mixing
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use print::{is_toml_table, toml_value};
+pub use scan::{Deposit, Scan};
 pub use specimen::{
     Acceptance, CellMix, Chromatin, Cytoplasm, DyeAmounts, Folds, Group, GroupForm, Layout, Nucleus, Restore, Seam,
     ShapeSpread, Sheet, Slide, Stain, TintMix,
@@ -67,6 +69,8 @@ pub struct Recipe {
     pub optics: Optics,
     /// The camera.
     pub camera: Camera,
+    /// A whole slide.
+    pub scan: Scan,
 }
 
 impl Recipe {
@@ -91,7 +95,9 @@ impl Recipe {
                 })*
             };
         }
-        take!(field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera);
+        take!(
+            field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera, scan
+        );
     }
 
     /// The JSON schema of recipes.

@@ -2,14 +2,14 @@
 
 use rand_core::Rng;
 
-use crate::key::Stream;
+use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
 use crate::recipe::{CellMix, Number, Recipe};
 
 use super::depth::Relief;
 use super::draw::FieldNumbers;
-use super::groups::Groups;
+use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
 use super::stain::FieldStain;
 use super::{Body, CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Object, View, WeightMap};
@@ -42,33 +42,72 @@ pub(super) fn draw_cells(
     let mut cells = Vec::with_capacity(total);
     let mut groups_begun = 0;
     for ((name, mix), count) in recipe.cells.iter().zip(counts) {
-        let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
+        let kind = Class { name, mix, class: class_of(name, model)? };
         let mut groups = Groups::new(&mix.group, groups_begun);
         for _ in 0..count {
             let number = cells.len() as u64;
-            let own = |purpose: &str| field.key.stream("cell", number, purpose);
-            let mut rng = own("body");
-            let any_deg = random::between(0.0, 360.0, &mut rng);
-            let mut body = draw_body(recipe, name, class, mix, stain, &mut rng, own);
-            let stacking = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
-            let place = groups.next(body.radius_um, &mut places, &mut own("place"))?;
-            let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
-            body.nucleus.off_centre = polar(body.nucleus.off_centre, class.nucleus.polarity, rotation_deg);
-            cells.push(Object {
-                id: 0,
-                number,
-                cluster: place.group,
-                centre_um: place.centre_um,
-                depth_um: relief.at(place.centre_um) + stacking,
-                rotation_deg,
-                bethesda: class.bethesda.clone(),
-                coat: None,
-                body: Body::Cell(Box::new(body)),
-            });
+            let cell = Drawn::new(recipe, kind, stain, field.key, number);
+            let mut place_rng = field.key.stream("cell", number, "place");
+            let place = groups.next(cell.body.radius_um, |rng| places.next(rng), &mut place_rng)?;
+            let depth_um = relief.at(place.centre_um);
+            cells.push(cell.lie(kind, number, &place, depth_um));
         }
         groups_begun = groups.begun();
     }
     Ok(cells)
+}
+
+/// A class of cells of a recipe.
+#[derive(Clone, Copy)]
+pub(super) struct Class<'a> {
+    pub(super) name: &'a str,
+    pub(super) mix: &'a CellMix,
+    pub(super) class: &'a CellClass,
+}
+
+/// The class of a model, or what is wrong with its name.
+pub(super) fn class_of<'a>(name: &str, model: &'a Model) -> Result<&'a CellClass, String> {
+    model.classes.get(name).ok_or_else(|| unknown_class(name, model))
+}
+
+/// A cell that has no place yet.
+pub(super) struct Drawn {
+    pub(super) body: CellBody,
+    /// The direction it is turned to if nothing else says so, degrees.
+    any_deg: f64,
+    /// Its depth about the relief, µm.
+    stacking_um: f64,
+}
+
+impl Drawn {
+    /// The cell of that number.
+    pub(super) fn new(recipe: &Recipe, kind: Class<'_>, stain: &FieldStain<'_>, key: Key, number: u64) -> Self {
+        let own = |purpose: &str| key.stream("cell", number, purpose);
+        let mut rng = own("body");
+        let any_deg = random::between(0.0, 360.0, &mut rng);
+        let body = draw_body(recipe, kind.name, kind.class, kind.mix, stain, &mut rng, own);
+        let stacking_um = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
+        Self { body, any_deg, stacking_um }
+    }
+
+    /// The cell at its place, where the relief is so deep.
+    pub(super) fn lie(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
+        let Self { mut body, any_deg, stacking_um } = self;
+        let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
+        body.nucleus.off_centre = polar(body.nucleus.off_centre, kind.class.nucleus.polarity, rotation_deg);
+        Object {
+            id: 0,
+            number,
+            cluster: place.group,
+            plot: None,
+            centre_um: place.centre_um,
+            depth_um: depth_um + stacking_um,
+            rotation_deg,
+            bethesda: kind.class.bethesda.clone(),
+            coat: None,
+            body: Body::Cell(Box::new(body)),
+        }
+    }
 }
 
 /// Turns a displacement towards one end of the cell's long axis: all the way at polarity 1.

@@ -57,27 +57,33 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;
     }
-    Ok(Scene {
-        key,
-        slide: slide_of(recipe, key),
+    Ok(Scene { objects, slide: slide_of(recipe, key), ..empty(recipe, view, &field, &stain) })
+}
+
+/// The view without anything on it: how it is imaged.
+pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &FieldStain<'_>) -> Scene {
+    Scene {
+        key: field.key,
+        slide: 0,
         view,
-        planes_um: planes(recipe, &field),
-        fusion: fusion(recipe, &field),
-        background: background(recipe, &field),
-        light: light(recipe, &field),
-        optics: optics(recipe, &field),
+        planes_um: planes(recipe, field),
+        fusion: fusion(recipe, field),
+        background: background(recipe, field),
+        light: light(recipe, field),
+        optics: optics(recipe, field),
         restoration: Restoration {
             restore: recipe.nucleus.restore,
             feather_um: field.draw("nucleus.restore_feather_um", &recipe.nucleus.restore_feather_um),
         },
         dyes: stain.debris(),
-        camera: camera(recipe, &field),
-        objects,
-    })
+        camera: camera(recipe, field),
+        frame: None,
+        objects: Vec::new(),
+    }
 }
 
 /// Size of a pixel in the object.
-fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
+pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     let magnification = field.draw("field.magnification", &recipe.field.magnification);
     if magnification <= 0.0 {
         return field.draw("field.pixel_um", &recipe.field.pixel_um);

@@ -2,7 +2,6 @@
 
 use rand_core::Rng;
 
-use super::layout::Places;
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::{Group, GroupForm};
@@ -62,13 +61,23 @@ impl<'a> Groups<'a> {
         self.begun
     }
 
-    /// The place of the next cell. What a group does is drawn from the stream of its first cell.
-    pub(super) fn next(&mut self, radius_um: f64, places: &mut Places, rng: &mut Stream) -> Result<Place, String> {
+    /// Whether the next cell begins a group of its own.
+    pub(super) fn is_full(&self) -> bool {
+        self.now.as_ref().is_none_or(|group| group.cells.len() >= group.size)
+    }
+
+    /// The place of the next cell; `free` gives that of one which begins a group. What a group does is drawn from the stream of its first cell.
+    pub(super) fn next(
+        &mut self,
+        radius_um: f64,
+        mut free: impl FnMut(&mut Stream) -> Result<[f64; 2], String>,
+        rng: &mut Stream,
+    ) -> Result<Place, String> {
         if self.group.form == GroupForm::Alone {
-            return Ok(Place { centre_um: places.next(rng)?, rotation_deg: f64::NAN, group: 0 });
+            return Ok(Place { centre_um: free(rng)?, rotation_deg: f64::NAN, group: 0 });
         }
-        if self.now.as_ref().is_none_or(|group| group.cells.len() >= group.size) {
-            let origin_um = places.next(rng)?;
+        if self.is_full() {
+            let origin_um = free(rng)?;
             let size = self.group.size.draw_count(rng).max(1);
             let direction = random::direction(rng);
             self.begun += 1;

@@ -30,8 +30,16 @@ pub(crate) struct FieldStain<'a> {
 
 impl<'a> FieldStain<'a> {
     pub(super) fn draw(recipe: &'a Recipe, field: &FieldNumbers) -> Self {
+        Self::of(recipe, field, &FieldNumbers { key: Key { index: slide_of(recipe, field.key), ..field.key } })
+    }
+
+    /// The stain of a whole slide, whose key is its own.
+    pub(super) fn of_slide(recipe: &'a Recipe, slide: &FieldNumbers) -> Self {
+        Self::of(recipe, slide, slide)
+    }
+
+    fn of(recipe: &'a Recipe, field: &FieldNumbers, slide: &FieldNumbers) -> Self {
         let stain = &recipe.stain;
-        let slide = FieldNumbers { key: Key { index: slide_of(recipe, field.key), ..field.key } };
         let of_slide = |name: &str, number: &Number| number.draw(&mut slide.key.stream("slide", 0, name));
         let of_field = |name: &str, number: &Number| field.draw(name, number);
         let mut balance = [1.0; DYES];

@@ -9,7 +9,7 @@ use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchS
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
 use super::lights::{ColouredLight, Group, groups};
-use super::overlap::Overlaps;
+use super::overlap::{Meets, Overlaps};
 use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
 use crate::detect::sum_over;
 use crate::exp10::exp10_from;
@@ -77,11 +77,7 @@ impl BrightFieldPath {
     ) -> Result<Self, String> {
         let scene = slide.scene;
         let groups = groups(slide, optics, lenses, threads)?;
-        let gaussian = |um: f64, tail: f64| {
-            let gaussian = Gaussian::truncated(um / scene.view.pixel_um, Method::Direct, tail);
-            gaussian.map_err(|e| format!("optics.extra_blur_um: {e}"))
-        };
-        let further = (optics.extra_blur_um > 0.0).then(|| gaussian(optics.extra_blur_um, LOST_TAIL)).transpose()?;
+        let further = further(optics, scene.view.pixel_um)?;
         let restores = scene.restoration.restore != Restore::Off && any_imaged(slide.phantoms);
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
         let restoration = restores.then(feather).transpose().map_err(|e| e.to_string())?;
@@ -96,7 +92,9 @@ impl BrightFieldPath {
                 .then(|| slide.phantoms.iter().map(|_| Mutex::default()).collect()),
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. }).then(|| {
                 let view = scene.view;
-                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), threads)
+                // What overlaps beyond the border of a frame is not known in it.
+                let meets = if scene.frame.is_some() { Meets::All } else { Meets::Some };
+                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), meets, threads)
             }),
             groups,
             spare: Mutex::default(),
@@ -329,6 +327,13 @@ impl BrightFieldPath {
     fn spare(&self) -> MutexGuard<'_, Vec<Bench>> {
         self.spare.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The further spread of finished light, if there is any.
+pub(super) fn further(optics: &SceneMicroscope, pixel_um: f64) -> Result<Option<Gaussian>, String> {
+    let gaussian = || Gaussian::truncated(optics.extra_blur_um / pixel_um, Method::Direct, LOST_TAIL);
+    let further = (optics.extra_blur_um > 0.0).then(gaussian).transpose();
+    further.map_err(|e| format!("optics.extra_blur_um: {e}"))
 }
 
 fn any_imaged(phantoms: &[Phantom]) -> bool {

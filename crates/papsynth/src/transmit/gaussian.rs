@@ -79,6 +79,11 @@ impl GaussianPath {
         Ok(Self { width, height, in_plane, px_per_um, wavelength_um, threads, spare: Mutex::default() })
     }
 
+    /// Pixels by which the spread in the image plane reaches.
+    pub(super) fn in_plane_px(&self) -> usize {
+        self.in_plane.radius()
+    }
+
     /// `light` becomes the absorbance I_p of the phantoms.
     pub(super) fn absorb(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
         let absorbance = &mut light.channels[0];
@@ -146,10 +151,7 @@ impl GaussianPath {
                 self.px_per_um * (scene.seen_at_um(plane, depth_um) - depth_um).abs()
             }
         };
-        let gaussian = (sigma_px > SHARP_PX)
-            .then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL))
-            .transpose()
-            .map_err(|e| e.to_string())?;
+        let gaussian = blur(sigma_px)?;
         Ok(phantom
             .pieces
             .iter()
@@ -192,6 +194,17 @@ impl GaussianPath {
     fn spare(&self) -> MutexGuard<'_, Spare> {
         self.spare.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// The blur of an object out of focus, if it is any.
+fn blur(sigma_px: f64) -> Result<Option<Gaussian>, String> {
+    let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL));
+    gaussian.transpose().map_err(|e| e.to_string())
+}
+
+/// Pixels by which an object is spread that is blurred by so many.
+pub(super) fn reach_px(sigma_px: f64) -> Result<usize, String> {
+    Ok(blur(sigma_px)?.as_ref().map_or(0, Gaussian::radius))
 }
 
 #[multiversion(targets = "simd")]

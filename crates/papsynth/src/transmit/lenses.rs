@@ -2,15 +2,14 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use optics_psf::{Fft, Microscope, MicroscopeParams, PatchImager};
+use optics_psf::{Microscope, MicroscopeParams, PatchImager};
 
 /// Microscopes that are remembered: a colour image needs three, one of single wavelengths sixteen.
 const REMEMBERED: usize = 20;
 
 /// All microscopes of an engine.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Lenses {
-    fft: Fft,
     known: Mutex<Vec<Arc<Lens>>>,
 }
 
@@ -18,15 +17,10 @@ pub(crate) struct Lenses {
 #[derive(Debug)]
 pub(crate) struct Lens {
     params: MicroscopeParams,
-    pub(crate) fft: Fft,
     pub(crate) imager: PatchImager,
 }
 
 impl Lenses {
-    pub(crate) fn new(fft: Fft) -> Self {
-        Self { fft, known: Mutex::default() }
-    }
-
     /// The microscope of these parameters.
     pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, String> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
@@ -38,7 +32,7 @@ impl Lenses {
         }
         let microscope = Microscope::new(params).map_err(|e| format!("optics: {e}"))?;
         let imager = PatchImager::new(&microscope);
-        let lens = Arc::new(Lens { params: params.clone(), fft: self.fft, imager });
+        let lens = Arc::new(Lens { params: params.clone(), imager });
         if known.len() == REMEMBERED {
             known.remove(0);
         }

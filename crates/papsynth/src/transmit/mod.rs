@@ -139,5 +139,69 @@ fn background(scene: &Scene) -> Result<Background, String> {
         },
     };
     let key = scene.key.stream("field", 0, "background").next_u64();
-    Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))
+    let background = Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))?;
+    Ok(match scene.frame {
+        Some(frame) => background.on_slide(frame.origin_px),
+        None => background,
+    })
+}
+
+/// How far optics spread what lies in a scene.
+pub(crate) struct Spread {
+    kind: SpreadKind,
+}
+
+enum SpreadKind {
+    /// Light of the whole picture by so many pixels, light of an object by what its lenses say.
+    BrightField { further_px: usize, groups: Vec<lights::Group> },
+    Gaussian { in_plane_px: usize, px_per_um: f64 },
+}
+
+impl Spread {
+    /// Of the optics of a scene, whose objects are not looked at.
+    pub(crate) fn new(scene: &Scene, lenses: &Lenses) -> Result<Self, String> {
+        let empty = Slide { scene, phantoms: &[], masks: &[] };
+        let kind = match &scene.optics {
+            SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
+                let path = GaussianPath::new(empty, *sigma_xy_um, *sigma_z_um_per_um, Threads::One)?;
+                let px_per_um = sigma_z_um_per_um / scene.view.pixel_um;
+                SpreadKind::Gaussian { in_plane_px: path.in_plane_px(), px_per_um }
+            }
+            SceneOptics::BrightField(microscope) => {
+                let further = bright_field::further(microscope, scene.view.pixel_um)?;
+                let further_px = further.as_ref().map_or(0, optics_psf::Gaussian::radius);
+                let groups = lights::groups(empty, microscope, lenses, Threads::One)?;
+                SpreadKind::BrightField { further_px, groups }
+            }
+        };
+        Ok(Self { kind })
+    }
+
+    /// Pixels round a picture that light reaches it from.
+    pub(crate) fn of_picture_px(&self) -> usize {
+        match &self.kind {
+            SpreadKind::BrightField { further_px, .. } => *further_px,
+            SpreadKind::Gaussian { in_plane_px, .. } => *in_plane_px,
+        }
+    }
+
+    /// Pixels by which an object of that depth is spread in some plane of its scene.
+    pub(crate) fn of_object_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, String> {
+        let mut widest = 0;
+        for &plane_um in &scene.planes_um {
+            let seen_at_um = scene.seen_at_um(plane_um, depth_um);
+            match &self.kind {
+                SpreadKind::BrightField { groups, .. } => {
+                    for light in groups.iter().flat_map(|group| &group.lights) {
+                        let margin = light.lens.imager.margin_px(-depth_um, seen_at_um - light.shift_um);
+                        widest = widest.max(margin.map_err(|e| format!("optics: {e}"))?);
+                    }
+                }
+                SpreadKind::Gaussian { px_per_um, .. } => {
+                    widest = widest.max(gaussian::reach_px(px_per_um * (seen_at_um - depth_um).abs())?);
+                }
+            }
+        }
+        Ok(widest)
+    }
 }

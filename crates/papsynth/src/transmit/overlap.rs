@@ -44,13 +44,30 @@ struct Stained {
     transmittance: [Vec<f32>; 3],
 }
 
+/// Which objects are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meets {
+    /// Those whose boxes meet another's.
+    Some,
+    /// All that are stained.
+    All,
+}
+
 impl Overlaps {
-    pub(super) fn new(phantoms: &[Phantom], width: usize, height: usize, n: usize, threads: Threads) -> Self {
-        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained(phantom, width, height, n)).collect();
+    pub(super) fn new(
+        phantoms: &[Phantom],
+        width: usize,
+        height: usize,
+        n: usize,
+        which: Meets,
+        threads: Threads,
+    ) -> Self {
+        let boxes: Vec<Option<Window>> = 
+            phantoms.iter().map(|phantom| stained(phantom, width, height, n, which)).collect();
         // Sorted by their left edges, only neighbours can meet.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
         order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
-        let mut meets = vec![false; boxes.len()];
+        let mut meets: Vec<bool> = boxes.iter().map(|b| which == Meets::All && b.is_some()).collect();
         for (at, &i) in order.iter().enumerate() {
             let Some(a) = boxes[i] else { continue };
             for &j in &order[at + 1..] {
@@ -147,13 +164,13 @@ impl Overlapping {
 }
 
 /// The camera's pixels over which an object is stained enough to matter.
-fn stained(phantom: &Phantom, width: usize, height: usize, n: usize) -> Option<Window> {
+fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, which: Meets) -> Option<Window> {
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
     let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
-    window.meets(width * n, height * n, 0).then_some(Window {
+    (which == Meets::All || window.meets(width * n, height * n, 0)).then_some(Window {
         origin: window.origin.map(|at| at / n as i64),
         width: window.width / n,
         height: window.height / n,

@@ -73,7 +73,7 @@ fn outline(
     body: &CellBody,
     centre: Point,
 ) -> Result<Vec<Point>, String> {
-    let mut rng = scene.key.stream("cell", object.number, "outline");
+    let mut rng = scene.stream("cell", object, "outline");
     let radius_px = body.radius_um / scene.sheet_grid().pixel_um;
     let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
     let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
@@ -82,7 +82,7 @@ fn outline(
     let middle = fsd_shape::centroid(&outline);
     let outline: Vec<Point> =
         outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
-    let own = &mut scene.key.stream("cell", object.number, "outline.corners");
+    let own = &mut scene.stream("cell", object, "outline.corners");
     Ok(outline::shaped(outline, &body.detail, own))
 }
 
@@ -136,7 +136,7 @@ fn crumple(
     let jobs =
         cells.iter().zip(plans).map(|((_, body), plan)| Job { outline: &plan.outline, excess: body.detail.excess });
     let mut streams: Vec<Stream> =
-        cells.iter().map(|(object, _)| scene.key.stream("cell", object.number, "sheet")).collect();
+        cells.iter().map(|(object, _)| scene.stream("cell", object, "sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| sheet.map(Some).map_err(|e| e.to_string())).collect()
 }
@@ -152,7 +152,7 @@ fn finish(
     plan: Plan,
     sheet: Option<Sheet>,
 ) -> Result<Phantom, String> {
-    let own = |purpose: &str| scene.key.stream("cell", object.number, purpose);
+    let own = |purpose: &str| scene.stream("cell", object, purpose);
     let mut rng = own("detail");
     let pixel_um = scene.sheet_grid().pixel_um;
     let mut pieces = vec![plan.outline.clone()];

@@ -72,7 +72,38 @@ pub(super) fn problems(recipe: &Recipe) -> Vec<Problem> {
     layout(recipe, &mut check);
     cells(recipe, &mut check);
     debris(recipe, &mut check);
+    scan(recipe, &mut check);
     check.problems
+}
+
+fn scan(recipe: &Recipe, check: &mut Check) {
+    let scan = &recipe.scan;
+    let sides = [
+        ("width_px", scan.width_px, 64, 1_000_000),
+        ("height_px", scan.height_px, 64, 1_000_000),
+        ("frame_px", scan.frame_px, 128, 8192),
+    ];
+    for (name, side, low, high) in sides {
+        if !(low..=high).contains(&side) {
+            check.add(&format!("scan.{name}"), format!("{side} is outside {low} to {high}"));
+        }
+    }
+    if !(10.0..=2000.0).contains(&scan.reach_um) {
+        check.add("scan.reach_um", format!("{} is outside 10 to 2000", scan.reach_um));
+    }
+    let deposit = &scan.deposit;
+    check.numbers(
+        "scan.deposit",
+        &[
+            ("x_um", &deposit.x_um, -1e6, 1e6),
+            ("y_um", &deposit.y_um, -1e6, 1e6),
+            ("radius_um", &deposit.radius_um, 1.0, 1e6),
+            ("edge_um", &deposit.edge_um, 1.0, 1e5),
+            ("unevenness", &deposit.unevenness, 0.0, 1.0),
+            ("patch_um", &deposit.patch_um, 50.0, 1e5),
+            ("outside", &deposit.outside, 0.0, 1.0),
+        ],
+    );
 }
 
 fn layout(recipe: &Recipe, check: &mut Check) {

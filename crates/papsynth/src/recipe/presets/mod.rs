@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use super::specimen::defaults;
 use super::{
     Background, Camera, CellMix, Cytoplasm, Debris, Field, Focus, Group, GroupForm, Layout, Light, Nucleus, Number,
-    Optics, Picture, RECIPE_VERSION, Recipe, Slide, Stain, TintMix,
+    Optics, Picture, RECIPE_VERSION, Recipe, Scan, Slide, Stain, TintMix,
 };
 
 /// A named recipe.
@@ -247,6 +247,7 @@ fn lbc() -> Recipe {
         version: RECIPE_VERSION,
         field: Field::default(),
         focus: Focus::default(),
+        scan: Scan::default(),
         slide: Slide::default(),
         layout: Layout::Clusters {
             count: defaults::clusters(),

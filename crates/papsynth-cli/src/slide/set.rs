@@ -1,0 +1,104 @@
+//! Slides on the disk.
+
+use std::path::Path;
+
+use papsynth::Threads;
+use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
+use papsynth_dataset::{Check, Error, Share};
+
+use super::open;
+use crate::args::{SlideFinalize, SlideMake};
+use crate::exit::{self, Complaint, Failure};
+use crate::interrupt::Interrupt;
+use crate::report::Bar;
+use crate::setup::Setup;
+use crate::share;
+use crate::verify::MOST;
+
+pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
+    if let Some([width, height]) = args.size {
+        let sides = [("width_px", width), ("height_px", height)];
+        args.engine.recipe.set.extend(sides.map(|(name, side)| format!("scan.{name}={side}")));
+    }
+    let setup = Setup::load(&args.engine, None)?;
+    let seed = args.engine.seed;
+    let slide = open(&setup, seed, args.slide)?;
+    let share = match args.share.shard {
+        Some(shards) => share::of(shards)?,
+        None => Share::ALL,
+    };
+    // One of the sizes that can be typed.
+    let shard_px = args.shard_px.parse().unwrap_or(4096);
+    let interrupt = Interrupt::watch()?;
+    let info = SlideInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, shard_px };
+    let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
+    let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
+    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let run = SlideRun { share, threads, check, stop: interrupt.flag() };
+    let bar = Bar::start(args.quiet);
+    let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
+        let [done, all] = progress.done;
+        let what = if progress.kept { "was there" } else { "made" };
+        bar.say(done, all, &format!("shard {}: {} objects and parts, {what}", SlideSet::name_of(progress.at), progress.objects));
+    });
+    bar.clear();
+    let stopped = stopped.map_err(|error| match error {
+        Error::Engine(error) => setup.recipe.refuse(&error),
+        other => other.into(),
+    })?;
+    if stopped {
+        let message = format!("stopped; every file in {} is whole", args.out.display());
+        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
+    }
+    if share == Share::ALL { close(&set, args.quiet) } else { Ok(()) }
+}
+
+pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {
+    close(&SlideSet::open(&args.dir)?, false)
+}
+
+fn close(set: &SlideSet, quiet: bool) -> Result<(), Failure> {
+    let finished = set.finish()?;
+    if quiet {
+        return Ok(());
+    }
+    let megabytes = finished.bytes / 1_000_000;
+    exit::print(&format!(
+        "{}: {} shards, {} objects and parts of cells, {megabytes} MB, root {}\nLook at: {}\n",
+        set.path().display(),
+        finished.shards,
+        finished.objects,
+        finished.root_sha256,
+        set.path().join("thumbnail.png").display()
+    ))
+}
+
+/// `papsynth verify` of a slide.
+pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
+    let findings = SlideSet::open(dir)?.verify()?;
+    let there = dir.display();
+    if json {
+        let list = findings.iter().map(|finding| serde_json::json!({ "path": finding.path, "message": finding.message }));
+        exit::print(&format!("{:#}\n", serde_json::json!({ "findings": list.collect::<Vec<_>>() })))?;
+    } else if findings.is_empty() {
+        exit::print(&format!("{there}: whole\n"))?;
+    } else {
+        let mut text = String::new();
+        for finding in findings.iter().take(MOST) {
+            text.push_str(&format!("{}: {}\n", finding.path, finding.message));
+        }
+        if findings.len() > MOST {
+            text.push_str(&format!("and {} more\n", findings.len() - MOST));
+        }
+        exit::print(&text)?;
+    }
+    if findings.is_empty() {
+        return Ok(());
+    }
+    let help = if findings.iter().any(|finding| finding.mended_by_making) {
+        "the command that made the slide, with --verify, makes again what is wrong"
+    } else {
+        "remove what does not belong there"
+    };
+    Err(Failure::input(Complaint::new(format!("{there}: {} things are wrong", findings.len())).help(help)))
+}

@@ -1,0 +1,364 @@
+//! `ome-zarr`: every frame an OME-Zarr 0.5 group, its labels as layers that never overlap, each a label image.
+//!
+//! Every array lies in one shard, so that a frame is few files; a stack is compressed plane by plane, as it comes.
+
+use std::collections::BTreeSet;
+use std::io::Cursor;
+
+use papsynth::Plane;
+use papsynth::truth::Group;
+use papsynth_zarr::{
+    Channel, Form, Image, Kind, Labels, Pyramid, Sample, Shard, ShardEncoder, ShardReader, Space, Tiling, halved,
+    halved_labels, levels_until, shard_bytes,
+};
+use serde_json::{Map, Value, json};
+
+use super::written::differs;
+use super::{Field, Files, Place, Sink, Written, zarr_group as group_of};
+use crate::coco::category_name;
+use crate::error::{Error, Problem};
+use crate::files::{Folder, Output};
+use crate::image_of::LIMITS;
+use crate::layers::layers;
+use crate::layout::numbered;
+use crate::read::{self, LevelImage};
+use crate::record::{FileRecord, Geometry};
+use crate::shard_writer::white;
+use crate::write::LARGE;
+
+/// Side of a chunk: what a viewer reads at least.
+const CHUNK: usize = 512;
+
+pub(super) struct Images<'a> {
+    files: Files<'a>,
+    /// The levels of the image whose planes are coming.
+    levels: Vec<Level>,
+}
+
+/// A level of an image, the file of its one shard.
+struct Level {
+    encoder: ShardEncoder,
+    output: Output,
+}
+
+impl<'a> Images<'a> {
+    pub(super) fn new(place: Place<'a>) -> Self {
+        Self { files: Files::new(place.folder), levels: Vec::new() }
+    }
+
+    /// Adds one channel of a plane to every level.
+    fn add<T: Sample>(&mut self, channel: usize, plane: usize, mut values: Vec<T>) -> Result<(), papsynth_zarr::Error> {
+        for level in &mut self.levels {
+            let width = level.encoder.block().columns.len();
+            let bytes = level.encoder.plane(channel, plane, &values)?;
+            level.output.bytes(&bytes).map_err(|error| match error {
+                Error::Io { source, .. } => source.into(),
+                other => papsynth_zarr::Error::Argument { what: other.to_string() },
+            })?;
+            values = halved(&values, width);
+        }
+        Ok(())
+    }
+}
+
+/// The arrays of an image or label image of a frame.
+fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
+    let [width, height] = [geometry.view.width, geometry.view.height];
+    let form = Form {
+        kind,
+        channels,
+        planes,
+        height,
+        width,
+        tiling: Tiling::whole(CHUNK, planes.unwrap_or(1), width, height),
+        levels: if width.max(height) < LARGE { 1 } else { levels_until(CHUNK, width, height) },
+    };
+    Pyramid::new(&form).map_err(|error| geometry.wrong(error.to_string()))
+}
+
+/// The arrays of the image of a frame.
+fn of_image(geometry: &Geometry) -> Result<Pyramid, Error> {
+    let many = |count: usize| (count > 1).then_some(count);
+    let kind = if geometry.bits <= 8 { Kind::U8 } else { Kind::U16 };
+    pyramid(geometry, kind, [many(geometry.channels), many(geometry.planes_um.len())])
+}
+
+/// A label image: one layer of a group.
+struct Layer {
+    labels: Labels,
+    ids: Vec<u32>,
+}
+
+/// All label images of a frame.
+fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
+    let mut found = Vec::new();
+    for group in Group::ALL {
+        let pages = layers(field.truth, group);
+        let kind = if pages.iter().flatten().all(|&id| id <= u16::MAX.into()) { Kind::U16 } else { Kind::U32 };
+        for (number, ids) in pages.into_iter().enumerate() {
+            let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
+            let labels = Labels {
+                name: format!("{}-{number}", group.name()),
+                pyramid: pyramid(field.geometry, kind, [None, None])?,
+                colors: Vec::new(),
+                properties: properties(field, group, &shown),
+            };
+            found.push(Layer { labels, ids });
+        }
+    }
+    Ok(found)
+}
+
+/// What is known of the objects of a group that a layer shows.
+fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, Map<String, Value>)> {
+    let objects = field.truth.objects.iter().zip(&field.document.annotations);
+    let shown = objects.filter(|(object, _)| object.group() == group && shown.contains(&object.id));
+    shown
+        .map(|(object, annotation)| {
+            let known = [
+                ("category", json!(category_name(&object.class, object.part))),
+                ("class", json!(object.class)),
+                ("bethesda", json!(object.bethesda)),
+                ("kind", json!(object.kind.name())),
+                // A nucleus has the label of its cell.
+                ("parent", json!(annotation.has_parent().then_some(object.id))),
+                ("depth_um", json!(object.depth_um)),
+                ("stain", json!(object.stain)),
+                ("area_um2", json!(object.area_um2)),
+                ("area_px", json!(object.amodal.area())),
+                ("truncated", json!(object.truncated)),
+            ];
+            (object.id, known.map(|(name, value)| (name.to_owned(), value)).into_iter().collect())
+        })
+        .collect()
+}
+
+/// Every `zarr.json` of a frame.
+fn documents(geometry: &Geometry, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let range = [0.0, f64::from(white(geometry.bits))];
+    let channel = |(label, color): (&str, [u8; 3])| Channel { label: label.to_owned(), color, range, window: range };
+    let channels = match geometry.channels {
+        3 => [("red", [255, 0, 0]), ("green", [0, 255, 0]), ("blue", [0, 0, 255])].map(channel).to_vec(),
+        _ => vec![channel(("grey", [255; 3]))],
+    };
+    let planes = &geometry.planes_um;
+    let step_um = match planes.as_slice() {
+        [first, second, ..] if first != second => second - first,
+        _ => 1.0,
+    };
+    let own = json!({
+        "seed": geometry.key.seed,
+        "index": geometry.key.index,
+        "slide": geometry.slide,
+        "bits": geometry.bits,
+        "planes_um": planes,
+    });
+    let image = Image {
+        name: numbered(geometry.key.index),
+        pyramid: of_image(geometry)?,
+        space: Space { pixel_um: geometry.view.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
+        channels,
+        plane: planes.len() / 2,
+        labels,
+        attributes: Map::from_iter([("papsynth".to_owned(), own)]),
+    };
+    image.documents().map_err(|error| geometry.wrong(error.to_string()))
+}
+
+/// The one shard of a level, from the folder of its group.
+fn shard_file(level: usize, array: &papsynth_zarr::Array) -> String {
+    format!("{level}/{}", array.file(Shard::default()))
+}
+
+impl Sink for Images<'_> {
+    fn begin(&mut self, geometry: &Geometry) -> Result<(), Error> {
+        let group = group_of(geometry.key.index);
+        self.levels.clear();
+        for (level, array) in of_image(geometry)?.levels().iter().enumerate() {
+            let name = format!("{group}/{}", shard_file(level, array));
+            let output = Output::new(self.files.folder.pending(&name)?)?;
+            let encoder =
+                ShardEncoder::new(array, Shard::default()).map_err(|error| geometry.wrong(error.to_string()))?;
+            self.levels.push(Level { encoder, output });
+        }
+        Ok(())
+    }
+
+    fn plane(&mut self, plane: &Plane, geometry: &Geometry) -> Result<(), Error> {
+        for channel in 0..geometry.channels {
+            let values = plane.grey.iter().skip(channel).step_by(geometry.channels);
+            let added = match geometry.bits {
+                // Checked to fit before it came here.
+                ..=8 => self.add(channel, plane.index, values.map(|&v| v.to_le_bytes()[0]).collect()),
+                _ => self.add(channel, plane.index, values.copied().collect()),
+            };
+            added.map_err(|error| failed(error, self.files.folder, &group_of(geometry.key.index), geometry))?;
+        }
+        Ok(())
+    }
+
+    fn field(&mut self, field: &Field) -> Result<(), Error> {
+        let (geometry, group) = (field.geometry, group_of(field.index()));
+        let broken = |error| failed(error, self.files.folder, &group, geometry);
+        for Level { encoder, mut output } in self.levels.drain(..) {
+            output.bytes(&encoder.end().map_err(broken)?)?;
+            self.files.written.push(output.into_pending()?.commit()?);
+        }
+        let mut described = Vec::new();
+        for Layer { labels, ids } in of_labels(field)? {
+            let folder = format!("{group}/{}", labels.folder());
+            for (name, bytes) in label_shards(&labels, ids).map_err(broken)? {
+                self.files.write(&format!("{folder}/{name}"), &bytes)?;
+            }
+            described.push(labels);
+        }
+        for (name, bytes) in documents(geometry, described)? {
+            self.files.write(&format!("{group}/{name}"), &bytes)?;
+        }
+        Ok(())
+    }
+
+    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
+        Ok(self.files.written)
+    }
+}
+
+/// What went wrong while a frame was encoded.
+fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, geometry: &Geometry) -> Error {
+    match error {
+        papsynth_zarr::Error::Io(source) => Error::io("write", &folder.path(group))(source),
+        other => geometry.wrong(other.to_string()),
+    }
+}
+
+/// The shards of all levels of a label image, by their names in its folder.
+fn label_shards(labels: &Labels, mut ids: Vec<u32>) -> Result<Vec<(String, Vec<u8>)>, papsynth_zarr::Error> {
+    let mut shards = Vec::new();
+    for (level, array) in labels.pyramid.levels().iter().enumerate() {
+        let bytes = match array.kind() {
+            Kind::U16 => shard_bytes(array, Shard::default(), &small(&ids))?,
+            _ => shard_bytes(array, Shard::default(), &ids)?,
+        };
+        shards.push((shard_file(level, array), bytes));
+        ids = halved_labels(&ids, array.shape()[3]);
+    }
+    Ok(shards)
+}
+
+/// Ids of which none needs more than 16 bits.
+fn small(ids: &[u32]) -> Vec<u16> {
+    ids.iter().map(|&id| u16::try_from(id).unwrap_or(u16::MAX)).collect()
+}
+
+/// Whether a frame is what its truth says: documents to the letter, levels each the half of that before, labels those of the masks.
+pub(super) fn check(written: &Written) -> Result<(), Error> {
+    let field = written.field;
+    let (geometry, group) = (field.geometry, group_of(field.index()));
+    let layers = of_labels(field)?;
+    for (name, expected) in documents(geometry, layers.iter().map(|layer| layer.labels.clone()).collect())? {
+        written.file(&format!("{group}/{name}"), |bytes| match bytes == expected {
+            true => Ok(()),
+            false => differs("it does not say what the record and coco.json do"),
+        })?;
+    }
+    let pyramid = of_image(geometry)?;
+    let first = format!("{group}/{}", shard_file(0, &pyramid.levels()[0]));
+    written.file(&first, |bytes| written.shown(geometry.planes_um.len(), |take| planes(bytes, geometry, take)))?;
+    match geometry.bits {
+        ..=8 => are_halves::<u8>(written, &group, &pyramid)?,
+        _ => are_halves::<u16>(written, &group, &pyramid)?,
+    }
+    for Layer { labels, ids } in layers {
+        match labels.pyramid.levels()[0].kind() {
+            Kind::U16 => are_labels(written, &group, &labels, small(&ids))?,
+            _ => are_labels(written, &group, &labels, ids)?,
+        }
+    }
+    Ok(())
+}
+
+/// Every level is the half of that before.
+fn are_halves<T: Sample>(written: &Written, group: &str, pyramid: &Pyramid) -> Result<(), Error> {
+    for (number, pair) in pyramid.levels().windows(2).enumerate() {
+        let [full, half] = [&pair[0], &pair[1]];
+        let name = |level: usize, array| format!("{group}/{}", shard_file(level, array));
+        let above = written.folder.path(&name(number, full));
+        let bytes = read::bytes(&above, LIMITS.max_file_bytes)?;
+        let mut above = ShardReader::open(full, Shard::default(), Cursor::new(bytes))
+            .map_err(|error| Error::input(&above)(broken(error)))?;
+        written.file(&name(number + 1, half), |bytes| {
+            let mut below = ShardReader::open(half, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
+            let [channels, planes, _, width] = full.shape();
+            for (plane, channel) in (0..planes).flat_map(|plane| (0..channels).map(move |channel| (plane, channel))) {
+                let expected: Vec<T> = halved(&above.plane(channel, plane).map_err(broken)?, width);
+                if below.plane::<T>(channel, plane).map_err(broken)? != expected {
+                    return differs("it is not the half of the level before");
+                }
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+/// Every level of a label image shows these ids.
+fn are_labels<T: Sample>(written: &Written, group: &str, labels: &Labels, mut ids: Vec<T>) -> Result<(), Error> {
+    for (level, array) in labels.pyramid.levels().iter().enumerate() {
+        written.file(&format!("{group}/{}/{}", labels.folder(), shard_file(level, array)), |bytes| {
+            let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
+            match reader.plane::<T>(0, 0).map_err(broken)? == ids {
+                true => Ok(()),
+                false => differs("it is not what the masks of coco.json give"),
+            }
+        })?;
+        ids = halved_labels(&ids, array.shape()[3]);
+    }
+    Ok(())
+}
+
+fn broken(error: papsynth_zarr::Error) -> Problem {
+    Problem::Broken { format: "Zarr", message: error.to_string() }
+}
+
+/// The planes of a frame, from the bytes of its image's one shard at full size.
+fn planes(
+    bytes: &[u8],
+    geometry: &Geometry,
+    take: &mut dyn FnMut(LevelImage) -> Result<(), Problem>,
+) -> Result<(), Problem> {
+    let sizes = |error: Error| Problem::Differs { what: error.to_string() };
+    let pyramid = of_image(geometry).map_err(sizes)?;
+    let array = &pyramid.levels()[0];
+    let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
+    let (width, channels) = (geometry.view.width, geometry.channels);
+    for plane in 0..geometry.planes_um.len() {
+        let mut levels = vec![0; geometry.values()];
+        for channel in 0..channels {
+            let at = levels.iter_mut().skip(channel).step_by(channels);
+            match array.kind() {
+                Kind::U8 => {
+                    let values: Vec<u8> = reader.plane(channel, plane).map_err(broken)?;
+                    at.zip(values).for_each(|(level, value)| *level = value.into());
+                }
+                _ => {
+                    let values: Vec<u16> = reader.plane(channel, plane).map_err(broken)?;
+                    at.zip(values).for_each(|(level, value)| *level = value);
+                }
+            }
+        }
+        take(LevelImage { width, channels, levels, white: white(if geometry.bits <= 8 { 8 } else { 16 }) })?;
+    }
+    Ok(())
+}
+
+/// The planes of a frame of a data set, one after the other.
+pub(crate) fn read_planes(
+    folder: &Folder,
+    geometry: &Geometry,
+    take: &mut dyn FnMut(LevelImage) -> Result<(), Problem>,
+) -> Result<(), Error> {
+    let array = of_image(geometry)?;
+    let path = folder.path(&format!("{}/{}", group_of(geometry.key.index), shard_file(0, &array.levels()[0])));
+    let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;
+    planes(&bytes, geometry, take).map_err(Error::input(&path))
+}

@@ -1,0 +1,21 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod array;
+mod crc32c;
+mod document;
+mod error;
+mod halve;
+mod pyramid;
+mod read;
+mod sample;
+mod shard;
+
+pub use array::{Array, Block, Shard};
+pub use document::{Channel, Image, Labels, Space, VERSION};
+pub use error::Error;
+pub use halve::{halved, halved_labels};
+pub use pyramid::{Form, Pyramid, Tiling, levels_until};
+pub use read::ShardReader;
+pub use sample::{Kind, Sample};
+pub use shard::{ShardEncoder, shard_bytes};

@@ -1,0 +1,174 @@
+//! A shard read back from its file.
+
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
+
+use zstd::bulk::Decompressor;
+
+use crate::array::{Array, Block, Shard};
+use crate::crc32c::crc32c;
+use crate::error::{Error, argument, damaged};
+use crate::sample::Sample;
+use crate::shard::ABSENT;
+
+/// Bytes of an entry of the index.
+const ENTRY: usize = 16;
+
+/// Bytes of the checksum.
+const CHECKSUM: usize = 4;
+
+/// Reads regions of a shard that [`ShardEncoder`](crate::ShardEncoder) wrote.
+///
+/// Whatever the file holds, no more memory is taken than the array's sizes ask for: the index, one chunk, and the region. What is not as it was
+/// written is an [`Error::Damaged`]: the index has a checksum, each chunk another, and none may be missing.
+#[derive(Debug)]
+pub struct ShardReader<R> {
+    array: Array,
+    block: Block,
+    index: Vec<[u64; 2]>,
+    file: R,
+}
+
+impl<R: Read + Seek> ShardReader<R> {
+    /// Opens the file of a shard and reads its index.
+    ///
+    /// # Errors
+    /// If the array has no such shard, the file is damaged, or the system refuses.
+    pub fn open(array: &Array, shard: Shard, mut file: R) -> Result<Self, Error> {
+        let block = array.block(shard)?;
+        let size = array.entries() * ENTRY + CHECKSUM;
+        let length = file.seek(SeekFrom::End(0))?;
+        let Some(data) = length.checked_sub(size as u64) else {
+            return damaged(format!("it has {length} bytes, its index alone {size}"));
+        };
+        file.seek(SeekFrom::Start(data))?;
+        let mut bytes = vec![0; size];
+        file.read_exact(&mut bytes)?;
+        let (entries, checksum) = bytes.split_at(size - CHECKSUM);
+        if crc32c(entries).to_le_bytes() != checksum {
+            return damaged("the checksum of its index is another".to_owned());
+        }
+        let number = |bytes: &[u8]| bytes.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        let index: Vec<[u64; 2]> =
+            entries.chunks_exact(ENTRY).map(|entry| [number(entry), number(&entry[ENTRY / 2..])]).collect();
+        let reader = Self { array: array.clone(), block, index, file };
+        reader.check(data)?;
+        Ok(reader)
+    }
+
+    /// Exactly the chunks of the array are there, and they fill the file.
+    fn check(&self, data: u64) -> Result<(), Error> {
+        let (array, block) = (&self.array, &self.block);
+        let [rows, columns] = [block.rows.len(), block.columns.len()].map(|side| side.div_ceil(array.chunk));
+        let mut left = data;
+        for (number, &[start, bytes]) in self.index.iter().enumerate() {
+            let (column, rest) = (number % array.chunks(), number / array.chunks());
+            let (row, plane) = (rest % array.chunks(), rest / array.chunks() % array.shard_planes);
+            let is_due = column < columns && row < rows && plane < block.planes.len();
+            if is_due == ([start, bytes] == ABSENT) {
+                let what = if is_due { "is missing" } else { "lies outside the array" };
+                return damaged(format!("chunk {number} {what}"));
+            }
+            if !is_due {
+                continue;
+            }
+            if start.checked_add(bytes).is_none_or(|end| end > data) || bytes > self.most() {
+                return damaged(format!(
+                    "chunk {number} is said to have {bytes} bytes from {start} on, of {data} in all"
+                ));
+            }
+            match left.checked_sub(bytes) {
+                Some(rest) => left = rest,
+                None => return damaged("its chunks have more bytes than it".to_owned()),
+            }
+        }
+        if left == 0 { Ok(()) } else { damaged(format!("{left} of its bytes belong to no chunk")) }
+    }
+
+    /// Most bytes of a compressed chunk.
+    fn most(&self) -> u64 {
+        zstd::zstd_safe::compress_bound(self.array.chunk_bytes()) as u64
+    }
+
+    /// What the shard holds.
+    #[must_use]
+    pub fn block(&self) -> &Block {
+        &self.block
+    }
+
+    /// Rows and columns of one channel of one plane, all counted in the array and within the [`Block`], row by row. Every chunk that they touch is
+    /// decompressed: regions whose borders are those of chunks cost least.
+    ///
+    /// # Errors
+    /// If the region leaves the shard or the numbers are of another type than the array's, the file is damaged, or the system refuses.
+    pub fn region<T: Sample>(
+        &mut self,
+        channel: usize,
+        plane: usize,
+        rows: Range<usize>,
+        columns: Range<usize>,
+    ) -> Result<Vec<T>, Error> {
+        let (array, block) = (&self.array, &self.block);
+        if T::KIND != array.kind {
+            return argument(format!("{} from an array of {}", T::KIND.name(), array.kind.name()));
+        }
+        let inside = |part: &Range<usize>, whole: &Range<usize>| {
+            part.start < part.end && whole.start <= part.start && part.end <= whole.end
+        };
+        let fits = inside(&rows, &block.rows) && inside(&columns, &block.columns);
+        if !fits || !block.planes.contains(&plane) || channel >= array.shape[0] {
+            return argument(format!(
+                "rows {rows:?} and columns {columns:?} of channel {channel} of plane {plane} do not lie in {block:?}"
+            ));
+        }
+        let (side, size) = (array.chunk, array.kind.bytes());
+        // From here on counted in the shard.
+        let within = plane - block.planes.start;
+        let [rows, columns] = [(&rows, &block.rows), (&columns, &block.columns)]
+            .map(|(part, whole)| part.start - whole.start..part.end - whole.start);
+        let mut values = vec![T::default(); rows.len() * columns.len()];
+        for down in rows.start / side..rows.end.div_ceil(side) {
+            for right in columns.start / side..columns.end.div_ceil(side) {
+                let entry = self.array.entry(channel, within, down, right);
+                let chunk = self.chunk(entry)?;
+                let shared = |part: &Range<usize>, number: usize| {
+                    part.start.max(number * side)..part.end.min((number + 1) * side)
+                };
+                let across = shared(&columns, right);
+                for y in shared(&rows, down) {
+                    let from = &chunk[((y - down * side) * side + across.start - right * side) * size..];
+                    let to = &mut values[(y - rows.start) * columns.len() + across.start - columns.start..];
+                    for (value, bytes) in to[..across.len()].iter_mut().zip(from.chunks_exact(size)) {
+                        *value = T::get(bytes);
+                    }
+                }
+            }
+        }
+        Ok(values)
+    }
+
+    /// All of one channel of one plane.
+    ///
+    /// # Errors
+    /// As [`region`](Self::region).
+    pub fn plane<T: Sample>(&mut self, channel: usize, plane: usize) -> Result<Vec<T>, Error> {
+        let Block { rows, columns, .. } = self.block.clone();
+        self.region(channel, plane, rows, columns)
+    }
+
+    /// A chunk as it was before it was compressed.
+    fn chunk(&mut self, entry: usize) -> Result<Vec<u8>, Error> {
+        let [start, bytes] = self.index[entry];
+        self.file.seek(SeekFrom::Start(start))?;
+        let mut packed = Vec::new();
+        // No more than was checked above.
+        self.file.by_ref().take(bytes).read_to_end(&mut packed)?;
+        let size = self.array.chunk_bytes();
+        let mut chunk = vec![0; size];
+        match Decompressor::new()?.decompress_to_buffer(&packed, chunk.as_mut_slice()) {
+            Ok(found) if found == size => Ok(chunk),
+            Ok(found) => damaged(format!("chunk {entry} has {found} bytes decompressed, not {size}")),
+            Err(error) => damaged(format!("chunk {entry} cannot be decompressed: {error}")),
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! A shard as bytes.
+
+use zstd::bulk::Compressor;
+use zstd::zstd_safe::CParameter;
+
+use crate::array::{Array, Block, Shard, ZSTD_LEVEL};
+use crate::crc32c::crc32c;
+use crate::error::{Error, argument};
+use crate::sample::Sample;
+
+/// The index's mark of a chunk that is not there.
+pub(crate) const ABSENT: [u64; 2] = [u64::MAX; 2];
+
+/// Encodes a shard piece by piece, as planes come: what it returns is appended to the file, the index last. The same values give the same
+/// bytes.
+///
+/// Every chunk in the array is written, also one of zeros: so a chunk, or a file, that is missing was lost.
+#[derive(Debug)]
+pub struct ShardEncoder {
+    array: Array,
+    block: Block,
+    index: Vec<[u64; 2]>,
+    /// Bytes returned so far.
+    bytes: u64,
+}
+
+impl ShardEncoder {
+    /// Begins a shard of an array.
+    ///
+    /// # Errors
+    /// If the array has no such shard.
+    pub fn new(array: &Array, shard: Shard) -> Result<Self, Error> {
+        let block = array.block(shard)?;
+        Ok(Self { array: array.clone(), block, index: vec![ABSENT; array.entries()], bytes: 0 })
+    }
+
+    /// What the shard holds.
+    #[must_use]
+    pub fn block(&self) -> &Block {
+        &self.block
+    }
+
+    /// The bytes of one channel of one plane, both counted in the array; its values are those of the [`Block`], row by row. In any order, each
+    /// once.
+    ///
+    /// # Errors
+    /// If the plane is not in the shard or was there already, the numbers are of another type than the array's or not as many as the block has
+    /// pixels, or the compressor finds no memory.
+    pub fn plane<T: Sample>(&mut self, channel: usize, plane: usize, values: &[T]) -> Result<Vec<u8>, Error> {
+        let (array, block) = (&self.array, &self.block);
+        if T::KIND != array.kind {
+            return argument(format!("{} for an array of {}", T::KIND.name(), array.kind.name()));
+        }
+        if values.len() != block.pixels() {
+            let [rows, columns] = [block.rows.len(), block.columns.len()];
+            return argument(format!("{} values for a block of {rows} x {columns} pixels", values.len()));
+        }
+        if channel >= array.shape[0] || !block.planes.contains(&plane) {
+            return argument(format!("channel {channel} of plane {plane} does not lie in a shard of {block:?}"));
+        }
+        let within = plane - block.planes.start;
+        if self.index[array.entry(channel, within, 0, 0)] != ABSENT {
+            return argument(format!("channel {channel} of plane {plane} was written already"));
+        }
+        let mut zstd = Compressor::new(ZSTD_LEVEL)?;
+        zstd.set_parameter(CParameter::ChecksumFlag(true))?;
+        let (side, width) = (array.chunk, block.columns.len());
+        let mut out = Vec::new();
+        let mut chunk = Vec::with_capacity(array.chunk_bytes());
+        for row in 0..block.rows.len().div_ceil(side) {
+            for column in 0..width.div_ceil(side) {
+                let columns = column * side..((column + 1) * side).min(width);
+                chunk.clear();
+                // Beyond the array there are zeros.
+                for line in values.chunks_exact(width).skip(row * side).take(side) {
+                    line[columns.clone()].iter().for_each(|value| value.put(&mut chunk));
+                    (columns.len()..side).for_each(|_| T::default().put(&mut chunk));
+                }
+                chunk.resize(array.chunk_bytes(), 0);
+                let packed = zstd.compress(&chunk)?;
+                let entry = array.entry(channel, within, row, column);
+                self.index[entry] = [self.bytes, packed.len() as u64];
+                self.bytes += packed.len() as u64;
+                out.extend(packed);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The last bytes of the file: the index and its checksum.
+    ///
+    /// # Errors
+    /// If a channel of a plane is missing.
+    pub fn end(self) -> Result<Vec<u8>, Error> {
+        let (array, block) = (&self.array, &self.block);
+        for plane in block.planes.clone() {
+            for channel in 0..array.shape[0] {
+                if self.index[array.entry(channel, plane - block.planes.start, 0, 0)] == ABSENT {
+                    return argument(format!("channel {channel} of plane {plane} was not written"));
+                }
+            }
+        }
+        let mut bytes: Vec<u8> = self.index.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
+        bytes.extend(crc32c(&bytes).to_le_bytes());
+        Ok(bytes)
+    }
+}
+
+/// A whole shard as the bytes of its file: [`ShardEncoder`] at once. The values are those of the shard's [`Block`], channel by channel, plane by plane, row by row.
+///
+/// # Errors
+/// If the array has no such shard, the numbers are of another type than the array's or not as many as the block has, or the compressor finds no memory.
+pub fn shard_bytes<T: Sample>(array: &Array, shard: Shard, values: &[T]) -> Result<Vec<u8>, Error> {
+    let mut encoder = ShardEncoder::new(array, shard)?;
+    let Block { planes, .. } = encoder.block.clone();
+    let (pixels, channels) = (encoder.block.pixels(), array.shape[0]);
+    if values.len() != pixels * planes.len() * channels {
+        return argument(format!(
+            "{} values for {channels} channels of {} planes of {pixels} pixels",
+            values.len(),
+            planes.len()
+        ));
+    }
+    let of = (0..channels).flat_map(|channel| planes.clone().map(move |plane| (channel, plane)));
+    let mut bytes = Vec::new();
+    for ((channel, plane), values) in of.zip(values.chunks_exact(pixels)) {
+        bytes.extend(encoder.plane(channel, plane, values)?);
+    }
+    bytes.extend(encoder.end()?);
+    Ok(bytes)
+}

@@ -1,0 +1,360 @@
+//! What lies on a whole slide, square by square.
+//!
+//! A slide is divided into plots. What a plot holds follows from the slide's key and the plot's number alone: how many objects are
+//! tried, where each lies, and whether it stays there, by the density at its place, which is a function of the place.
+//! So any part of a slide can be drawn alone, and a slide is part of every larger one.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use perlin_bg::{Fractal, FractalParams};
+use rand_core::Rng;
+
+use super::cells::{Class, Drawn, class_of};
+use super::deposit::{DENSEST, Deposit};
+use super::draw::{FieldNumbers, empty, pixel_um};
+use super::groups::Groups;
+use super::stain::FieldStain;
+use super::{Object, Plot, Scene, View};
+use crate::debris::{Ground, Sieve};
+use crate::key::Key;
+use crate::model::Model;
+use crate::random;
+use crate::recipe::{GroupForm, Layout, Number, Recipe};
+
+/// Side of a plot in pixels.
+pub(crate) const PLOT_PX: i64 = 1024;
+
+/// Plots beyond the upper and left border of a slide, whose objects may reach into it.
+pub(crate) const BEYOND: i64 = 8;
+
+/// Bits of a plot's column and row in its number, and of an object in its id.
+const SIDE_BITS: u32 = 10;
+const OBJECT_BITS: u32 = 12;
+
+/// Plots whose objects are remembered.
+const REMEMBERED: usize = 192;
+
+/// What lies on one slide.
+#[derive(Debug)]
+pub(crate) struct Population {
+    recipe: Recipe,
+    model: Model,
+    key: Key,
+    pixel_um: f64,
+    /// Plots that are as large as a field.
+    share: f64,
+    spacing_um: f64,
+    deposit: Deposit,
+    scatter: Scatter,
+    relief: Relief,
+    sown: Memory<Vec<Object>>,
+    plots: Memory<Vec<Object>>,
+}
+
+/// Where the layout lets cells lie.
+#[derive(Debug)]
+enum Scatter {
+    Anywhere,
+    Clusters {
+        count: Number,
+        radius_um: Number,
+        outside: f64,
+        /// Plots that a cluster reaches beyond its own.
+        reach: i64,
+        /// Mean weight.
+        mean: f64,
+    },
+}
+
+/// A cluster's middle and radius, µm.
+type Cluster = [f64; 3];
+
+/// How deep a slide's cells lie: the noise of a field's relief, as a function of the place.
+#[derive(Debug)]
+struct Relief {
+    noise: Fractal,
+    cell_um: f64,
+    scale_um: f64,
+}
+
+/// What was worked out last.
+#[derive(Debug)]
+struct Memory<T> {
+    /// By row and column.
+    known: Mutex<BTreeMap<[i64; 2], Arc<T>>>,
+}
+
+impl<T> Default for Memory<T> {
+    fn default() -> Self {
+        Self { known: Mutex::default() }
+    }
+}
+
+impl<T> Memory<T> {
+    /// What was made of a plot, or is made now: the same, however often.
+    fn get<E>(&self, at: [i64; 2], make: impl FnOnce() -> Result<T, E>) -> Result<Arc<T>, E> {
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = known().get(&[at[1], at[0]]) {
+            return Ok(Arc::clone(found));
+        }
+        let made = Arc::new(make()?);
+        let mut known = known();
+        known.insert([at[1], at[0]], Arc::clone(&made));
+        if known.len() > REMEMBERED {
+            // Slides are worked through from the top: the first row is farthest behind.
+            known.pop_first();
+        }
+        Ok(made)
+    }
+}
+
+impl Population {
+    /// The population of a slide whose own key is given, and the slide without anything on it.
+    pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), String> {
+        let slide = FieldNumbers { key };
+        let stain = FieldStain::of_slide(recipe, &slide);
+        let pixel_um = pixel_um(recipe, &slide);
+        let view = View { width: 0, height: 0, pixel_um };
+        let scene = empty(recipe, view, &slide, &stain);
+        let middle = |number: &Number| number.bounds().iter().sum::<f64>() / 2.0;
+        let field_px = middle(&recipe.field.width_px) * middle(&recipe.field.height_px);
+        let relief_key = key.stream("slide", 0, "slide.relief").next_u64();
+        let mut population = Self {
+            recipe: recipe.clone(),
+            model: model.clone(),
+            key,
+            pixel_um,
+            share: (PLOT_PX * PLOT_PX) as f64 / field_px,
+            spacing_um: slide.draw("slide.spacing_um", &recipe.slide.spacing_um),
+            deposit: Deposit::draw(&recipe.scan.deposit, &slide)?,
+            scatter: Scatter::Anywhere,
+            relief: Relief::new(
+                slide.draw("slide.depth_um", &recipe.slide.depth_um),
+                slide.draw("slide.relief_um", &recipe.slide.relief_um),
+                relief_key,
+            )?,
+            sown: Memory::default(),
+            plots: Memory::default(),
+        };
+        population.scatter = population.scatter(&slide)?;
+        Ok((population, scene))
+    }
+
+    fn side_um(&self) -> f64 {
+        PLOT_PX as f64 * self.pixel_um
+    }
+
+    /// How the layout lets cells lie on a slide.
+    fn scatter(&self, slide: &FieldNumbers) -> Result<Scatter, String> {
+        /// Most plots that a cluster may reach beyond its own.
+        const FARTHEST: i64 = 4;
+        /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
+        const PLACES: i64 = 96;
+        const ACROSS: i64 = 12;
+        let Layout::Clusters { count, radius_um, outside } = &self.recipe.layout else {
+            return match self.recipe.layout {
+                Layout::Uniform {} => Ok(Scatter::Anywhere),
+                _ => Err("layout.kind: slides know `uniform` and `clusters`; others describe one field".to_owned()),
+            };
+        };
+        let largest = radius_um.bounds()[1];
+        let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
+        if reach > FARTHEST {
+            return Err(format!(
+                "layout.radius_um: up to {largest} is too wide for a slide of such pixels; expected at most {:.0}",
+                FARTHEST as f64 * self.side_um() / CLUSTER_REACH
+            ));
+        }
+        let outside = slide.draw("layout.outside", outside);
+        let (count, radius_um) = (count.clone(), radius_um.clone());
+        let mut scatter = Scatter::Clusters { count, radius_um, outside, reach, mean: 1.0 };
+        // The mean over a part of the slide that does not depend on the slide's size.
+        let mut sum = 0.0;
+        for row in 0..ACROSS {
+            for column in 0..ACROSS {
+                let clusters = self.clusters(&scatter, [column, row]);
+                let places = PLACES / ACROSS;
+                for place in 0..places * places {
+                    let local = [place % places, place / places].map(|at| (at as f64 + 0.5) / places as f64);
+                    let um = [column, row].map(|at| at as f64 * self.side_um());
+                    let place = [0, 1].map(|axis| um[axis] + local[axis] * self.side_um());
+                    sum += weight(&clusters, outside, place);
+                }
+            }
+        }
+        if let Scatter::Clusters { mean, .. } = &mut scatter {
+            *mean = sum / (PLACES * PLACES) as f64;
+        }
+        Ok(scatter)
+    }
+
+    /// The clusters that reach into a plot.
+    fn clusters(&self, scatter: &Scatter, at: [i64; 2]) -> Vec<Cluster> {
+        let Scatter::Clusters { count, radius_um, reach, .. } = scatter else { return Vec::new() };
+        let mut clusters = Vec::new();
+        for row in at[1] - reach..=at[1] + reach {
+            for column in at[0] - reach..=at[0] + reach {
+                let field = FieldNumbers { key: self.key.plot(number([column, row])) };
+                let wanted = field.draw("layout.count", count) * self.share;
+                let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, "layout.count"));
+                for cluster in 0..wanted as u64 + u64::from(further) {
+                    let mut rng = field.key.stream("field", cluster, "layout.cluster");
+                    let radius = radius_um.draw(&mut rng);
+                    let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
+                    clusters.push([place[0], place[1], radius]);
+                }
+            }
+        }
+        clusters
+    }
+
+    /// The cells of a plot, but for those that lie too near to one of another plot.
+    fn sow(&self, at: [i64; 2]) -> Result<Vec<Object>, String> {
+        let field = FieldNumbers { key: self.key.plot(number(at)) };
+        let slide = FieldNumbers { key: self.key };
+        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let clusters = self.clusters(&self.scatter, at);
+        let (outside, mean) = match self.scatter {
+            Scatter::Anywhere => (1.0, 1.0),
+            Scatter::Clusters { outside, mean, .. } => (outside, mean),
+        };
+        let side_um = self.side_um();
+        let global = |place: [f64; 2]| [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
+        let stays = |place: [f64; 2]| weight(&clusters, outside, place) * self.deposit.density(place) / DENSEST;
+        let mut cells: Vec<Object> = Vec::new();
+        let mut first: Vec<[f64; 2]> = Vec::new();
+        let (mut tried, mut begun) = (0_u64, 0);
+        for (name, mix) in &self.recipe.cells {
+            let kind = Class { name, mix, class: class_of(name, &self.model)? };
+            let path = format!("cells.{name}.count");
+            let alone = mix.group.form == GroupForm::Alone;
+            let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
+            let wanted = field.draw(&path, &mix.count) * self.share * DENSEST / mean / size;
+            let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, &path));
+            for _ in 0..wanted as u64 + u64::from(further) {
+                let mut rng = field.key.stream("cell", tried, "origin");
+                let origin = [0, 1].map(|_| random::between(0.0, side_um, &mut rng));
+                let number = tried;
+                tried += 1;
+                if !random::chance(stays(global(origin)), &mut rng)
+                    || first.iter().any(|other| near(*other, origin, self.spacing_um))
+                {
+                    continue;
+                }
+                first.push(origin);
+                let mut groups = Groups::new(&mix.group, begun);
+                // Members of a group are numbered beyond all that are tried.
+                let mut member = 0;
+                loop {
+                    let number = if member == 0 { number } else { number << 16 | 1 << 56 | member };
+                    let cell = Drawn::new(&self.recipe, kind, &stain, field.key, number);
+                    let mut place_rng = field.key.stream("cell", number, "place");
+                    let place = groups.next(cell.body.radius_um, |_| Ok(origin), &mut place_rng)?;
+                    let depth_um = self.relief.at(global(place.centre_um));
+                    cells.push(cell.lie(kind, number, &place, depth_um));
+                    member += 1;
+                    if alone || groups.is_full() {
+                        break;
+                    }
+                }
+                begun = groups.begun();
+            }
+        }
+        Ok(cells)
+    }
+
+    fn sown(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, String> {
+        self.sown.get(at, || self.sow(at))
+    }
+
+    /// Everything whose middle was drawn in a plot, in the order of its ids; places are counted from the plot's corner.
+    pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, String> {
+        self.plots.get(at, || self.draw(at))
+    }
+
+    fn draw(&self, at: [i64; 2]) -> Result<Vec<Object>, String> {
+        let number = number(at);
+        let field = FieldNumbers { key: self.key.plot(number) };
+        let slide = FieldNumbers { key: self.key };
+        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let side_um = self.side_um();
+        let mut objects = self.sown(at)?.as_ref().clone();
+        // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
+        let mut taken = Vec::new();
+        for [x, y] in [[-1, -1], [0, -1], [1, -1], [-1, 0]] {
+            let corner = [x, y].map(|step: i64| step as f64 * side_um);
+            let others = self.sown([at[0] + x, at[1] + y])?;
+            let places = others.iter().map(|other| [0, 1].map(|axis| other.centre_um[axis] + corner[axis]));
+            taken.extend(places.filter(|place| place.iter().all(|v| *v > -self.spacing_um)));
+        }
+        objects.retain(|cell| cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um)));
+        let (width, height) = (PLOT_PX as usize, PLOT_PX as usize);
+        let view = View { width, height, pixel_um: self.pixel_um };
+        let stays = |place: [f64; 2]| {
+            let place = [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
+            self.deposit.density(place) / DENSEST
+        };
+        // Those that stay anywhere are tried as often as there are some, the others more often.
+        let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
+        self.recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects).through(sieve));
+        let most = (1 << OBJECT_BITS) - 2;
+        if objects.len() > most {
+            return Err(format!(
+                "{} objects lie in a square of {PLOT_PX} x {PLOT_PX} pixels; a slide can number {most} there: ask for fewer",
+                objects.len()
+            ));
+        }
+        for (id, object) in (1_u32..).zip(&mut objects) {
+            object.id = number << OBJECT_BITS | id;
+            if object.cluster > 0 {
+                object.cluster |= number << OBJECT_BITS;
+            }
+            object.plot = Some(Plot { number, at_px: [0; 2] });
+        }
+        Ok(objects)
+    }
+}
+
+/// How many radii from its middle a cluster ends.
+const CLUSTER_REACH: f64 = 4.3;
+
+/// The weight of a place, from `outside` to 1.
+fn weight(clusters: &[Cluster], outside: f64, [x, y]: [f64; 2]) -> f64 {
+    let square = |[cx, cy, radius]: &Cluster| ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (radius * radius);
+    let nearest = clusters.iter().map(square).fold(f64::INFINITY, f64::min);
+    let share = if nearest < CLUSTER_REACH * CLUSTER_REACH { libm::exp(-0.5 * nearest) } else { 0.0 };
+    outside + (1.0 - outside) * share
+}
+
+/// The number of a plot on its slide.
+fn number([column, row]: [i64; 2]) -> u32 {
+    let side = |at: i64| (at + BEYOND).clamp(0, (1 << SIDE_BITS) - 1) as u32;
+    side(row) << SIDE_BITS | side(column)
+}
+
+/// The mean of a number as it is drawn.
+fn mean_of(number: &Number) -> f64 {
+    const DRAWS: u64 = 256;
+    let mut rng = Key { seed: 0, index: 0 }.stream("slide", 0, "mean");
+    ((0..DRAWS).map(|_| number.draw_count(&mut rng).max(1) as f64).sum::<f64>()) / DRAWS as f64
+}
+
+fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
+    let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
+    dx * dx + dy * dy < distance * distance
+}
+
+impl Relief {
+    fn new(depth_um: f64, cell_um: f64, key: u64) -> Result<Self, String> {
+        /// How far the noise of a field reaches from its lowest to its highest place, in the mean.
+        const RANGE: f64 = 1.1;
+        let noise = Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key);
+        Ok(Self { noise: noise.map_err(|e| format!("slide.relief_um: {e}"))?, cell_um, scale_um: depth_um / RANGE })
+    }
+
+    /// Depth at a place of the slide, µm.
+    fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        self.scale_um * f64::from(self.noise.at(x / self.cell_um, y / self.cell_um))
+    }
+}

@@ -1,0 +1,418 @@
+//! Whole slides, larger than memory: any part of one can be made alone.
+//!
+//! A scanner's camera sees a slide frame by frame, and so does the engine. Frames lie on a lattice that begins at the slide's
+//! first pixel. Each is lit and exposed by itself, on a border of pixels that is cut off again; what lies on it is drawn from
+//! plots that do not depend on frames (`scene/plots.rs`), and every object is imaged in a patch of its own, so that
+//! frames join without a seam. A part of the slide is cut from the frames that it meets: its size cannot change a pixel.
+
+use std::sync::Arc;
+
+use crate::engine::Engine;
+use crate::error::Error;
+use crate::key::Key;
+use crate::recipe::{Imaging, Optics, Problem};
+use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
+use crate::threads::{self, Threads};
+use crate::transmit::Spread;
+use crate::truth::{Group, LabelMap, ObjectTruth};
+
+/// A whole slide of an engine's recipe and model.
+///
+/// ```
+/// use papsynth::model::Model;
+/// use papsynth::recipe::Preset;
+/// use papsynth::{Engine, Inputs, Threads};
+///
+/// let mut recipe = Preset::Sparse.recipe();
+/// (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (300, 200, 128);
+/// let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
+/// let slide = engine.slide(1, 0)?;
+/// let part = slide.part([100, 50], [64, 32], Threads::One)?;
+/// assert_eq!(part.planes[0].grey.len(), 64 * 32);
+/// # Ok::<(), papsynth::Error>(())
+/// ```
+pub struct Slide<'a> {
+    engine: &'a Engine,
+    number: u64,
+    population: Population,
+    /// The slide without anything on it.
+    empty: Scene,
+    spread: Spread,
+    /// Pixels round a frame that are exposed with it and cut off.
+    border_px: i64,
+}
+
+impl core::fmt::Debug for Slide<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Slide").field("number", &self.number).field("size_px", &self.size_px()).finish_non_exhaustive()
+    }
+}
+
+/// A part of a slide: an image and what is known of it.
+#[derive(Debug, Clone)]
+pub struct SlidePart {
+    /// Column and row of its first pixel on the slide.
+    pub origin_px: [u32; 2],
+    /// Columns and rows.
+    pub size_px: [u32; 2],
+    /// Its focal planes.
+    pub planes: Vec<PartPlane>,
+    /// The id of the front-most object at each pixel, 0 where there is none: of cytoplasm, nuclei and debris, in the order of
+    /// [`Group::ALL`]. Layers of dirt have no ids.
+    pub labels: Vec<LabelMap>,
+    /// Number of cytoplasms that lie over each other at each pixel.
+    pub layers: Vec<u16>,
+    /// A row for every object whose middle lies in this part, and for every part of a cell. Masks and places are those on the
+    /// slide; masks are whole, also where they leave this part. `front` is empty: `labels` show what lies in front.
+    pub objects: Vec<ObjectTruth>,
+}
+
+/// A focal plane of a part of a slide.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartPlane {
+    /// Travel of the stage, µm.
+    pub stage_um: f64,
+    /// Grey levels, row by row, the channels of a pixel side by side.
+    pub grey: Vec<u16>,
+    /// The same without noise and before rounding; empty where it was not asked for.
+    pub noise_free: Vec<f32>,
+}
+
+impl Engine {
+    /// A whole slide: `number` tells the slides of a seed apart.
+    ///
+    /// # Errors
+    /// If the recipe asks for what is not to be had on a slide: which field, which value, what would be accepted.
+    pub fn slide(&self, seed: u64, number: u64) -> Result<Slide<'_>, Error> {
+        Slide::new(self, seed, number)
+    }
+}
+
+impl<'a> Slide<'a> {
+    /// Largest number of a slide.
+    pub const LAST: u64 = (1 << 30) - 1;
+
+    fn new(engine: &'a Engine, seed: u64, number: u64) -> Result<Self, Error> {
+        let recipe = engine.recipe();
+        let fail = |field: &str, message: String| {
+            Error::Recipe(vec![Problem { field: field.to_owned(), message }])
+        };
+        if number > Self::LAST {
+            return Err(fail("slide", format!("{number} is no number of a slide; expected 0 to {}", Self::LAST)));
+        }
+        if matches!(recipe.optics, Optics::BrightField { imaging: Imaging::Abbe, .. }) {
+            return Err(fail("optics.imaging", "\"abbe\" images whole fields; slides know \"product\"".to_owned()));
+        }
+        let key = Key { seed, index: number };
+        let (population, mut empty) = Population::new(recipe, engine.model(), key).map_err(Error::Layout)?;
+        empty.slide = number;
+        let spread = Spread::new(&empty, engine.lenses()).map_err(Error::Layout)?;
+        let border_px = spread.of_picture_px() as i64;
+        let reach_px = recipe.scan.reach_um / empty.view.pixel_um;
+        let most = (BEYOND - 1) as f64 * PLOT_PX as f64;
+        if reach_px > most {
+            let message = format!(
+                "{} is too far for pixels of {} µm; expected at most {:.0}",
+                recipe.scan.reach_um,
+                empty.view.pixel_um,
+                most * empty.view.pixel_um
+            );
+            return Err(fail("scan.reach_um", message));
+        }
+        Ok(Self { engine, number, population, empty, spread, border_px })
+    }
+
+    /// Columns and rows of the slide.
+    #[must_use]
+    pub fn size_px(&self) -> [u32; 2] {
+        let scan = &self.engine.recipe().scan;
+        [scan.width_px, scan.height_px]
+    }
+
+    /// The slide's number.
+    #[must_use]
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Size of a pixel, µm.
+    #[must_use]
+    pub fn pixel_um(&self) -> f64 {
+        self.empty.view.pixel_um
+    }
+
+    /// Travels of the stage to the focal planes, µm.
+    #[must_use]
+    pub fn planes_um(&self) -> &[f64] {
+        &self.empty.planes_um
+    }
+
+    /// Channels of a pixel: 1 or 3.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.empty.channels()
+    }
+
+    /// Bits of a grey level.
+    #[must_use]
+    pub fn bits(&self) -> u32 {
+        self.empty.camera.bits
+    }
+
+    /// Columns and rows of frames.
+    #[must_use]
+    pub fn frames(&self) -> [u32; 2] {
+        self.size_px().map(|side| side.div_ceil(self.side_px()))
+    }
+
+    /// Side of a frame in pixels.
+    #[must_use]
+    pub fn side_px(&self) -> u32 {
+        self.engine.recipe().scan.frame_px
+    }
+
+    /// Everything that may be seen in a part of the slide, by id. No pixel is touched.
+    ///
+    /// # Errors
+    /// If an object reaches farther than `scan.reach_um`, or a plot holds more objects than can be numbered.
+    pub fn objects(&self, origin_px: [u32; 2], size_px: [u32; 2]) -> Result<Vec<Object>, Error> {
+        let low = origin_px.map(i64::from);
+        let high = [0, 1].map(|axis| low[axis] + i64::from(size_px[axis]));
+        self.reaching(low, high).map_err(|message| self.fail(message))
+    }
+
+    fn fail(&self, message: String) -> Error {
+        Error::Image { index: self.number, message }
+    }
+
+    /// The objects that reach into a rectangle of the slide, from `low` up to `high`, their plots counted from `low`.
+    fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, String> {
+        let pixel_um = self.pixel_um();
+        let most_um = self.engine.recipe().scan.reach_um;
+        let halo = (most_um / pixel_um).ceil() as i64;
+        let plots = |axis: usize| {
+            let [first, last] = [low[axis] - halo, high[axis] - 1 + halo].map(|at| at.div_euclid(PLOT_PX));
+            first.max(-BEYOND)..=last
+        };
+        let mut found = Vec::new();
+        for row in plots(1) {
+            for column in plots(0) {
+                let at = [column, row];
+                let plot: Arc<Vec<Object>> = self.population.plot(at)?;
+                for object in plot.iter() {
+                    let reach_px = object.body.reach_um(pixel_um) / pixel_um + 3.0;
+                    let spread_px = self.spread.of_object_px(&self.empty, object.depth_um)?;
+                    let reach_px = reach_px + spread_px as f64;
+                    if reach_px > halo as f64 {
+                        return Err(too_far(object, reach_px * pixel_um, most_um));
+                    }
+                    let at_px = [0, 1].map(|axis| at[axis] * PLOT_PX - low[axis]);
+                    let meets = (0..2).all(|axis| {
+                        let middle = object.centre_um[axis] / pixel_um + at_px[axis] as f64;
+                        middle + reach_px > 0.0 && middle - reach_px < (high[axis] - low[axis]) as f64
+                    });
+                    if meets {
+                        let plot = object.plot.map(|plot| Plot { at_px, ..plot });
+                        found.push(Object { plot, ..object.clone() });
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// A frame: all of it that lies on the slide.
+    ///
+    /// # Errors
+    /// As [`Slide::objects`], or if a frame of that column and row is not on the slide.
+    pub fn frame(&self, at: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
+        let frames = self.frames();
+        if at[0] >= frames[0] || at[1] >= frames[1] {
+            let message = format!("frame {at:?} is not on the slide, which has {} x {}", frames[0], frames[1]);
+            return Err(self.fail(message));
+        }
+        self.expose(at, threads, true).map_err(|message| self.fail(message))
+    }
+
+    fn expose(&self, at: [u32; 2], threads: Threads, noise_free: bool) -> Result<SlidePart, String> {
+        let side = self.side_px();
+        let origin_px = at.map(|at| at * side);
+        let border = self.border_px;
+        let low = origin_px.map(|at| i64::from(at) - border);
+        let whole = side as usize + 2 * border as usize;
+        let high = low.map(|at| at + whole as i64);
+        let scene = Scene {
+            view: View { width: whole, height: whole, pixel_um: self.pixel_um() },
+            frame: Some(SlideFrame { number: at[1] << 16 | at[0], origin_px: low }),
+            objects: self.reaching(low, high)?,
+            ..self.empty.clone()
+        };
+        let slide_px = self.size_px();
+        let size_px = [0, 1].map(|axis| side.min(slide_px[axis] - origin_px[axis]));
+        let channels = scene.channels();
+        let cut = Cut { border: border as usize, whole, size: size_px.map(|side| side as usize) };
+        let mut rendering = self.engine.rendering(scene, threads)?;
+        let mut planes = Vec::new();
+        for index in 0..rendering.planes() {
+            let plane = rendering.plane(index)?;
+            planes.push(PartPlane {
+                stage_um: plane.stage_um,
+                grey: cut.of(&plane.grey, channels),
+                noise_free: if noise_free { cut.of(&plane.noise_free, channels) } else { Vec::new() },
+            });
+        }
+        let pixel_um = self.pixel_um();
+        let within = |place_um: [f64; 2]| {
+            (0..2).all(|axis| {
+                let at = (place_um[axis] / pixel_um).floor() - border as f64;
+                at >= 0.0 && at < f64::from(size_px[axis])
+            })
+        };
+        let (mut truth, objects) = rendering.on_slide(slide_px, within);
+        self.engine.give_back(rendering);
+        truth.objects.retain(|object| !object.kind.is_layer());
+        let labels = Group::ALL.map(|group| LabelMap {
+            width: size_px[0] as usize,
+            ids: cut.of(&truth.labels(group).ids, 1),
+        });
+        let layers = cut.of(&truth.layers(), 1);
+        Ok(SlidePart { origin_px, size_px, planes, labels: labels.to_vec(), layers, objects })
+    }
+
+    /// Any part of the slide, cut from the frames that it meets.
+    ///
+    /// # Errors
+    /// As [`Slide::frame`], or if the part leaves the slide.
+    pub fn part(&self, origin_px: [u32; 2], size_px: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
+        self.cut(origin_px, size_px, threads, true)
+    }
+
+    /// The same without the noise-free images, which take four times the memory of the picture.
+    ///
+    /// # Errors
+    /// As [`Slide::part`].
+    pub fn picture(&self, origin_px: [u32; 2], size_px: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
+        self.cut(origin_px, size_px, threads, false)
+    }
+
+    fn cut(
+        &self,
+        origin_px: [u32; 2],
+        size_px: [u32; 2],
+        threads: Threads,
+        noise_free: bool,
+    ) -> Result<SlidePart, Error> {
+        let slide_px = self.size_px();
+        let inside = (0..2).all(|axis| {
+            size_px[axis] > 0 && origin_px[axis].checked_add(size_px[axis]).is_some_and(|end| end <= slide_px[axis])
+        });
+        if !inside {
+            return Err(self.fail(format!(
+                "{} x {} pixels from {origin_px:?} on leave the slide of {} x {}",
+                size_px[0], size_px[1], slide_px[0], slide_px[1]
+            )));
+        }
+        let side = self.side_px();
+        let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;
+        let mut part = SlidePart::blank(origin_px, size_px, self.planes_um(), self.channels(), noise_free);
+        let frames: Vec<[u32; 2]> =
+            frames(1).flat_map(|row| frames(0).map(move |column| [column, row])).collect();
+        // Few at a time, since each takes the memory of a picture.
+        for frames in frames.chunks(threads::count(threads)) {
+            let inner = if frames.len() > 1 { Threads::One } else { threads };
+            for frame in threads::map(threads, frames, |&at| self.expose(at, inner, noise_free)) {
+                part.lay(&frame.map_err(|message| self.fail(message))?, self.channels());
+            }
+        }
+        let pixel_um = self.pixel_um();
+        part.objects.retain(|object| {
+            (0..2).all(|axis| {
+                let at = (object.centre_um[axis] / pixel_um).floor();
+                at >= f64::from(origin_px[axis]) && at < f64::from(origin_px[axis] + size_px[axis])
+            })
+        });
+        part.objects.sort_by_key(|object| (object.id, object.part));
+        Ok(part)
+    }
+}
+
+fn too_far(object: &Object, reach_um: f64, most_um: f64) -> String {
+    format!(
+        "a {} reaches {reach_um:.0} µm at its place and depth, farther than `scan.reach_um` = {most_um}: raise that, or make it \
+         smaller or nearer to focus",
+        object.body.kind().name()
+    )
+}
+
+impl SlidePart {
+    fn blank(
+        origin_px: [u32; 2],
+        size_px: [u32; 2],
+        planes_um: &[f64],
+        channels: usize,
+        noise_free: bool,
+    ) -> Self {
+        let pixels = size_px[0] as usize * size_px[1] as usize;
+        let plane = |stage_um: &f64| PartPlane {
+            stage_um: *stage_um,
+            grey: vec![0; pixels * channels],
+            noise_free: if noise_free { vec![0.0; pixels * channels] } else { Vec::new() },
+        };
+        let labels = Group::ALL.map(|_| LabelMap { width: size_px[0] as usize, ids: vec![0; pixels] });
+        Self {
+            origin_px,
+            size_px,
+            planes: planes_um.iter().map(plane).collect(),
+            labels: labels.to_vec(),
+            layers: vec![0; pixels],
+            objects: Vec::new(),
+        }
+    }
+
+    /// Takes over what it shares with another part.
+    fn lay(&mut self, other: &Self, channels: usize) {
+        let low = [0, 1].map(|axis| self.origin_px[axis].max(other.origin_px[axis]));
+        let high = [0, 1].map(|axis| {
+            (self.origin_px[axis] + self.size_px[axis]).min(other.origin_px[axis] + other.size_px[axis])
+        });
+        if low[0] >= high[0] {
+            return;
+        }
+        let columns = (high[0] - low[0]) as usize;
+        let at = |part: &Self, y: u32| {
+            (y - part.origin_px[1]) as usize * part.size_px[0] as usize + (low[0] - part.origin_px[0]) as usize
+        };
+        let places: Vec<[usize; 2]> = (low[1]..high[1]).map(|y| [at(self, y), at(other, y)]).collect();
+        fn copy<T: Copy>(places: &[[usize; 2]], values: usize, to: &mut [T], from: &[T], channels: usize) {
+            for [own, others] in places {
+                to[own * channels..][..values].copy_from_slice(&from[others * channels..][..values]);
+            }
+        }
+        for (plane, others) in self.planes.iter_mut().zip(&other.planes) {
+            copy(&places, columns * channels, &mut plane.grey, &others.grey, channels);
+            if !plane.noise_free.is_empty() {
+                copy(&places, columns * channels, &mut plane.noise_free, &others.noise_free, channels);
+            }
+        }
+        for (labels, others) in self.labels.iter_mut().zip(&other.labels) {
+            copy(&places, columns, &mut labels.ids, &others.ids, 1);
+        }
+        copy(&places, columns, &mut self.layers, &other.layers, 1);
+        self.objects.extend(other.objects.iter().cloned());
+    }
+}
+
+/// What is kept of a frame with its border.
+struct Cut {
+    border: usize,
+    whole: usize,
+    size: [usize; 2],
+}
+
+impl Cut {
+    fn of<T: Copy>(&self, values: &[T], channels: usize) -> Vec<T> {
+        let row = self.whole * channels;
+        let rows = values.chunks_exact(row).skip(self.border).take(self.size[1]);
+        rows.flat_map(|row| &row[self.border * channels..][..self.size[0] * channels]).copied().collect()
+    }
+}

@@ -1,0 +1,165 @@
+//! Whole slides: no seam, no dependence on tiles, frames, order or the slide's size.
+
+use papsynth::model::Model;
+use papsynth::recipe::{Illumination, Light, Preset, Recipe};
+use papsynth::slide::SlidePart;
+use papsynth::truth::Part;
+use papsynth::{Engine, Inputs, Threads};
+
+/// A slide that is full of everything from its first pixel on.
+fn recipe() -> Recipe {
+    let mut recipe = Preset::Inflamed.recipe();
+    (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (900, 700, 256);
+    recipe.scan.deposit.radius_um = 60_000.0.into();
+    recipe
+}
+
+/// A slide whose frames are lit alike all over, so that they differ in their noise alone.
+fn even(mut recipe: Recipe) -> Recipe {
+    recipe.background.illumination =
+        Illumination::Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() };
+    recipe
+}
+
+fn engine(recipe: &Recipe) -> Engine {
+    Engine::new(recipe, &Model::builtin(), &Inputs::default()).unwrap()
+}
+
+fn part(engine: &Engine, origin: [u32; 2], size: [u32; 2]) -> SlidePart {
+    engine.slide(5, 0).unwrap().part(origin, size, Threads::One).unwrap()
+}
+
+fn is_same(a: &SlidePart, b: &SlidePart) {
+    assert!(a.planes == b.planes, "pixels differ");
+    assert_eq!(a.labels, b.labels);
+    assert_eq!(a.layers, b.layers);
+    assert_eq!(a.objects, b.objects);
+}
+
+/// The largest difference of noise-free grey levels.
+fn difference(a: &SlidePart, b: &SlidePart) -> f32 {
+    let pairs = a.planes.iter().zip(&b.planes).flat_map(|(a, b)| a.noise_free.iter().zip(&b.noise_free));
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn frames_join_without_a_seam() {
+    let mut colour = recipe();
+    colour.light = Light::Colour {
+        lamp_k: 3200.0.into(),
+        mixing: papsynth::recipe::Mixing::Spectral,
+        chromatic_um: 0.3.into(),
+        rendition: papsynth::recipe::Rendition::Display,
+    };
+    let mut stack = recipe();
+    (stack.focus.planes, stack.focus.step_um) = (2.0.into(), 3.0.into());
+    let mut paper = Preset::Paper2015.recipe();
+    paper.layout = papsynth::recipe::Layout::Uniform {};
+    paper.scan = recipe().scan;
+    for (name, recipe) in [("default", recipe()), ("colour", colour), ("stack", stack), ("paper", paper)] {
+        let mut recipe = even(recipe);
+        let size = [500, 400];
+        let small = part(&engine(&recipe), [100, 90], size);
+        recipe.scan.frame_px = 1024;
+        let large = part(&engine(&recipe), [100, 90], size);
+        // Scatter is interpolated from another first pixel.
+        let off = difference(&small, &large);
+        println!("{name}: {off}");
+        assert!(off < 2e-3, "{name}: {off} grey levels");
+        assert_eq!(small.labels, large.labels, "{name}");
+        assert_eq!(small.layers, large.layers, "{name}");
+        assert_eq!(small.objects.len(), large.objects.len(), "{name}");
+        for (a, b) in small.objects.iter().zip(&large.objects) {
+            assert_eq!((a.id, &a.amodal, a.area_um2, a.depth_um), (b.id, &b.amodal, b.area_um2, b.depth_um), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_part_is_that_part_whatever_its_size_and_the_slides() {
+    let recipe = recipe();
+    let engine = engine(&recipe);
+    let whole = part(&engine, [0, 0], [900, 700]);
+    let cut = |origin: [u32; 2], size: [u32; 2]| -> Vec<u16> {
+        let rows = (origin[1]..origin[1] + size[1]).map(|y| (y * 900 + origin[0]) as usize);
+        rows.flat_map(|at| &whole.planes[0].grey[at..at + size[0] as usize]).copied().collect()
+    };
+    for (origin, size) in [([0, 0], [64, 64]), ([250, 250], [10, 10]), ([612, 433], [288, 267]), ([899, 699], [1, 1])] {
+        assert!(part(&engine, origin, size).planes[0].grey == cut(origin, size), "{origin:?}");
+    }
+    let mut larger = recipe;
+    (larger.scan.width_px, larger.scan.height_px) = (5000, 3000);
+    let of_larger = part(&self::engine(&larger), [300, 200], [300, 300]);
+    let of_smaller = part(&engine, [300, 200], [300, 300]);
+    assert!(of_larger.planes == of_smaller.planes);
+    assert_eq!(of_larger.labels, of_smaller.labels);
+}
+
+#[test]
+fn threads_and_order_change_nothing() {
+    let recipe = recipe();
+    let engine = engine(&recipe);
+    let one = engine.slide(5, 0).unwrap().frame([1, 1], Threads::One).unwrap();
+    let slide = engine.slide(5, 0).unwrap();
+    slide.frame([3, 2], Threads::All).unwrap();
+    slide.frame([0, 0], Threads::All).unwrap();
+    is_same(&one, &slide.frame([1, 1], Threads::All).unwrap());
+    let other = engine.slide(5, 1).unwrap().frame([1, 1], Threads::All).unwrap();
+    assert!(one.planes != other.planes, "another slide");
+}
+
+#[test]
+fn every_object_is_told_once_and_its_mask_is_what_labels_show() {
+    let recipe = recipe();
+    let engine = engine(&recipe);
+    let slide = engine.slide(5, 0).unwrap();
+    let mut rows = Vec::new();
+    let mut layers = vec![0_u16; 900 * 700];
+    for row in 0..slide.frames()[1] {
+        for column in 0..slide.frames()[0] {
+            rows.extend(slide.frame([column, row], Threads::All).unwrap().objects);
+        }
+    }
+    let mut ids: Vec<_> = rows.iter().map(|row| (row.id, row.part)).collect();
+    let told = ids.len();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), told, "an object is told twice");
+    assert!(told > 100, "{told}");
+    // Objects whose middle lies beyond the slide are seen and not told; all others make up the layers.
+    for row in rows.iter().filter(|row| row.part == Part::Cytoplasm) {
+        row.amodal.pixels(900).for_each(|pixel| layers[pixel] += 1);
+    }
+    let whole = part(&engine, [0, 0], [900, 700]);
+    let inside = |pixel: usize| (250..650).contains(&(pixel % 900)) && (250..450).contains(&(pixel / 900));
+    assert!((0..layers.len()).filter(|&pixel| inside(pixel)).all(|pixel| layers[pixel] == whole.layers[pixel]));
+}
+
+#[test]
+fn density_is_that_of_fields_within_the_deposit_and_falls_beyond_it() {
+    let mut recipe = Preset::Lbc.recipe();
+    (recipe.scan.width_px, recipe.scan.height_px) = (60_000, 60_000);
+    recipe.scan.deposit.unevenness = 0.0.into();
+    let engine = engine(&recipe);
+    let count = |slide: &papsynth::Slide<'_>, origin, size: u32| {
+        let found = slide.objects(origin, [size; 2]).unwrap();
+        found.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count() as f64
+    };
+    let fields = 24;
+    let scenes = (0..fields).map(|index| engine.scene(papsynth::key::Key { seed: 3, index }).unwrap());
+    let cells: usize = scenes
+        .map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count())
+        .sum();
+    let wanted = cells as f64 / (fields as f64 * 1376.0 * 1038.0);
+    let side = 8000;
+    let (mut inside, mut beyond) = (0.0, 0.0);
+    for number in 0..3 {
+        let slide = engine.slide(3, number).unwrap();
+        inside += count(&slide, [24_000, 26_000], side) / 3.0;
+        beyond += count(&slide, [0, 0], 4000) / 3.0;
+    }
+    // Some that reach in from beyond are counted too.
+    let found = inside / f64::from(side + 300).powi(2);
+    assert!((found / wanted - 1.0).abs() < 0.2, "{found} {wanted}");
+    assert!(beyond / f64::from(4300 * 4300) < 0.05 * wanted, "{beyond}");
+}

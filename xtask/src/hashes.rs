@@ -1,0 +1,90 @@
+//! The same hashes on every machine.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use crate::arguments::Arguments;
+use crate::outcome::Outcome;
+use crate::workspace::Workspace;
+use crate::{Chore, shell};
+
+pub(crate) const CHORE: Chore = Chore {
+    name: "hashes",
+    usage: "[--bless | --full]",
+    about: "compares hashes of what small recipes give with fixtures/hashes.txt, or writes them anew",
+    details: "Pixels, light, labels, truth and scenes of twenty recipes, made by the program papsynth-hashes on this machine, with and without the \
+              instructions for which its C library has other functions; `cargo xtask wasm` has the same made in wasm32. --full also compiles \
+              it for the plainest and the newest processors, and runs it on the one that valgrind imitates. --bless is for changes of what a recipe \
+              gives, which have a line under Results in CHANGELOG.md.",
+    run,
+};
+
+/// What makes and prints them.
+pub(crate) const PACKAGE: &str = "papsynth-hashes";
+
+/// Processors that compilers know, from the plainest on; `native` is the one at hand.
+const PROCESSORS: [&str; 3] = ["x86-64", "x86-64-v3", "native"];
+
+fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
+    let (bless, full) = (arguments.flag("--bless"), arguments.flag("--full"));
+    arguments.finish()?;
+    let mut command = workspace.cargo();
+    command.args(["test", "--package", PACKAGE]);
+    if bless {
+        command.env("PAPSYNTH_BLESS", "1");
+    }
+    shell::run(&mut command)?;
+    if full { on_other_processors(workspace) } else { Ok(Outcome::Done) }
+}
+
+/// Compiled for several processors, and on one without AVX-512.
+fn on_other_processors(workspace: &Workspace) -> Result<Outcome> {
+    if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
+        return Ok(Outcome::Skipped("processors are known here for x86-64 and Linux alone".to_owned()));
+    }
+    for processor in PROCESSORS {
+        let folder = workspace.target.join("hashes").join(processor);
+        let mut command = workspace.cargo();
+        command.args(["run", "--quiet", "--package", PACKAGE, "--target-dir"]).arg(&folder);
+        command.env("RUSTFLAGS", format!("-C target-cpu={processor}"));
+        compare(workspace, &shell::output(&mut command)?, processor)?;
+    }
+    if !shell::answers(Command::new("valgrind").arg("--version")) {
+        return Outcome::skipped_unless_ci(
+            "valgrind is not installed, which imitates a processor without AVX-512".to_owned(),
+        );
+    }
+    let program = workspace.target.join("hashes").join(PROCESSORS[0]).join("debug").join(PACKAGE);
+    let mut command = Command::new("valgrind");
+    command.args(["--quiet", "--tool=none"]).arg(program);
+    compare(workspace, &shell::output(&mut command)?, "valgrind's processor")?;
+    Ok(Outcome::Done)
+}
+
+/// Fails if hashes made on `machine` are not those of the repository.
+pub(crate) fn compare(workspace: &Workspace, found: &str, machine: &str) -> Result<()> {
+    let file = workspace.root.join("fixtures/hashes.txt");
+    let expected = read(&file)?;
+    if found == expected {
+        println!("{machine}: {} hashes agree", expected.lines().count());
+        return Ok(());
+    }
+    // One line for each recipe: the first of its stages that differs.
+    let mut recipes: Vec<&str> = Vec::new();
+    let mut differences = String::new();
+    for (expected, found) in expected.lines().zip(found.lines()).filter(|(expected, found)| expected != found) {
+        let recipe = expected.split(' ').next().unwrap_or_default();
+        if !recipes.contains(&recipe) {
+            recipes.push(recipe);
+            differences.push_str(&format!("\n  {expected}\n  is {found}"));
+        }
+    }
+    bail!("on {machine} {} recipes give something else than in {}:{differences}", recipes.len(), workspace.shown(&file))
+}
+
+fn read(file: &Path) -> Result<String> {
+    fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))
+}
