@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
@@ -17,7 +16,7 @@ pub(crate) const CHORE: Chore = Chore {
     about: "compares hashes of what small recipes give with fixtures/hashes.txt, or writes them anew",
     details: "Pixels, light, labels, truth and scenes of twenty recipes, made by the program papsynth-hashes on this machine, with and without the \
               instructions for which its C library has other functions; `cargo xtask wasm` has the same made in wasm32. --full also compiles \
-              it for the plainest and the newest processors, and runs it on the one that valgrind imitates. --bless is for changes of what a recipe \
+              it for the plainest, a usual and the newest processor. --bless is for changes of what a recipe \
               gives, which have a line under Results in CHANGELOG.md.",
     run,
 };
@@ -40,7 +39,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     if full { on_other_processors(workspace) } else { Ok(Outcome::Done) }
 }
 
-/// Compiled for several processors, and on one without AVX-512.
+/// Compiled for several processors.
 fn on_other_processors(workspace: &Workspace) -> Result<Outcome> {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
         return Ok(Outcome::Skipped("processors are known here for x86-64 and Linux alone".to_owned()));
@@ -52,15 +51,6 @@ fn on_other_processors(workspace: &Workspace) -> Result<Outcome> {
         command.env("RUSTFLAGS", format!("-C target-cpu={processor}"));
         compare(workspace, &shell::output(&mut command)?, processor)?;
     }
-    if !shell::answers(Command::new("valgrind").arg("--version")) {
-        return Outcome::skipped_unless_ci(
-            "valgrind is not installed, which imitates a processor without AVX-512".to_owned(),
-        );
-    }
-    let program = workspace.target.join("hashes").join(PROCESSORS[0]).join("debug").join(PACKAGE);
-    let mut command = Command::new("valgrind");
-    command.args(["--quiet", "--tool=none"]).arg(program);
-    compare(workspace, &shell::output(&mut command)?, "valgrind's processor")?;
     Ok(Outcome::Done)
 }
 

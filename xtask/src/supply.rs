@@ -13,18 +13,22 @@ use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "sbom",
-    usage: "",
+    usage: "[--check]",
     about: "writes the bill of materials of the program, as CycloneDX, to the target folder",
     details: "CycloneDX 1.5 in JSON: every crate that `papsynth` is built of, on any platform, with version, licence, SHA-256 and what it depends on. The same \
-              Cargo.lock gives the same bytes.",
+              Cargo.lock gives the same bytes. With --check nothing is written: licences, sources and crates that are there twice are held against deny.toml.",
     run,
 };
 
 /// The crate whose program is shipped.
 const PROGRAM: &str = "papsynth-cli";
 
-fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
+fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
+    let check_alone = arguments.flag("--check");
     arguments.finish()?;
+    if check_alone {
+        return check(workspace);
+    }
     println!("{}", workspace.shown(&write(workspace)?));
     Ok(Outcome::Done)
 }
@@ -53,9 +57,9 @@ pub(crate) fn check(workspace: &Workspace) -> Result<Outcome> {
         .filter_map(|entry| entry.get("crate").and_then(toml::Value::as_str).map(str::to_owned))
         .collect();
     let tree = Tree::load(workspace)?;
-    let mut wrong = Vec::new();
+    let (mut wrong, mut twice) = (Vec::new(), Vec::new());
     let mut versions: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for package in tree.packages.values() {
+    for package in tree.used.iter().filter_map(|id| tree.packages.get(id)) {
         let (name, version) = (text_of(package, "name")?, text_of(package, "version")?);
         versions.entry(name).or_default().push(version);
         let is_ours = package.get("source").is_none_or(Value::is_null);
@@ -79,20 +83,25 @@ pub(crate) fn check(workspace: &Workspace) -> Result<Outcome> {
             })
         };
         if versions.iter().filter(|version| !is_listed(version)).count() > 1 {
-            wrong.push(format!("{name} is there in versions {}", versions.join(", ")));
+            twice.push(format!("{name} is there in versions {}", versions.join(", ")));
         }
+    }
+    // As `cargo deny` takes it: a warning, or an error.
+    match rules.get("bans").and_then(|bans| bans.get("multiple-versions")).and_then(toml::Value::as_str) {
+        Some("deny") => wrong.append(&mut twice),
+        _ => twice.iter().for_each(|twice| println!("warning: {twice}")),
     }
     if !wrong.is_empty() {
         bail!("deny.toml does not allow: {}", wrong.join("; "));
     }
-    println!("{} crates: licences, sources and versions are those that deny.toml allows", tree.packages.len());
+    println!("{} crates: licences and sources are those that deny.toml allows", tree.used.len());
     Ok(Outcome::Done)
 }
 
 /// Whether one of the licences that are offered is allowed, and all that are asked for together.
 fn is_allowed(expression: &str, allowed: &BTreeSet<String>) -> bool {
     // Of SPDX what crates use: names, AND before OR, parentheses, and a slash that once stood for OR.
-    let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
+    let spaced = expression.replace('/', " OR ").replace(" or ", " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
     let mut at = 0;
     let fits = either(&words, &mut at, allowed);
@@ -135,6 +144,8 @@ fn one(words: &[&str], at: &mut usize, allowed: &BTreeSet<String>) -> bool {
 
 /// All that Cargo has resolved.
 struct Tree {
+    /// What the workspace is built and tested with; Cargo lists more.
+    used: BTreeSet<String>,
     /// By identity.
     packages: BTreeMap<String, Value>,
     /// What each is built of, tests and examples left out.
@@ -154,14 +165,23 @@ impl Tree {
         for package in array(&metadata, "packages") {
             packages.insert(text_of(&package, "id")?.to_owned(), package);
         }
-        let mut built_of = BTreeMap::new();
+        let (mut built_of, mut needs) = (BTreeMap::new(), BTreeMap::new());
         for node in array(metadata.get("resolve").unwrap_or(&Value::Null), "nodes") {
             let is_built = |dep: &&Value| {
                 array(dep, "dep_kinds").iter().any(|kind| kind.get("kind").and_then(Value::as_str) != Some("dev"))
             };
             let needed = array(&node, "deps");
+            let ids = needed.iter().map(|dep| Ok(text_of(dep, "pkg")?.to_owned())).collect::<Result<Vec<_>>>()?;
+            needs.insert(text_of(&node, "id")?.to_owned(), ids);
             let needed = needed.iter().filter(is_built).map(|dep| Ok(text_of(dep, "pkg")?.to_owned()));
             built_of.insert(text_of(&node, "id")?.to_owned(), needed.collect::<Result<BTreeSet<_>>>()?);
+        }
+        let (mut used, mut open) = (BTreeSet::new(), Vec::new());
+        open.extend(array(&metadata, "workspace_members").iter().filter_map(Value::as_str).map(str::to_owned));
+        while let Some(id) = open.pop() {
+            if used.insert(id.clone()) {
+                open.extend(needs.get(&id).into_iter().flatten().cloned());
+            }
         }
         let lock = fs::read_to_string(workspace.root.join("Cargo.lock")).context("Cargo.lock")?;
         let lock: toml::Table = lock.parse().context("Cargo.lock")?;
@@ -172,7 +192,7 @@ impl Tree {
                 hashes.insert((name, version), hash);
             }
         }
-        Ok(Self { packages, built_of, hashes })
+        Ok(Self { used, packages, built_of, hashes })
     }
 
     /// CycloneDX 1.5: <https://cyclonedx.org/docs/1.5/json/>. No date and no serial number, which would differ from run to run.

@@ -9,26 +9,45 @@ use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "torture",
-    usage: "[--kills N]",
-    about: "kills runs a thousand times, turns a thousand bits over",
-    details: "Runs are killed at N random moments (1000 unless it is said) and completed again; a thousand bits of a data set in every format are turned \
-              over, one at a time, and must be found. By hand, before a release.",
+    usage: "[--kills N] [--fuzz N] [--tiny N]",
+    about: "kills runs a thousand times, turns a thousand bits over, fills a disk, makes a hundred thousand images",
+    details: "Runs are killed at N random moments (1000 unless it is said) and completed again, once on a disk that is full; a thousand bits of a data set in every format are turned \
+              over, one at a time, it is cut a hundred times and loses each of its files, and all must be found. Every field of a recipe gets whatever it cannot be. Inputs of every fuzz target are \
+              changed N times (100000). N tiny images (100000) must not need more memory than a tenth of them, and estimates of memory are held against what is needed. By \
+              hand, before a release: with these numbers it takes hours.",
     run,
 };
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let kills: u64 = match arguments.option("--kills")? {
-        Some(kills) => kills.parse().with_context(|| format!("`{kills}` is no number of kills"))?,
-        None => 1000,
+    let mut number = |name: &str, usual: u64| match arguments.option(name)? {
+        Some(text) => text.parse().with_context(|| format!("{name}: `{text}` is no number")),
+        None => Ok(usual),
     };
+    let (kills, fuzz, tiny) = (number("--kills", 1000)?, number("--fuzz", 100_000)?, number("--tiny", 100_000)?);
     arguments.finish()?;
     let test = |package: &str, suite: &str, filter: &str| {
         let mut cargo = workspace.cargo();
-        cargo.args(["test", "--package", package, "--test", suite, filter, "--", "--nocapture"]);
+        cargo.args([
+            "test",
+            "--release",
+            "--package",
+            package,
+            "--test",
+            suite,
+            filter,
+            "--",
+            "--nocapture",
+            "--include-ignored",
+        ]);
         cargo.env("PAPSYNTH_KILLS", kills.to_string()).env("PAPSYNTH_TORTURE", "1");
+        cargo.env("PAPSYNTH_FUZZ", fuzz.to_string()).env("PAPSYNTH_TINY", tiny.to_string());
         shell::run(&mut cargo)
     };
     test("papsynth-cli", "sets", "whatever_is_killed")?;
-    test("papsynth-dataset", "verifying", "every_bit")?;
+    test("papsynth-cli", "sets", "a_full_disk")?;
+    test("papsynth-dataset", "verifying", "every_")?;
+    test("papsynth-cli", "hostile", "")?;
+    test("papsynth-dataset", "corpus", "")?;
+    test("papsynth-cli", "memory", "")?;
     Ok(Outcome::Done)
 }

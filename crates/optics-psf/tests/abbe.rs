@@ -8,7 +8,7 @@ use optics_psf::{Abbe, AbbeParams, Error, Layer, Source};
 use support::{SIDE, absorbing, array, microscope, phase_object, relative, shifted, single, soft_disk, worst};
 
 fn abbe(condenser_na: f64, source: Source) -> Abbe {
-    let params = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+    let params = AbbeParams { width: SIDE, height: SIDE, source };
     Abbe::new(&microscope(condenser_na), &params).unwrap()
 }
 

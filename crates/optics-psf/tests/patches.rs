@@ -266,7 +266,7 @@ fn things_that_overlap_at_two_depths_are_within_2_percent_of_abbe() {
     for condenser_na in [0.41, 0.6] {
         let params = sampled(condenser_na);
         let source = Source::Lattice { stride: 2 };
-        let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+        let abbe = AbbeParams { width: SIDE, height: SIDE, source };
         let abbe = Abbe::new(&Microscope::new(&params).unwrap(), &abbe).unwrap();
         for depths in [[2.0, -3.0], [0.0, 3.0], [0.0, 1.0], [-1.0, 4.0], [3.0, 4.0]] {
             let layers: [Layer; 2] = [absorbing(depths[0], &disk), absorbing(depths[1], &asym)];
@@ -284,7 +284,7 @@ fn things_at_one_depth_are_best_one_patch() {
     let params = sampled(0.6);
     let imager = imager(&params);
     let source = Source::Lattice { stride: 2 };
-    let abbe = AbbeParams { width: SIDE, height: SIDE, source, ..AbbeParams::default() };
+    let abbe = AbbeParams { width: SIDE, height: SIDE, source };
     let abbe = Abbe::new(&Microscope::new(&params).unwrap(), &abbe).unwrap();
     let disc = |x, y, radius, absorbance| shifted(&soft_disk(radius, absorbance, 0.12), x, y);
     let touching = [disc(-8, 0, 1.0, 0.4), disc(8, 0, 1.0, 0.4)];

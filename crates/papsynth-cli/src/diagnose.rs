@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use papsynth::recipe::{RECIPE_VERSION, Recipe};
+use papsynth::recipe::{Number, RECIPE_VERSION, Recipe};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -91,6 +91,9 @@ fn version(table: &DeTable<'_>) -> Result<(), Vec<Fault>> {
     Err(vec![Fault { path, span: Some(node.span()), message, help: Some(help.to_owned()) }])
 }
 
+/// Strange fields of which it is said what may have been meant.
+const MOST_HELPED: usize = 64;
+
 struct Check<'c> {
     schema: &'c Schema,
     text: &'c str,
@@ -112,9 +115,11 @@ impl Check<'_> {
             path.push(name.to_owned());
             match section.field(name, kind.as_deref()) {
                 None => {
-                    let help = self.unknown_help(name, section.keys(kind.as_deref()));
+                    // Looking for what was meant takes a millisecond: of thousands of strange fields nobody reads more than the first.
+                    let is_told = self.faults.len() < MOST_HELPED;
+                    let help = is_told.then(|| self.unknown_help(name, section.keys(kind.as_deref())));
                     let message = format!("{}: there is no such field", path.join("."));
-                    self.fault(path, key.span(), message, Some(help));
+                    self.fault(path, key.span(), message, help);
                 }
                 Some(inner) => self.value(value, inner, path),
             }
@@ -149,6 +154,13 @@ impl Check<'_> {
                 let message = format!("{}: {} is {}", path.join("."), self.shown(node), type_of(node.get_ref()));
                 self.fault(path, node.span(), message, Some(help_for(section)));
             }
+            DeValue::Table(inner) if section.is_number() && is_inline(self.text, node) => {
+                let before = self.faults.len();
+                self.table(inner, section, path);
+                if self.faults.len() == before {
+                    self.distribution(node, section, path);
+                }
+            }
             DeValue::Table(inner) if section.is_table() => self.table(inner, section, path),
             DeValue::String(word) if !words.is_empty() && !words.contains(&word.as_ref()) => {
                 let message = format!("{}: `{}` is not known", path.join("."), shorten(word));
@@ -156,6 +168,23 @@ impl Check<'_> {
             }
             _ => {}
         }
+    }
+
+    /// A distribution is read by itself: in a section with a `kind`, the reader would only name the section.
+    fn distribution(&mut self, node: &Node<'_>, section: Section<'_>, path: &[String]) {
+        #[derive(serde::Deserialize)]
+        struct One {
+            #[serde(rename = "x")]
+            _x: Number,
+        }
+        const BEFORE: &str = "x = ";
+        let written = self.text.get(node.span()).unwrap_or_default();
+        let Err(error) = toml::from_str::<One>(&format!("{BEFORE}{written}")) else { return };
+        let inner = error.span().filter(|span| span.start >= BEFORE.len()).map_or(node.span(), |span| {
+            let start = node.span().start;
+            start + span.start - BEFORE.len()..start + span.end - BEFORE.len()
+        });
+        self.fault(path, inner, format!("{}: {}", path.join("."), one_line(error.message())), Some(help_for(section)));
     }
 
     fn unknown_help(&self, name: &str, keys: Vec<&str>) -> String {
@@ -266,6 +295,18 @@ fn shorten(text: &str) -> String {
         return line.to_owned();
     }
     line.chars().take(LONGEST).chain("…".chars()).collect()
+}
+
+/// A message that repeats a value of any length, such as a list: its beginning and its end, where it says what would be accepted.
+pub(crate) fn middle_left_out(text: &str) -> String {
+    /// Characters of either.
+    const KEPT: usize = 300;
+    let count = text.chars().count();
+    if count <= 2 * KEPT {
+        return text.to_owned();
+    }
+    let (begin, end): (String, String) = (text.chars().take(KEPT).collect(), text.chars().skip(count - KEPT).collect());
+    format!("{begin} … {end}")
 }
 
 fn one_line(text: &str) -> String {

@@ -2,11 +2,12 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Progress as Step, Run, Share};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Progress as Step, Run, Share};
 
 use crate::args::{Generate, LayoutArgs};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
+use crate::memory::{self, Fit, Need};
 use crate::profile::Account;
 use crate::report::{self, Progress, Start};
 use crate::setup::Setup;
@@ -19,14 +20,18 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let seed = args.engine.seed;
     let frames = args.indices();
     let count = frames.end - frames.start;
-    // A slide that cannot be drawn is found out before anything is written.
-    setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
-
+    let (layout, chosen) = args.layout.layout(frames.end);
     let share = match args.share.shard {
         Some(shards) => share::of(shards)?,
         None => Share::ALL,
     };
-    let (layout, chosen) = args.layout.layout(frames.end);
+    // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
+    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
+    let few = usize::try_from(shards).ok().filter(|shards| *shards < setup.threads);
+    let fit = fit(args, &setup, few, &layout)?;
+    // A slide that cannot be drawn is found out before anything is written.
+    setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
+
     if chosen {
         let most = LayoutArgs::MOST_IN_FOLDERS;
         exit::note(&format!(
@@ -37,13 +42,13 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let map = setup.map.as_ref();
     let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
     let dataset = Dataset::create_or_resume(&args.out, &info)?;
-    // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
-    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
-    let (at_once, threads) = match usize::try_from(shards) {
-        Ok(shards) if shards < setup.threads => (1, setup.threads_of_a_frame()),
-        _ => (setup.threads, Threads::One),
+    let at_once = fit.at_once;
+    let (threads, working) = match fit.shared {
+        true => (setup.threads_of_a_frame(), setup.threads),
+        false => (Threads::One, at_once),
     };
-    let progress = Progress::start(args, Start { dir: args.out.clone(), seed, frames: count, threads: setup.threads })?;
+    let start = Start { dir: args.out.clone(), seed, frames: count, threads: working, memory: fit.bytes };
+    let progress = Progress::start(args, start)?;
     let check = if args.verify { Check::Hashes } else { Check::Sizes };
     let run = Run { frames, share, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
     let step = |step: Step| {
@@ -72,6 +77,22 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
         Some(account) => exit::print(&account.table(setup.threads)),
         None => Ok(()),
     }
+}
+
+/// How the run goes with the memory that it may use; of `few` shards, if there are fewer than threads.
+fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, Failure> {
+    let need = Need::of(&setup.recipe.recipe, layout);
+    let (shared, at_once) = (few.is_some() && setup.threads > 1, few.map_or(setup.threads, |_| 1));
+    let budget = memory::budget(args.max_memory);
+    let Some(fit) = need.fit(at_once, shared, budget) else {
+        return Err(need.refuse(&setup.recipe.recipe, budget.unwrap_or_default(), args.max_memory.is_some()));
+    };
+    if (fit.at_once, fit.shared) != (at_once, shared) {
+        let all = setup.threads;
+        let may = memory::shown(budget.unwrap_or_default() as f64);
+        exit::note(&format!("{} of {all} threads make frames, so that they fit into {may}", fit.at_once));
+    }
+    Ok(fit)
 }
 
 /// A frame of the right size that cannot be read.

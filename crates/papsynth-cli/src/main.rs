@@ -13,6 +13,7 @@ mod interrupt;
 mod judge;
 mod learn;
 mod match_fields;
+mod memory;
 mod nearest;
 mod plan;
 mod preview;

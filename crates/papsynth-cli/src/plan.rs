@@ -11,6 +11,7 @@ use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Progress, Ru
 
 use crate::args::Plan;
 use crate::exit::{self, Complaint, Failure};
+use crate::memory;
 use crate::setup::Setup;
 
 /// Student's t for a two-sided interval of 95 %, for 1, 2, … degrees of freedom; beyond the table that of the normal distribution.
@@ -129,17 +130,10 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
     }
     let sum: u64 = samples.bytes.values().sum();
     row("on disk", size(each(sum) * frames));
-    if let Some(peak) = peak_memory() {
-        row("memory", format!("{} with one thread; about as much again for each further one", size(peak)));
+    if let Some(peak) = memory::peak() {
+        row("memory", format!("{} with one thread; about as much again for each further one", size(peak as f64)));
     }
     out
-}
-
-/// The most memory that the program has had, bytes, where the system tells.
-fn peak_memory() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok().map(|kilobytes| kilobytes * 1024.0)
 }
 
 fn size(bytes: f64) -> String {

@@ -123,7 +123,10 @@ impl RecipeFile {
         let schema = Schema::new();
         let (fields, heading) = match error {
             papsynth::Error::Recipe(problems) => {
-                let fields = problems.iter().map(|p| (p.field.clone(), p.to_string())).collect::<Vec<_>>();
+                let fields = problems
+                    .iter()
+                    .map(|p| (p.field.clone(), diagnose::middle_left_out(&p.to_string())))
+                    .collect::<Vec<_>>();
                 (fields, "the recipe asks for what cannot be")
             }
             papsynth::Error::Layout(_) => return Failure::input(self.complaint("layout", error.to_string())),

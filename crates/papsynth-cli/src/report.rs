@@ -10,6 +10,7 @@ use serde_json::json;
 
 use crate::args::Generate;
 use crate::exit::{self, Failure};
+use crate::memory;
 
 /// Lines that a run prints at most, however many frames it makes.
 const MOST_LINES: u64 = 100;
@@ -34,6 +35,8 @@ pub(crate) struct Start {
     pub(crate) frames: u64,
     /// Threads that work.
     pub(crate) threads: usize,
+    /// Memory that they are expected to need at most, bytes.
+    pub(crate) memory: u64,
 }
 
 /// Says how far a run is. Shared by all threads.
@@ -59,8 +62,10 @@ impl Progress {
         bar.set_style(look(""));
         bar.set_message(start.dir.display().to_string());
         if style == Style::Json {
-            let Start { dir, seed, frames, threads } = &start;
-            event(&json!({ "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads }))?;
+            let Start { dir, seed, frames, threads, memory } = &start;
+            event(&json!({
+                "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads, "memory_bytes": memory,
+            }))?;
         }
         if style == Style::Bar {
             bar.tick();
@@ -109,7 +114,9 @@ impl Progress {
     pub(crate) fn done(&self, outcome: &Outcome, share: Share) -> Result<(), Failure> {
         let (dir, Outcome { made, kept, .. }) = (&self.start.dir, outcome);
         match self.style {
-            Style::Json => event(&json!({ "event": "done", "dir": dir, "made": made, "kept": kept })),
+            Style::Json => event(&json!({
+                "event": "done", "dir": dir, "made": made, "kept": kept, "peak_memory_bytes": memory::peak(),
+            })),
             Style::Quiet => Ok(()),
             Style::Bar | Style::Lines => {
                 let (dir, frames) = (dir.display(), if *made == 1 { "frame" } else { "frames" });

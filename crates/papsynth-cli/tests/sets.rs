@@ -51,13 +51,16 @@ fn four_writers_on_the_same_shards_do_no_harm() {
     assert_eq!(root(&bench, "four", 6), root(&bench, "one", 6));
 }
 
-/// Kills at random moments, 50 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
+/// Kills at random moments of the whole run, 50 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
 #[cfg(unix)]
 #[test]
 fn whatever_is_killed_is_completed_by_the_next_run() {
     let bench = Bench::new("kills");
     let frames = format!("--quiet --threads 2 --frames 12 --format folder,webdataset --frames-per-shard 3 {TINY}");
+    #[expect(clippy::disallowed_methods, reason = "moments of a run are spread over as long as it takes here")]
+    let start = std::time::Instant::now();
     bench.good(&format!("generate --out whole {frames}"));
+    let whole = u64::try_from(start.elapsed().as_micros()).unwrap();
     let expected = root(&bench, "whole", 12);
     let kills: u64 = std::env::var("PAPSYNTH_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(50);
     let mut state = 20_261_122_u64;
@@ -67,7 +70,7 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
         loop {
             let mut child = bench.spawn(&format!("generate --out out {frames}"));
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            std::thread::sleep(std::time::Duration::from_micros((state >> 33) % 400_000));
+            std::thread::sleep(std::time::Duration::from_micros((state >> 33) % (whole * 5 / 4).max(1)));
             let ended = child.try_wait().unwrap();
             child.kill().unwrap();
             let _ = child.wait();
@@ -76,8 +79,9 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
             }
             assert!(ended.is_none(), "a run that is not killed succeeds");
             killed += 1;
-            // Every file that has its name is whole.
-            for (name, bytes) in bench.files("out") {
+            // Every file that has its name is whole; the folder itself may not be there yet.
+            let left = if bench.path("out").exists() { bench.files("out") } else { Default::default() };
+            for (name, bytes) in left {
                 let good = fs::read(bench.path("whole").join(&name));
                 let changes = ["manifest.json", "splits.csv", "README.md", "croissant.json", "contact-sheet.png"];
                 let is_whole = good.is_ok_and(|good| good == bytes) || changes.contains(&name.as_str());
@@ -93,6 +97,45 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
         fs::remove_dir_all(bench.path("out")).unwrap();
     }
     eprintln!("{killed} kills in {rounds} rounds");
+}
+
+/// A disk that is full for real, made of memory; `cargo test -- --nocapture` says where none can be made.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_leaves_nothing_partial_and_the_run_goes_on_when_there_is_room() {
+    const SCRIPT: &str = r#"
+        program=$1; shift
+        mkdir disk && mount -t tmpfs -o size=160k tmpfs disk || { echo 'no disk'; exit 0; }
+        "$program" generate --out disk/out "$@" 2> message; echo "first $?"
+        (cd disk/out && find . -type f) | while read -r name; do
+            case $name in
+                *.tmp) echo "left $name" ;;
+                ./manifest.json) ;;
+                *) cmp -s "disk/out/$name" "whole/$name" || echo "partial $name" ;;
+            esac
+        done
+        mount -o remount,size=64m disk
+        "$program" generate --out disk/out "$@"; echo "second $?"
+        "$program" verify disk/out --frames 6
+        umount disk
+    "#;
+    let bench = Bench::new("full-disk");
+    for format in ["folder", "webdataset,cellpose,qupath --frames-per-shard 2"] {
+        let words = format!("--quiet --threads 2 --frames 6 --format {format} {TINY}");
+        bench.good(&format!("generate --out whole {words}"));
+        let Some(said) = bench.script_as_root(SCRIPT, &words).filter(|said| !said.contains("no disk")) else {
+            eprintln!("left out: this system lets nobody mount a small disk");
+            return;
+        };
+        assert!(said.contains("first 74\n"), "{said}");
+        let message = fs::read_to_string(bench.path("message")).unwrap();
+        assert!(message.contains("No space left") && message.contains("disk/out"), "{message}");
+        assert!(!said.contains("partial") && !said.contains("left "), "{said}");
+        assert!(said.contains("second 0\n"), "{said}");
+        assert!(said.contains(&format!("root {}", root(&bench, "whole", 6))), "{said}");
+        fs::remove_dir_all(bench.path("whole")).unwrap();
+        fs::remove_dir(bench.path("disk")).unwrap();
+    }
 }
 
 #[test]

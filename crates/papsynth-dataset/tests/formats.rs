@@ -290,7 +290,7 @@ fn groups_of_zarr_hold_every_pixel_at_every_size_and_every_mask_whole() {
 
 #[test]
 #[cfg(not(feature = "zarr"))]
-fn a_build_without_zarr_says_so_and_never_calls_such_a_data_set_whole() {
+fn a_build_without_zarr_says_so_before_anything_is_written() {
     let scratch = Scratch::new("no-zarr");
     let says = "the format `ome-zarr` needs a build of papsynth with `--features zarr`";
     let error = begin(scratch.path(), &Layout::new([Format::OmeZarr])).unwrap_err().to_string();

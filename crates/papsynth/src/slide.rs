@@ -106,6 +106,7 @@ impl<'a> Slide<'a> {
         let key = Key { seed, index: number };
         let (population, mut empty) = Population::new(recipe, engine.model(), key).map_err(Error::Layout)?;
         empty.slide = number;
+        empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
         let spread = Spread::new(&empty, engine.lenses()).map_err(Error::Layout)?;
         let border_px = spread.of_picture_px() as i64;
         let reach_px = recipe.scan.reach_um / empty.view.pixel_um;

@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn paddings_and_their_grids() {
         let grid = |padding, spectrum| {
-            let params = FieldParams { width: 200, height: 61, spectrum, padding, ..FieldParams::default() };
+            let params = FieldParams { width: 200, height: 61, spectrum, padding };
             params.grid().unwrap()
         };
         let gaussian = Spectrum::Gaussian { sigma_px: 7.0 };

@@ -17,8 +17,7 @@ fn matern(nu: f64, length_px: f64) -> Spectrum {
 }
 
 fn periodic(width: usize, height: usize, spectrum: Spectrum) -> SpectralField {
-    SpectralField::new(&FieldParams { width, height, spectrum, padding: Padding::Periodic, ..FieldParams::default() })
-        .unwrap()
+    SpectralField::new(&FieldParams { width, height, spectrum, padding: Padding::Periodic }).unwrap()
 }
 
 /// Mean over pixels of field(x) · field(x + lag), wrapped.
@@ -50,9 +49,7 @@ fn mean_is_zero_and_variance_one() {
         (Spectrum::BROWNIAN, Padding::Periodic),
         (Spectrum::BROWNIAN, Padding::Decorrelated),
     ] {
-        let field =
-            SpectralField::new(&FieldParams { width: 96, height: 64, spectrum, padding, ..FieldParams::default() })
-                .unwrap();
+        let field = SpectralField::new(&FieldParams { width: 96, height: 64, spectrum, padding }).unwrap();
         let mut rng = rng();
         let draws: Vec<_> = (0..2000).map(|_| field.draw(&mut rng)).collect();
         let squares: Vec<_> = draws.iter().map(|f| product(f, 96, [0, 0])).collect();
@@ -162,9 +159,7 @@ fn periodic_fields_tile_and_padded_ones_do_not() {
     const SIDE: usize = 120;
     let spectrum = Spectrum::Gaussian { sigma_px: 6.0 };
     let seam = |padding| {
-        let field =
-            SpectralField::new(&FieldParams { width: SIDE, height: SIDE, spectrum, padding, ..FieldParams::default() })
-                .unwrap();
+        let field = SpectralField::new(&FieldParams { width: SIDE, height: SIDE, spectrum, padding }).unwrap();
         let mut rng = rng();
         let products: Vec<_> = (0..300)
             .map(|_| field.draw(&mut rng))
@@ -188,14 +183,8 @@ fn periodic_fields_tile_and_padded_ones_do_not() {
 fn draw_into_overwrites_with_the_same_bits() {
     for (width, height) in [(1, 1), (1, 9), (9, 1), (2, 3), (37, 29), (64, 17)] {
         for padding in [Padding::Periodic, Padding::Margin { px: 3 }] {
-            let field = SpectralField::new(&FieldParams {
-                width,
-                height,
-                spectrum: matern(1.0, 2.0),
-                padding,
-                ..FieldParams::default()
-            })
-            .unwrap();
+            let field =
+                SpectralField::new(&FieldParams { width, height, spectrum: matern(1.0, 2.0), padding }).unwrap();
             let drawn = field.draw(&mut rng());
             let mut filled = vec![f32::NAN; width * height];
             field.draw_into(&mut filled, &mut rng());

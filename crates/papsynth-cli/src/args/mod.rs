@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, Parser, Subcommand};
 use papsynth::recipe::{CameraPreset, Preset};
 
+use crate::memory::parse_size;
 pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
 pub(crate) use sets::{
     Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
@@ -148,6 +149,7 @@ Examples:
   papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
   papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
   papsynth generate my.toml --out many --frames 100000 --shard 3/20   the fourth of twenty machines
+  papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB
   papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
   papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
@@ -170,6 +172,10 @@ pub(crate) struct Generate {
     /// Read every file that is there, as `papsynth verify` does, and make anew what is wrong, instead of comparing sizes
     #[arg(long)]
     pub(crate) verify: bool,
+    /// Memory to use at most, such as 2GiB: fewer frames are made side by side if need be [default: 80 % of what is available, where the
+    /// system tells]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(crate) max_memory: Option<u64>,
     /// Say where the time went, stage by stage, and how many pixels and objects a second were made
     #[arg(long, conflicts_with = "quiet")]
     pub(crate) profile: bool,

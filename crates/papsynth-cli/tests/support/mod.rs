@@ -50,6 +50,29 @@ impl Bench {
         Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
     }
 
+    /// A run that may ask the system for so many kilobytes in all, where the system can be told to refuse more.
+    pub(crate) fn run_within(&self, kilobytes: u64, words: &str) -> Outcome {
+        if !cfg!(target_os = "linux") {
+            return self.run(words);
+        }
+        let limited = format!("ulimit -v {kilobytes} && exec \"$0\" \"$@\"");
+        let mut command = Command::new("sh");
+        command.args(["-c", &limited, env!("CARGO_BIN_EXE_papsynth")]).args(words.split_whitespace());
+        let output = command.current_dir(&self.root).stdin(Stdio::null()).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Outcome { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// What a shell script prints that may mount in a world of its own; the program is its first argument, then `words`. Nothing where nobody
+    /// may.
+    pub(crate) fn script_as_root(&self, script: &str, words: &str) -> Option<String> {
+        let mut command = Command::new("unshare");
+        command.args(["--map-root-user", "--mount", "sh", "-c", script, "sh", env!("CARGO_BIN_EXE_papsynth")]);
+        let output =
+            command.args(words.split_whitespace()).current_dir(&self.root).stdin(Stdio::null()).output().ok()?;
+        output.status.success().then(|| String::from_utf8(output.stdout).unwrap())
+    }
+
     /// A run with variables of the environment.
     pub(crate) fn run_with(&self, words: &str, variables: &[(&str, &str)]) -> Outcome {
         let output = self.command(words).envs(variables.iter().copied()).output().unwrap();
@@ -60,6 +83,11 @@ impl Bench {
     /// A run that goes on beside the test.
     pub(crate) fn spawn(&self, words: &str) -> std::process::Child {
         self.command(words).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    /// A run that goes on beside the test, and whose standard output is read.
+    pub(crate) fn spawn_heard(&self, words: &str) -> std::process::Child {
+        self.command(words).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
     }
 
     /// A run that must succeed.

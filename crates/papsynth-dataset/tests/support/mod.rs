@@ -115,6 +115,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             jpeg_quality: 0,
             jpeg_subsampling: Subsampling::Squares,
         },
+        frame: None,
         objects: Vec::new(),
     }
 }

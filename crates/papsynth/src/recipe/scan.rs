@@ -17,6 +17,8 @@ pub struct Scan {
     pub height_px: u32,
     /// Side of the square frames that the scanner's camera takes, pixels, 128 to 8192: each is lit and exposed by itself.
     pub frame_px: u32,
+    /// Share of the unevenness of the lamp (`background.illumination`) that the scanner's correction leaves, 0 to 1.
+    pub shading_left: f64,
     /// Farthest that an object's picture may reach from the object's middle, µm, 10 to 2000; what would reach further is refused.
     pub reach_um: f64,
     /// Where the material lies.
@@ -45,7 +47,7 @@ pub struct Deposit {
 
 impl Default for Scan {
     fn default() -> Self {
-        Self { width_px: 56_000, height_px: 56_000, frame_px: 2048, reach_um: 400.0, deposit: Deposit::default() }
+        Self { width_px: 56_000, height_px: 56_000, frame_px: 2048, shading_left: 0.15, reach_um: 400.0, deposit: Deposit::default() }
     }
 }
 

@@ -164,6 +164,16 @@ pub enum SceneIllumination {
     },
 }
 
+impl SceneIllumination {
+    /// The same with so much of its unevenness.
+    pub(crate) fn weakened(self, share: f64) -> Self {
+        match self {
+            Self::Border { exponent } => Self::Border { exponent: share * exponent },
+            Self::Bowl { x2, y2, top } => Self::Bowl { x2: share * x2, y2: share * y2, top },
+        }
+    }
+}
+
 impl Scene {
     /// The grid on which the slide is rendered: that of the image, or a finer one.
     #[must_use]

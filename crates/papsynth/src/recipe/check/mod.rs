@@ -88,6 +88,9 @@ fn scan(recipe: &Recipe, check: &mut Check) {
             check.add(&format!("scan.{name}"), format!("{side} is outside {low} to {high}"));
         }
     }
+    if !(0.0..=1.0).contains(&scan.shading_left) {
+        check.add("scan.shading_left", format!("{} is outside 0 to 1", scan.shading_left));
+    }
     if !(10.0..=2000.0).contains(&scan.reach_um) {
         check.add("scan.reach_um", format!("{} is outside 10 to 2000", scan.reach_um));
     }

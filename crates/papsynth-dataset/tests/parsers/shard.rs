@@ -1,0 +1,101 @@
+//! Any bytes as one of the files of a shard: of tables, COCO, GeoJSON, outlines, images, label images, tar files. The first byte says which. From
+//! 128 on the rest is the file; below, the rest is a list of changes to the file as it was written, of four bytes each.
+
+use std::fs;
+use std::sync::LazyLock;
+
+use papsynth::model::Model;
+use papsynth_dataset::read::truths;
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, ShardRecord};
+use sha2::{Digest, Sha256};
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use support::{SEED, Scratch, frame, recipe};
+
+const RECORD: &str = "shards/000000.json";
+const COCO: &str = "shards/000000.coco.json";
+
+/// A shard in every format, of a stack and an image.
+struct Shard {
+    scratch: Scratch,
+    dataset: Dataset,
+    record: ShardRecord,
+    /// Its files, by path.
+    files: Vec<(String, Vec<u8>)>,
+}
+
+fn begin() -> Shard {
+    let scratch = Scratch::new("fuzz-shard");
+    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::ALL) };
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).expect("a folder for it");
+    let mut writer = dataset.shard_writer(0).expect("a shard");
+    for frame in [frame(0, 2, 8, 1), frame(1, 1, 8, 1)] {
+        writer.begin(&frame.finished.scene).expect("a frame");
+        frame.planes.iter().for_each(|plane| writer.write_plane(plane).expect("a plane"));
+        writer.end(&frame.finished).expect("its truth");
+    }
+    writer.commit().expect("a record");
+    let record = ShardRecord::from_json(&fs::read(scratch.join(RECORD)).expect("it")).expect("a record");
+    let read = |path: &String| (path.clone(), fs::read(scratch.join(path)).expect("a file of the record"));
+    let files = record.files.iter().map(|file| read(&file.path)).collect();
+    Shard { scratch, dataset, record, files }
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Where (of 65536 parts of the file), what is done there, with which value.
+fn changes(mut bytes: Vec<u8>, list: &[u8]) -> Vec<u8> {
+    for change in list.chunks_exact(4) {
+        let at = usize::from(u16::from_le_bytes([change[0], change[1]])) * bytes.len() / 65536;
+        let (what, value) = (change[2] % 5, change[3]);
+        match what {
+            _ if bytes.is_empty() => break,
+            0 => bytes[at] = value,
+            1 => bytes[at] ^= 1 << (value % 8),
+            2 => drop(bytes.drain(at..(at + usize::from(value)).min(bytes.len()))),
+            3 => bytes.insert(at, value),
+            _ => bytes.truncate(at),
+        }
+    }
+    bytes
+}
+
+/// A file that is not what was written is found to contradict the others although its hash is right, unless it says the same.
+pub(crate) fn check(bytes: &[u8]) {
+    static SHARD: LazyLock<Shard> = LazyLock::new(begin);
+    let Shard { scratch, dataset, record, files } = &*SHARD;
+    let [which, rest @ ..] = bytes else { return };
+    let number = usize::from(*which) % files.len();
+    let (path, good) = &files[number];
+    let changed;
+    let content = match which {
+        128.. => rest,
+        _ => {
+            changed = changes(good.clone(), rest);
+            &changed
+        }
+    };
+    let mut record = record.clone();
+    (record.files[number].bytes, record.files[number].sha256) = (content.len() as u64, sha256(content));
+    record.sha256 = String::new();
+    record.sha256 = sha256(&serde_json::to_vec(&record).expect("a record is JSON"));
+    fs::write(scratch.join(path), content).expect("a file");
+    fs::write(scratch.join(RECORD), serde_json::to_vec(&record).expect("a record is JSON")).expect("a record");
+    let found = dataset.whole(0, Check::Hashes).expect("no failure of the system");
+    if found.is_some() && path == COCO {
+        assert_eq!(
+            truths(content).expect("what is found whole is read"),
+            truths(good).expect("and so is what was written")
+        );
+    }
+    // What readers take for text or a table says exactly what it said.
+    if found.is_some() && [".csv", ".txt"].iter().any(|ending| path.ends_with(ending)) {
+        assert_eq!(content, good.as_slice());
+    }
+    fs::write(scratch.join(path), good).expect("a file");
+}

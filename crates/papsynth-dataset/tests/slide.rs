@@ -1,0 +1,148 @@
+//! Slides on the disk: whoever makes them makes the same, nothing wrong goes unnoticed, and what is wrong is made again.
+
+#![cfg(feature = "zarr")]
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use papsynth::model::Model;
+use papsynth::recipe::{Preset, Recipe};
+use papsynth::truth::Group;
+use papsynth::{Engine, Inputs, Threads};
+use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
+use papsynth_dataset::{Check, Share};
+
+const SEED: u64 = 11;
+
+fn recipe() -> Recipe {
+    let mut recipe = Preset::Lbc.recipe();
+    (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (1300, 700, 512);
+    recipe.scan.deposit.radius_um = 60_000.0.into();
+    recipe
+}
+
+struct Folder(std::path::PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("papsynth-slide-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn make(path: &Path, engine: &Engine, share: Share, check: Check) -> SlideSet {
+    let slide = engine.slide(SEED, 0).unwrap();
+    let (recipe, model) = (recipe(), Model::builtin());
+    let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512 };
+    let set = SlideSet::create_or_resume(path, &slide, &info).unwrap();
+    let stop = AtomicBool::new(false);
+    let run = SlideRun { share, threads: Threads::All, check, stop: &stop };
+    assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    set
+}
+
+fn engine() -> Engine {
+    Engine::new(&recipe(), &Model::builtin(), &Inputs::default()).unwrap()
+}
+
+#[test]
+fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
+    let (one, two) = (Folder::new("one"), Folder::new("two"));
+    let engine = engine();
+    let whole = make(&one.0, &engine, Share::ALL, Check::Sizes);
+    let root = whole.finish().unwrap();
+    make(&two.0, &engine, Share { index: 1, of: 2 }, Check::Sizes);
+    let half = SlideSet::open(&two.0).unwrap();
+    let gap = half.finish().unwrap_err().to_string();
+    assert!(gap.contains("3 of 6 shards are missing") && gap.contains("0000-0000"), "{gap}");
+    make(&two.0, &engine, Share { index: 0, of: 2 }, Check::Sizes);
+    assert_eq!(half.finish().unwrap(), root);
+    // What is read back is what the engine makes, in every level.
+    let part = engine.slide(SEED, 0).unwrap().picture([100, 200], [900, 480], Threads::All).unwrap();
+    assert_eq!(whole.picture(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
+    for (group, labels) in Group::ALL.into_iter().zip(&part.labels) {
+        assert_eq!(whole.labels(group, 0, 200..680, 100..1000).unwrap(), labels.ids, "{}", group.name());
+    }
+    assert_eq!(whole.levels(), 3);
+    for level in 1..3 {
+        let [width, height] = whole.level_px(level).unwrap();
+        let [below_width, below_height] = whole.level_px(level - 1).unwrap();
+        let (found, below) = (
+            whole.picture(level, 0, 0..height, 0..width).unwrap(),
+            whole.picture(level - 1, 0, 0..below_height, 0..below_width).unwrap(),
+        );
+        let at = |x: usize, y: usize| u32::from(below[y.min(below_height - 1) * below_width + x.min(below_width - 1)]);
+        for (i, value) in found.iter().enumerate() {
+            let (x, y) = (2 * (i % width), 2 * (i / width));
+            let mean = (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1) + 2) / 4;
+            assert_eq!(u32::from(*value), mean, "{level}: {x} {y}");
+        }
+    }
+    // Another recipe does not go on here.
+    let mut other = recipe();
+    other.scan.frame_px = 256;
+    let info = SlideInfo { recipe: &other, model: &Model::builtin(), seed: SEED, shard_px: 512 };
+    let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
+    assert!(refused.to_string().contains("another recipe"), "{refused}");
+}
+
+#[test]
+fn whatever_is_wrong_is_found_and_mended() {
+    let folder = Folder::new("wrong");
+    let engine = engine();
+    let set = make(&folder.0, &engine, Share::ALL, Check::Sizes);
+    let root = set.finish().unwrap();
+    assert_eq!(set.verify().unwrap(), []);
+    let mut files = Vec::new();
+    let mut folders = vec![folder.0.clone()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).unwrap() {
+            let entry = entry.unwrap();
+            if entry.file_type().unwrap().is_dir() { folders.push(entry.path()) } else { files.push(entry.path()) }
+        }
+    }
+    files.sort();
+    assert!(files.len() > 40, "{}", files.len());
+    for (number, file) in files.iter().enumerate() {
+        let name = file.file_name().unwrap().to_string_lossy().into_owned();
+        let bytes = fs::read(file).unwrap();
+        let broken = |what: &str| {
+            // What a slide is cannot be found out without its head.
+            let found = match SlideSet::open(&folder.0) {
+                Ok(set) => set.verify().unwrap().len(),
+                Err(_) => usize::from(name == "slide.json"),
+            };
+            assert!(found > 0, "{} {what}", file.display());
+        };
+        fs::remove_file(file).unwrap();
+        broken("deleted");
+        fs::write(file, &bytes[..bytes.len() - 1]).unwrap();
+        broken("cut");
+        let mut flipped = bytes.clone();
+        let at = number * 7919 % bytes.len();
+        flipped[at] ^= 1 << (number % 8);
+        fs::write(file, &flipped).unwrap();
+        broken("flipped");
+        fs::write(file, &bytes).unwrap();
+    }
+    assert_eq!(SlideSet::open(&folder.0).unwrap().verify().unwrap(), []);
+    fs::write(folder.0.join("objects/other.csv"), "x").unwrap();
+    let found = set.verify().unwrap();
+    assert!(found.len() == 1 && !found[0].mended_by_making, "{found:?}");
+    fs::remove_file(folder.0.join("objects/other.csv")).unwrap();
+    let shard = files.iter().find(|file| file.to_string_lossy().contains("slide.ome.zarr/0/c")).unwrap();
+    let mut bytes = fs::read(shard).unwrap();
+    bytes[100] ^= 4;
+    fs::write(shard, bytes).unwrap();
+    make(&folder.0, &engine, Share::ALL, Check::Hashes);
+    assert_eq!(set.finish().unwrap(), root);
+    assert_eq!(set.verify().unwrap(), []);
+}

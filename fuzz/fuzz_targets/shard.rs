@@ -1,0 +1,6 @@
+#![no_main]
+
+#[path = "../../crates/papsynth-dataset/tests/parsers/shard.rs"]
+mod shard;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| shard::check(bytes));
