@@ -163,7 +163,8 @@ impl Bar {
         self.bar.set_position(done);
         self.bar.set_message(what.to_owned());
         if self.style == Style::Lines && is_told(done, all) {
-            let left = if done < all { format!(", about {} left", duration(self.bar.eta().as_secs())) } else { String::new() };
+            let left =
+                if done < all { format!(", about {} left", duration(self.bar.eta().as_secs())) } else { String::new() };
             let _ = writeln!(io::stderr().lock(), "{what} ({done} of {all}{left})");
         }
     }

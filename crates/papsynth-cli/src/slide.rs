@@ -40,7 +40,14 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
     let slide = open(&setup, args.engine.seed, args.slide)?;
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.refuse(&e))?;
     let middle = part.planes.len() / 2;
-    write_png(&args.out, &part.planes[middle].grey, args.size[0] as usize, slide.channels(), slide.bits(), slide.pixel_um())?;
+    write_png(
+        &args.out,
+        &part.planes[middle].grey,
+        args.size[0] as usize,
+        slide.channels(),
+        slide.bits(),
+        slide.pixel_um(),
+    )?;
     exit::print(&format!("Look at: {}\n", args.out.display()))
 }
 

@@ -47,7 +47,7 @@ pub use generate::{Outcome, Progress, Run, Share};
 pub use inspect::{Defect, Overview, inspect, shards_to_make};
 pub use layout::Layout;
 pub use picture::Picture;
+pub use picture::write_png;
 pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 pub use shard_writer::ShardWriter;
-pub use picture::write_png;
 pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};

@@ -230,6 +230,7 @@ pub fn write_png(
     bits: u32,
     pixel_um: f64,
 ) -> Result<(), crate::error::Error> {
-    let bytes = crate::write::png(levels, width, channels, bits, pixel_um).map_err(crate::error::Error::io("write", path))?;
+    let bytes =
+        crate::write::png(levels, width, channels, bits, pixel_um).map_err(crate::error::Error::io("write", path))?;
     crate::files::write_file(path, &bytes)
 }

@@ -113,7 +113,8 @@ fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
 fn records_of_impossible_frames_are_refused() {
     let (_, record) = FILES.iter().find(|(name, _)| name == "shards/000000.json").unwrap();
     let good = ShardRecord::from_json(record).unwrap();
-    let lies: [(fn(&mut ShardRecord), &str); 12] = [
+    type Lie = (fn(&mut ShardRecord), &'static str);
+    let lies: [Lie; 12] = [
         (|r| r.frames[0].width = usize::MAX, "pixels"),
         (|r| r.frames[0].height = 0, "pixels"),
         (|r| r.frames[0].height = 32_769, "pixels"),

@@ -94,9 +94,7 @@ impl<'a> Slide<'a> {
 
     fn new(engine: &'a Engine, seed: u64, number: u64) -> Result<Self, Error> {
         let recipe = engine.recipe();
-        let fail = |field: &str, message: String| {
-            Error::Recipe(vec![Problem { field: field.to_owned(), message }])
-        };
+        let fail = |field: &str, message: String| Error::Recipe(vec![Problem { field: field.to_owned(), message }]);
         if number > Self::LAST {
             return Err(fail("slide", format!("{number} is no number of a slide; expected 0 to {}", Self::LAST)));
         }
@@ -272,10 +270,8 @@ impl<'a> Slide<'a> {
         let (mut truth, objects) = rendering.on_slide(slide_px, within);
         self.engine.give_back(rendering);
         truth.objects.retain(|object| !object.kind.is_layer());
-        let labels = Group::ALL.map(|group| LabelMap {
-            width: size_px[0] as usize,
-            ids: cut.of(&truth.labels(group).ids, 1),
-        });
+        let labels =
+            Group::ALL.map(|group| LabelMap { width: size_px[0] as usize, ids: cut.of(&truth.labels(group).ids, 1) });
         let layers = cut.of(&truth.layers(), 1);
         Ok(SlidePart { origin_px, size_px, planes, labels: labels.to_vec(), layers, objects })
     }
@@ -316,8 +312,7 @@ impl<'a> Slide<'a> {
         let side = self.side_px();
         let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;
         let mut part = SlidePart::blank(origin_px, size_px, self.planes_um(), self.channels(), noise_free);
-        let frames: Vec<[u32; 2]> =
-            frames(1).flat_map(|row| frames(0).map(move |column| [column, row])).collect();
+        let frames: Vec<[u32; 2]> = frames(1).flat_map(|row| frames(0).map(move |column| [column, row])).collect();
         // Few at a time, since each takes the memory of a picture.
         for frames in frames.chunks(threads::count(threads)) {
             let inner = if frames.len() > 1 { Threads::One } else { threads };
@@ -346,13 +341,7 @@ fn too_far(object: &Object, reach_um: f64, most_um: f64) -> String {
 }
 
 impl SlidePart {
-    fn blank(
-        origin_px: [u32; 2],
-        size_px: [u32; 2],
-        planes_um: &[f64],
-        channels: usize,
-        noise_free: bool,
-    ) -> Self {
+    fn blank(origin_px: [u32; 2], size_px: [u32; 2], planes_um: &[f64], channels: usize, noise_free: bool) -> Self {
         let pixels = size_px[0] as usize * size_px[1] as usize;
         let plane = |stage_um: &f64| PartPlane {
             stage_um: *stage_um,
@@ -373,9 +362,8 @@ impl SlidePart {
     /// Takes over what it shares with another part.
     fn lay(&mut self, other: &Self, channels: usize) {
         let low = [0, 1].map(|axis| self.origin_px[axis].max(other.origin_px[axis]));
-        let high = [0, 1].map(|axis| {
-            (self.origin_px[axis] + self.size_px[axis]).min(other.origin_px[axis] + other.size_px[axis])
-        });
+        let high = [0, 1]
+            .map(|axis| (self.origin_px[axis] + self.size_px[axis]).min(other.origin_px[axis] + other.size_px[axis]));
         if low[0] >= high[0] {
             return;
         }

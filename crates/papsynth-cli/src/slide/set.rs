@@ -39,7 +39,11 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
         let [done, all] = progress.done;
         let what = if progress.kept { "was there" } else { "made" };
-        bar.say(done, all, &format!("shard {}: {} objects and parts, {what}", SlideSet::name_of(progress.at), progress.objects));
+        bar.say(
+            done,
+            all,
+            &format!("shard {}: {} objects and parts, {what}", SlideSet::name_of(progress.at), progress.objects),
+        );
     });
     bar.clear();
     let stopped = stopped.map_err(|error| match error {
@@ -78,7 +82,8 @@ pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     let findings = SlideSet::open(dir)?.verify()?;
     let there = dir.display();
     if json {
-        let list = findings.iter().map(|finding| serde_json::json!({ "path": finding.path, "message": finding.message }));
+        let list =
+            findings.iter().map(|finding| serde_json::json!({ "path": finding.path, "message": finding.message }));
         exit::print(&format!("{:#}\n", serde_json::json!({ "findings": list.collect::<Vec<_>>() })))?;
     } else if findings.is_empty() {
         exit::print(&format!("{there}: whole\n"))?;

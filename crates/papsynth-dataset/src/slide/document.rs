@@ -61,19 +61,11 @@ impl SlideSet {
     pub(super) fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let head = &self.head;
         let most = f64::from((1_u32 << head.bits) - 1);
-        let channel = |label: &str, color| Channel {
-            label: label.to_owned(),
-            color,
-            range: [0.0, most],
-            window: [0.0, most],
-        };
+        let channel =
+            |label: &str, color| Channel { label: label.to_owned(), color, range: [0.0, most], window: [0.0, most] };
         let channels = match head.channels {
             1 => vec![channel("grey", [255; 3])],
-            _ => vec![
-                channel("red", [255, 0, 0]),
-                channel("green", [0, 255, 0]),
-                channel("blue", [0, 0, 255]),
-            ],
+            _ => vec![channel("red", [255, 0, 0]), channel("green", [0, 255, 0]), channel("blue", [0, 0, 255])],
         };
         let labels = |name: &str, pyramid: &Pyramid| Labels {
             name: name.to_owned(),

@@ -221,7 +221,9 @@ impl SlideSet {
 
     fn level<'a>(&self, pyramid: &'a Pyramid, level: usize) -> Result<&'a Array, Error> {
         let levels = pyramid.levels();
-        levels.get(level).ok_or_else(|| wrong(self.path(), format!("has {} levels, and none of number {level}", levels.len())))
+        levels
+            .get(level)
+            .ok_or_else(|| wrong(self.path(), format!("has {} levels, and none of number {level}", levels.len())))
     }
 
     fn gather<T: Sample>(
@@ -273,8 +275,14 @@ impl SlideSet {
         #[expect(clippy::cast_possible_truncation, reason = "at most 8 bits are left")]
         let bytes: Vec<u8> = grey.iter().map(|grey| (grey >> shift) as u8).collect();
         let _ = height;
-        write::png(&bytes.iter().map(|grey| u16::from(*grey)).collect::<Vec<_>>(), width, self.head.channels, 8, self.head.pixel_um * f64::from(1_u32 << level))
-            .map_err(|e| wrong(self.path(), format!("thumbnail.png: {e}")))
+        write::png(
+            &bytes.iter().map(|grey| u16::from(*grey)).collect::<Vec<_>>(),
+            width,
+            self.head.channels,
+            8,
+            self.head.pixel_um * f64::from(1_u32 << level),
+        )
+        .map_err(|e| wrong(self.path(), format!("thumbnail.png: {e}")))
     }
 
     fn card(&self, objects: u64) -> String {

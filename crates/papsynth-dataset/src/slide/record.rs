@@ -90,7 +90,9 @@ impl SlideHead {
         if sides.iter().any(|side| !(1..=1 << 20).contains(side)) {
             return said(format!("sides of {sides:?} pixels; expected 1 to 1048576"));
         }
-        if !(1..=1024).contains(&head.planes_um.len()) || !matches!(head.channels, 1 | 3) || !(1..=16).contains(&head.bits)
+        if !(1..=1024).contains(&head.planes_um.len())
+            || !matches!(head.channels, 1 | 3)
+            || !(1..=16).contains(&head.bits)
         {
             let planes = head.planes_um.len();
             return said(format!("{planes} planes of {} channels of {} bits", head.channels, head.bits));

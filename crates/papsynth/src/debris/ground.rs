@@ -73,7 +73,17 @@ impl<'a> Ground<'a> {
             _ => None,
         };
         let cells = objects.iter().filter_map(place).collect();
-        Self { field, stain, size_um: view.size_um(), cells, kind: "", section: "", lies_on_glass: false, sieve: None, objects }
+        Self {
+            field,
+            stain,
+            size_um: view.size_um(),
+            cells,
+            kind: "",
+            section: "",
+            lies_on_glass: false,
+            sieve: None,
+            objects,
+        }
     }
 
     /// The same for a part of a slide.

@@ -276,7 +276,7 @@ fn hardly_anything_reaches_farther_than_it_says() {
         let mut debris = Debris::none();
         counted(&mut debris, kind, 150.0);
         let scene = draw(&debris);
-        let maker = PoolMaker::new(spectral_field::Fft::Portable).unwrap();
+        let maker = PoolMaker::new().unwrap();
         let pools = maker.make(scene.key);
         let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
         for object in &scene.objects {
@@ -286,7 +286,6 @@ fn hardly_anything_reaches_farther_than_it_says() {
             (told, most) = (told + 1, most.max(share));
             beyond += usize::from(share > 1.0);
         }
-        println!("{}: {most:.2} of what it says, {beyond} of {told} beyond", kind.name());
         // What reaches farther is cut off on slides.
         assert!(beyond * 100 <= told, "{}: {beyond} of {told}", kind.name());
         assert!(most > 0.25, "{}: {most}", kind.name());
@@ -305,7 +304,7 @@ fn hardly_a_cell_reaches_farther_than_it_says() {
         let model = Model::builtin();
         let scene = scene::draw(&recipe, &model, None, KEY).unwrap();
         let watch = crate::profile::Watch(None);
-        let studio = crate::phantom::Studio::new(&recipe, &model, spectral_field::Fft::Portable, watch).unwrap();
+        let studio = crate::phantom::Studio::new(&recipe, &model, watch).unwrap();
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
         for (object, phantom) in objects.iter().zip(crate::phantom::make(&studio, &scene, &pools, &objects).unwrap()) {
@@ -314,6 +313,5 @@ fn hardly_a_cell_reaches_farther_than_it_says() {
             beyond += usize::from(share > 1.0);
         }
     }
-    println!("{most:.2} of what they say, {beyond} of {told} beyond");
     assert!(beyond * 200 <= told && most > 0.6, "{beyond} of {told}, {most}");
 }

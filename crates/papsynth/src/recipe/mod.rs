@@ -96,7 +96,8 @@ impl Recipe {
             };
         }
         take!(
-            field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera, scan
+            field, focus, slide, layout, cells, cytoplasm, nucleus, stain, debris, background, light, optics, camera,
+            scan
         );
     }
 

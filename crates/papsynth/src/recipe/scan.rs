@@ -47,7 +47,14 @@ pub struct Deposit {
 
 impl Default for Scan {
     fn default() -> Self {
-        Self { width_px: 56_000, height_px: 56_000, frame_px: 2048, shading_left: 0.15, reach_um: 400.0, deposit: Deposit::default() }
+        Self {
+            width_px: 56_000,
+            height_px: 56_000,
+            frame_px: 2048,
+            shading_left: 0.15,
+            reach_um: 400.0,
+            deposit: Deposit::default(),
+        }
     }
 }
 

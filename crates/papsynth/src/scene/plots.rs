@@ -197,7 +197,8 @@ impl Population {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let wanted = field.draw("layout.count", count) * self.share;
-                let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, "layout.count"));
+                let further =
+                    random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, "layout.count"));
                 for cluster in 0..wanted as u64 + u64::from(further) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = radius_um.draw(&mut rng);
@@ -288,7 +289,9 @@ impl Population {
             let places = others.iter().map(|other| [0, 1].map(|axis| other.centre_um[axis] + corner[axis]));
             taken.extend(places.filter(|place| place.iter().all(|v| *v > -self.spacing_um)));
         }
-        objects.retain(|cell| cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um)));
+        objects.retain(|cell| {
+            cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um))
+        });
         let (width, height) = (PLOT_PX as usize, PLOT_PX as usize);
         let view = View { width, height, pixel_um: self.pixel_um };
         let stays = |place: [f64; 2]| {

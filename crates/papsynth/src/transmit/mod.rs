@@ -153,8 +153,14 @@ pub(crate) struct Spread {
 
 enum SpreadKind {
     /// Light of the whole picture by so many pixels, light of an object by what its lenses say.
-    BrightField { further_px: usize, groups: Vec<lights::Group> },
-    Gaussian { in_plane_px: usize, px_per_um: f64 },
+    BrightField {
+        further_px: usize,
+        groups: Vec<lights::Group>,
+    },
+    Gaussian {
+        in_plane_px: usize,
+        px_per_um: f64,
+    },
 }
 
 impl Spread {

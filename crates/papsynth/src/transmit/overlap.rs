@@ -62,7 +62,7 @@ impl Overlaps {
         which: Meets,
         threads: Threads,
     ) -> Self {
-        let boxes: Vec<Option<Window>> = 
+        let boxes: Vec<Option<Window>> =
             phantoms.iter().map(|phantom| stained(phantom, width, height, n, which)).collect();
         // Sorted by their left edges, only neighbours can meet.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();

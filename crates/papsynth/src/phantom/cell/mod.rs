@@ -135,8 +135,7 @@ fn crumple(
     let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs =
         cells.iter().zip(plans).map(|((_, body), plan)| Job { outline: &plan.outline, excess: body.detail.excess });
-    let mut streams: Vec<Stream> =
-        cells.iter().map(|(object, _)| scene.stream("cell", object, "sheet")).collect();
+    let mut streams: Vec<Stream> = cells.iter().map(|(object, _)| scene.stream("cell", object, "sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| sheet.map(Some).map_err(|e| e.to_string())).collect()
 }
