@@ -499,10 +499,11 @@ fn what_is_merged_is_made_again_and_compared() {
             String::from_utf8(files.iter().find(|(name, _)| name == "manifest.json").unwrap().1.clone()).unwrap();
         let of_no_shard = text.lines().skip(1).filter(|line| !line.contains("\"shard\":"));
         let merged: Vec<&str> = of_no_shard.map(|line| line.split('"').nth(3).unwrap()).collect();
-        let by_frame = ["coco.json", "objects.csv"];
+        let by_frame =
+            ["coco.json", "objects.csv"].into_iter().chain(cfg!(feature = "parquet").then_some("objects.parquet"));
         let always = ["README.md", "contact-sheet.png", "croissant.json", "model.json", "recipe.toml", "splits.csv"];
         assert!(always.iter().all(|name| merged.contains(name)), "{merged:?}");
-        assert!(by_frame.iter().all(|name| merged.contains(name) == (frames_per_shard == 1)), "{merged:?}");
+        assert!(by_frame.clone().all(|name| merged.contains(&name) == (frames_per_shard == 1)), "{merged:?}");
         let of = |name: &str| files.iter().find(|(n, _)| n == name).unwrap().1.as_slice();
         let mut lies: Vec<(&str, Option<Vec<u8>>)> = Vec::new();
         for &name in &merged {
@@ -521,6 +522,11 @@ fn what_is_merged_is_made_again_and_compared() {
             lies.push(lie("coco.json", "intermediate nucleus", "superficial nucleus"));
             lies.push(lie("coco.json", "\"id\":1", "\"id\":2"));
             lies.push(lie("objects.csv", "NILM", "HSIL"));
+            #[cfg(feature = "parquet")]
+            lies.push((
+                "objects.parquet",
+                Some(table_with(of("objects.parquet"), "none of this", |rows| rows.swap(0, 1))),
+            ));
         }
         for (name, bytes) in lies {
             lie_in_merged(&scratch, name, bytes.as_deref());
@@ -563,4 +569,23 @@ fn categories_are_those_of_the_recipe_everywhere() {
     let verdict = look(scratch.path());
     assert!(is_found(&verdict, "manifest.json"), "{verdict:?}");
     assert!(verdict.findings[0].message.contains("categories"), "{verdict:?}");
+}
+
+#[test]
+#[cfg(not(feature = "parquet"))]
+fn tables_that_this_build_cannot_read_are_refused_and_not_called_whole() {
+    let scratch = make("no-parquet");
+    for shard in 0..2 {
+        lie_in_record(&scratch, shard, |record| record.layout.objects_parquet = true);
+    }
+    let manifest = fs::read_to_string(scratch.join("manifest.json")).unwrap();
+    let (head, list) = manifest.split_once(",\"files\":").unwrap();
+    let (seal, flatten) = ("\"head_sha256\":\"", "\"flatten\":\"top\"");
+    let (head, _) = head.split_once(seal).unwrap();
+    assert!(head.contains(flatten));
+    let head = format!("{}{seal}", head.replace(flatten, &format!("{flatten},\"objects_parquet\":true")));
+    let hash = sha256(format!("{head}\"}}").as_bytes());
+    fs::write(scratch.join("manifest.json"), format!("{head}{hash}\",\"files\":{list}")).unwrap();
+    let error = verify(scratch.path(), None).unwrap_err().to_string();
+    assert!(error.contains("as Parquet needs a build of papsynth with `--features parquet`"), "{error}");
 }

@@ -16,7 +16,9 @@ pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
 pub(crate) use sets::{
     Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
 };
-pub(crate) use slide::{Slide, SlideFinalize, SlideMake, SlideTile, SlideVerb};
+pub(crate) use slide::{Slide, SlideTile, SlideVerb};
+#[cfg(feature = "zarr")]
+pub(crate) use slide::{SlideFinalize, SlideMake};
 use values::{camera_parser, parse_range, preset_parser};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
