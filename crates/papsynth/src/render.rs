@@ -234,6 +234,10 @@ impl Rendering {
             }
         }
         let mut objects = with_layers(objects);
+        if self.scene.frame.is_some() {
+            // What nobody counts hides nothing on a slide.
+            objects.retain(|object| !object.kind.is_layer());
+        }
         for group in Group::ALL {
             let chosen: Vec<usize> = (0..objects.len()).filter(|&i| objects[i].group() == group).collect();
             let painted: Vec<(u32, f64, &Mask)> =

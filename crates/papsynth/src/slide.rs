@@ -267,9 +267,8 @@ impl<'a> Slide<'a> {
                 at >= 0.0 && at < f64::from(size_px[axis])
             })
         };
-        let (mut truth, objects) = rendering.on_slide(slide_px, within);
+        let (truth, objects) = rendering.on_slide(slide_px, within);
         self.engine.give_back(rendering);
-        truth.objects.retain(|object| !object.kind.is_layer());
         let labels =
             Group::ALL.map(|group| LabelMap { width: size_px[0] as usize, ids: cut.of(&truth.labels(group).ids, 1) });
         let layers = cut.of(&truth.layers(), 1);

@@ -129,6 +129,10 @@ fn every_object_is_told_once_and_its_mask_is_what_labels_show() {
         row.amodal.pixels(900).for_each(|pixel| layers[pixel] += 1);
     }
     let whole = part(&engine, [0, 0], [900, 700]);
+    for row in &rows {
+        let group = papsynth::truth::Group::ALL.iter().position(|group| *group == row.group()).unwrap();
+        assert!(row.amodal.pixels(900).all(|pixel| whole.labels[group].ids[pixel] > 0), "{} {:?}", row.id, row.part);
+    }
     let inside = |pixel: usize| (250..650).contains(&(pixel % 900)) && (250..450).contains(&(pixel / 900));
     assert!((0..layers.len()).filter(|&pixel| inside(pixel)).all(|pixel| layers[pixel] == whole.layers[pixel]));
 }

@@ -141,16 +141,21 @@ impl SpectralField {
         let mut spare = vec![ZERO; height];
         let mut blocks = Vec::new();
         for (first, reaches) in (0..).step_by(LANES).zip(self.reach.chunks(LANES)) {
-            let mut block = vec![ZERO; height];
+            // The inverse transform is the forward one of the reversed sequence, of which the first comes in at the end.
+            let mut block = vec![ZERO; height + 1];
             let amplitudes = self.amplitude[first * height..].chunks(height);
             for (l, (amplitude, &reach)) in amplitudes.zip(reaches).enumerate() {
-                for ky in (0..=reach).chain((reach + 1).max(height - reach)..height) {
-                    let [re, im] = self.normal.pair(rng);
-                    // The inverse transform is the forward one of the reversed sequence.
-                    let z = &mut block[if ky == 0 { 0 } else { height - ky }];
-                    (z[0][l], z[1][l]) = (amplitude[ky] * re, amplitude[ky] * im);
-                }
+                let mut colour = |from: usize, to: usize| {
+                    let places = block[height + 1 - to..=height - from].iter_mut().rev();
+                    for (z, &a) in places.zip(&amplitude[from..to]) {
+                        let [re, im] = self.normal.pair(rng);
+                        (z[0][l], z[1][l]) = (a * re, a * im);
+                    }
+                };
+                colour(0, reach + 1);
+                colour((reach + 1).max(height - reach), height);
             }
+            block.swap_remove(0);
             self.columns.process(&mut block, &mut spare);
             for l in (0..reaches.len()).filter(|l| is_own_mirror(first + l, width)) {
                 // A real field needs a mirrored column, Z(-k) = Z*(k): the real part of its
@@ -197,15 +202,20 @@ fn gather(spectrum: &[Vec<Lanes>], columns: usize, first: usize, line: &mut [Lan
 /// Writes at most [`ROWS`] rows of `width`: real parts, then imaginary parts.
 #[multiversion(targets = "simd")]
 fn scatter(line: &[Lanes], rows: &mut [f32], width: usize) {
-    for (left, values) in (0..width).step_by(LANES).zip(line.chunks(LANES)) {
+    let (whole, rest) = line.as_chunks();
+    let mut last = [ZERO; LANES];
+    last[..rest.len()].copy_from_slice(rest);
+    for (left, values) in (0..width).step_by(LANES).zip(whole.iter().chain([&last])) {
         let mut parts = [[[0.0; LANES]; LANES]; 2];
-        for (i, value) in values.iter().enumerate() {
-            [parts[0][i], parts[1][i]] = *value;
+        for i in 0..LANES {
+            [parts[0][i], parts[1][i]] = values[i];
         }
         let parts = [transposed(&parts[0]), transposed(&parts[1])];
-        let right = width.min(left + LANES);
-        for (row, part) in rows.chunks_exact_mut(width).zip(parts.as_flattened()) {
-            row[left..right].copy_from_slice(&part[..right - left]);
+        let rows = rows.chunks_exact_mut(width).zip(parts.as_flattened());
+        if left + LANES <= width {
+            rows.for_each(|(row, part)| row[left..left + LANES].copy_from_slice(part));
+        } else {
+            rows.for_each(|(row, part)| row[left..].copy_from_slice(&part[..width - left]));
         }
     }
 }
