@@ -23,6 +23,7 @@ enum Role {
     Transforms,
     Technique,
     Engine,
+    /// Knows how a kind of file is laid out, and nothing of what is in it.
     Container,
     Dataset,
     Judge,
@@ -35,7 +36,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 20] = [
+const PLACES: [(&str, Role); 21] = [
     ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -48,6 +49,7 @@ const PLACES: [(&str, Role); 20] = [
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
     ("papsynth-zarr", Role::Container),
+    ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
     ("papsynth-study", Role::Study),

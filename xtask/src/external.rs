@@ -16,7 +16,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full]",
     about: "has other people's programs read what we write, and judge our camera",
     details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
-              Python of docs/formats runs; with --full also mlcroissant, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
+              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
               frames of the camera presets; libjpeg compresses what our JPEG did; with --full the bill of materials is held against the schema of CycloneDX, too. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
@@ -25,7 +25,7 @@ pub(crate) const CHORE: Chore = Chore {
 const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\npycocotools\nwebdataset\nshapely\n";
 
 /// Heavier ones. jsonpath-rw, which mlcroissant wants, has no wheel.
-const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\ndatasets\nopencv-python-headless\n";
+const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nopencv-python-headless\n";
 
 /// Readers of OME-Zarr; napari's reader brings the library of the format's authors along.
 const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\n";
@@ -38,7 +38,7 @@ const SMALL: [&str; 4] = ["--set", "field.width_px=400", "--set", "field.height_
 const LIGHT_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-seg,qupath";
 
 /// Those that heavy crates write.
-const HEAVY_FORMATS: &str = "ome-zarr";
+const HEAVY_FORMATS: &str = "ome-zarr,huggingface";
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let full = arguments.flag("--full");

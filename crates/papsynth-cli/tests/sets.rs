@@ -184,6 +184,16 @@ fn a_format_of_another_build_is_refused_before_anything_is_written() {
 }
 
 #[test]
+#[cfg(not(feature = "parquet"))]
+fn parquet_of_another_build_is_refused_before_anything_is_written() {
+    let bench = Bench::new("without-parquet");
+    let run = bench.run("generate --out out --frames 1 --format huggingface");
+    assert!(run.code == 2 && run.err.contains("needs a build of papsynth with `--features parquet`"), "{}", run.err);
+    assert!(!bench.path("out").exists());
+    assert!(bench.good("generate --help").out.contains("wants a build with --features parquet"));
+}
+
+#[test]
 #[cfg(feature = "zarr")]
 fn groups_of_zarr_are_made_verified_and_converted() {
     let bench = Bench::new("zarr");

@@ -45,6 +45,9 @@ pub(crate) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
     }
     row("shards/*.coco.json", "COCO, with amodal and visible masks and everything else that is known of every object");
     row("objects/*.csv", "the same as a table, without masks");
+    if dataset.layout.objects_parquet {
+        row("objects/*.parquet", "the same with types, and with amodal and visible masks as COCO's run lengths");
+    }
     row("splits.csv", "train, val and test, drawn by field and by slide (fields of a slide share stain and light)");
     row("manifest.json, shards/*.json", "every file with its size and SHA-256; `papsynth verify` checks them");
     if formats.iter().any(|format| format.is_flat()) {
@@ -77,7 +80,7 @@ pub(crate) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
             Some("csv") => "text/csv",
             Some("json") => "application/json",
             Some("tar") => "application/x-tar",
-            Some("parquet") => "application/x-parquet",
+            Some("parquet") => PARQUET,
             _ => "application/octet-stream",
         };
         json!({
@@ -85,19 +88,48 @@ pub(crate) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
             "contentSize": format!("{} B", file.bytes), "encodingFormat": encoding, "sha256": file.sha256,
         })
     };
+    // Files of many frames, each a set of its own, of which every file is named with its SHA-256 above.
+    let format_sets = dataset.layout.formats.iter().filter_map(|format| {
+        let (includes, encoding) = match format {
+            Format::Webdataset => ("webdataset/*.tar", "application/x-tar"),
+            Format::Huggingface => ("huggingface/data/*.parquet", PARQUET),
+            _ => return None,
+        };
+        Some((format.name(), includes, encoding, format.about()))
+    });
+    let table_sets = [
+        (TABLES, "objects/*.csv", "text/csv", "tables of objects, one a shard"),
+        (PARQUET_TABLES, "objects/*.parquet", PARQUET, "tables of objects with masks, one a shard"),
+    ];
+    let table_sets = table_sets.into_iter().filter(|(set, ..)| *set == TABLES || dataset.layout.objects_parquet);
+    let file_set = |(name, includes, encoding, about): (&str, &str, &str, &str)| {
+        json!({
+            "@type": "cr:FileSet", "@id": name, "name": name, "description": about, "encodingFormat": encoding, "includes": includes,
+        })
+    };
+    let distribution: Vec<Value> =
+        files.iter().map(object).chain(format_sets.chain(table_sets).map(file_set)).collect();
     let has = |name: &str| files.iter().any(|file| file.path == name);
-    let field = |set: &str, source: &str, (name, kind, about): &(&str, &str, &str)| {
+    let field = |set: &str, (source, id): (&str, &str), (name, kind, about): &(&str, &str, &str)| {
         json!({
             "@type": "cr:Field", "@id": format!("{set}/{name}"), "name": name, "description": about, "dataType": kind,
-            "source": { "fileObject": { "@id": source }, "extract": { "column": name } },
+            "source": { source: { "@id": id }, "extract": { "column": name } },
         })
     };
     let mut sets = Vec::new();
+    // Where shards hold many frames there is no table of all objects but those of the shards.
+    let objects = if has(layout::TABLE) { ("fileObject", layout::TABLE) } else { ("fileSet", TABLES) };
     for (set, source, about, fields) in [
-        ("objects", layout::TABLE, "Every object and part of a cell.", OBJECTS),
-        ("splits", layout::SPLITS, "Which split each frame falls into.", SPLITS),
+        ("objects", objects, "Every object and part of a cell.", OBJECTS),
+        ("splits", ("fileObject", layout::SPLITS), "Which split each frame falls into.", SPLITS),
+        ("frames", ("fileSet", Format::Huggingface.name()), "Size, slide and place of each frame.", FRAMES),
     ] {
-        if has(source) {
+        let (kind, name) = source;
+        let is_there = match kind {
+            "fileObject" => has(name),
+            _ => name == TABLES || dataset.layout.has(Format::Huggingface),
+        };
+        if is_there {
             let fields: Vec<Value> = fields.iter().map(|f| field(set, source, f)).collect();
             sets.push(json!({
                 "@type": "cr:RecordSet", "@id": set, "name": set, "description": about, "field": fields,
@@ -115,10 +147,25 @@ pub(crate) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
         "version": format!("{}.0.0", dataset.identity.stream_version),
         "citeAs": "Malm P, Brun A, Bengtsson E. Simulation of bright-field microscopy images depicting pap-smear specimen. \
                    Cytometry A 87 (2015) 212-226. doi:10.1002/cyto.a.22624",
-        "distribution": files.iter().map(object).collect::<Vec<_>>(),
+        "distribution": distribution,
         "recordSet": sets,
     })
 }
+
+const PARQUET: &str = "application/x-parquet";
+
+/// Names of the sets of tables.
+const TABLES: &str = "objects-csv";
+const PARQUET_TABLES: &str = "objects-parquet";
+
+const FRAMES: &[(&str, &str, &str)] = &[
+    ("index", "sc:Integer", "index of the frame"),
+    ("slide", "sc:Integer", "number of its slide"),
+    ("width", "sc:Integer", "columns"),
+    ("height", "sc:Integer", "rows"),
+    ("pixel_um", "sc:Float", "size of a pixel in micrometres"),
+    ("bits", "sc:Integer", "bits of a grey level"),
+];
 
 const OBJECTS: &[(&str, &str, &str)] = &[
     ("image", "sc:Integer", "index of the frame"),

@@ -15,10 +15,11 @@ use crate::coco::{Category, Document, Image, Info};
 use crate::dataset::Flaw;
 use crate::error::{Error, Problem};
 use crate::files::Folder;
-use crate::formats::{Field, Format, Tar, Written, tar};
+use crate::formats::{Field, Format, Shards, Tar, Written, tar};
 use crate::image_of::LIMITS;
 use crate::layout::{self, Layout};
 use crate::merge::document;
+use crate::parquet::{Frames, ObjectRows};
 use crate::read;
 use crate::record::{FrameSummary, Geometry, ShardRecord};
 use crate::shard_writer::summary;
@@ -66,7 +67,11 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
         true => Some(tar::Archive::new(BufReader::new(open()?))),
         false => None,
     };
-    let mut tar = archive.as_mut().map(|archive| Tar::new(&tar_path, archive)).transpose()?;
+    let tar = archive.as_mut().map(|archive| Tar::new(&tar_path, archive)).transpose()?;
+    let frames = layout.has(Format::Huggingface).then(|| Frames::new(folder, record.shard)).transpose()?;
+    let mut shards = Shards { tar, frames };
+    let objects = folder.inside(&layout::objects(record.shard))?;
+    let mut objects = layout.objects_parquet.then(|| ObjectRows::open(&objects)).transpose()?;
     let (mut rows, mut before) = (Vec::new(), 0);
     for (number, frame) in record.frames.iter().enumerate() {
         let truth = document.truth(frame.index).map_err(Error::input(coco))?;
@@ -74,7 +79,8 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
         let own = own_document(coco, &document, frame, &truth, record)?;
         let field = Field::new(&geometry, frame, &truth, &own, &[]);
         let written = Written::new(folder, layout, &field);
-        layout.formats.iter().try_for_each(|format| format.check(&written, tar.as_mut()))?;
+        layout.formats.iter().try_for_each(|format| format.check(&written, &mut shards))?;
+        objects.as_mut().map_or(Ok(()), |objects| objects.check(&truth, frame.index))?;
         let table = table(&truth, frame.index, number == 0)
             .map_err(|e| Error::input(csv)(Problem::Broken { format: "CSV", message: e.to_string() }))?;
         rows.extend(table);
@@ -91,7 +97,9 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
     if before != document.annotations.len() as u64 {
         return differs(coco, "it has annotations of no image".to_owned());
     }
-    tar.map_or(Ok(()), |mut tar| tar.end())?;
+    shards.tar.map_or(Ok(()), |mut tar| tar.end())?;
+    shards.frames.map_or(Ok(()), Frames::end)?;
+    objects.map_or(Ok(()), ObjectRows::end)?;
     match read::bytes(csv, LIMITS.max_file_bytes)? == rows {
         true => Ok(()),
         false => differs(csv, format!("it is not the table of {}", layout::coco(record.shard))),

@@ -11,7 +11,7 @@ use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
 use crate::generate::{Outcome, Progress};
-use crate::image_of::{LIMITS, bytes, levels, pages};
+use crate::image_of::{LIMITS, images, levels, pages};
 use crate::layout::{self, Form, Layout};
 use crate::merge::document;
 use crate::read::{self, LevelImage};
@@ -212,7 +212,9 @@ impl Source {
             return self.refuse(format!("{layout} keeps no picture of a stack with everything in focus"));
         };
         let path = self.dataset.folder.path(&name);
-        let image = LevelImage::decode(&bytes(&self.dataset, &name)?, &LIMITS).map_err(Error::input(&path))?;
+        let files = images(&self.dataset, &name)?;
+        let file = files.first().map(Vec::as_slice).unwrap_or_default();
+        let image = LevelImage::decode(file, &LIMITS).map_err(Error::input(&path))?;
         Ok(levels(image, frame.channels))
     }
 }

@@ -14,6 +14,7 @@ use crate::coco::{Category, categories};
 use crate::contents;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, is_temporary, sha256};
+use crate::formats;
 use crate::layout::{self, Layout};
 use crate::merge;
 use crate::read::{self, InputFile};
@@ -90,8 +91,8 @@ impl Dataset {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });
         }
-        if let Some(format) = layout.formats.iter().find(|format| format.needs().is_some()) {
-            return Err(format.missing(path));
+        if let Some((feature, what)) = layout.needs() {
+            return Err(formats::missing(&what, feature, path));
         }
         let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
@@ -198,7 +199,15 @@ impl Dataset {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let folder = Folder::new(path);
         let manifest = Manifest::read(&folder)?;
-        let own = [layout::RECIPE, layout::MODEL, layout::TABLE, layout::COCO, layout::SPLITS, layout::SHEET];
+        let own = [
+            layout::RECIPE,
+            layout::MODEL,
+            layout::TABLE,
+            layout::OBJECTS,
+            layout::COCO,
+            layout::SPLITS,
+            layout::SHEET,
+        ];
         let own = [own.as_slice(), &[layout::CARD, layout::CROISSANT]].concat();
         let is_map = |file: &&FileRecord| !file.path.contains('/') && !own.contains(&file.path.as_str());
         let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());

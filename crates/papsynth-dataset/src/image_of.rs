@@ -10,6 +10,7 @@ use crate::formats::Format;
 use crate::formats::ZARR_GROUP;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
+use crate::parquet;
 use crate::read::{self, LevelImage, Limits};
 use crate::record::FrameSummary;
 #[cfg(feature = "zarr")]
@@ -44,8 +45,8 @@ pub(crate) fn pages(
     mut take: impl FnMut(LevelImage) -> Result<(), Problem>,
 ) -> Result<(), Error> {
     if !name.ends_with(ZARR_GROUP) {
-        return LevelImage::pages(&bytes(dataset, name)?, &LIMITS, take)
-            .map_err(Error::input(&dataset.folder.path(name)));
+        let read = images(dataset, name)?.iter().try_for_each(|file| LevelImage::pages(file, &LIMITS, &mut take));
+        return read.map_err(Error::input(&dataset.folder.path(name)));
     }
     #[cfg(feature = "zarr")]
     return read_planes(&dataset.folder, &Geometry::of_summary(frame, dataset.identity.seed), &mut take);
@@ -64,8 +65,16 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     }
 }
 
+/// The files that make up an image of the data set: one, or one for each plane.
+pub(crate) fn images(dataset: &Dataset, name: &str) -> Result<Vec<Vec<u8>>, Error> {
+    match name.split_once(".parquet/") {
+        Some((file, image)) => parquet::images(&dataset.folder.inside(&format!("{file}.parquet"))?, image),
+        None => Ok(vec![bytes(dataset, name)?]),
+    }
+}
+
 /// The bytes of a file, or of one in a tar file of the data set.
-pub(crate) fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
+fn bytes(dataset: &Dataset, name: &str) -> Result<Vec<u8>, Error> {
     let Some((tar, entry)) = name.split_once(".tar/") else {
         return read::bytes(&dataset.folder.inside(name)?, LIMITS.max_file_bytes);
     };

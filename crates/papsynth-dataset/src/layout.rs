@@ -14,6 +14,7 @@ pub(crate) const MANIFEST: &str = "manifest.json";
 pub(crate) const RECIPE: &str = "recipe.toml";
 pub(crate) const MODEL: &str = "model.json";
 pub(crate) const TABLE: &str = "objects.csv";
+pub(crate) const OBJECTS: &str = "objects.parquet";
 pub(crate) const COCO: &str = "coco.json";
 pub(crate) const SHEET: &str = "contact-sheet.png";
 pub(crate) const CARD: &str = "README.md";
@@ -40,6 +41,9 @@ pub struct Layout {
     pub frames_per_shard: u64,
     /// What pixels show that belong to several objects, in formats that have one label a pixel.
     pub flatten: Flatten,
+    /// Whether the table of objects is also written as Parquet, with masks; wants the feature `parquet`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub objects_parquet: bool,
 }
 
 impl Default for Layout {
@@ -52,7 +56,7 @@ impl Layout {
     /// Frames of a shard of formats that keep many in a file: some hundred megabytes.
     pub const FRAMES_PER_SHARD: u64 = 256;
 
-    /// The usual layout of these formats.
+    /// The usual layout of these formats: with the feature `parquet` objects are also written as Parquet.
     #[must_use]
     pub fn new(formats: impl IntoIterator<Item = Format>) -> Self {
         let mut formats: Vec<Format> = formats.into_iter().collect();
@@ -60,7 +64,7 @@ impl Layout {
         formats.dedup();
         let many = formats.iter().any(|format| format.is_sharded());
         let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
-        Self { formats, frames_per_shard, flatten: Flatten::Top }
+        Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: crate::parquet::IS_HERE }
     }
 
     /// A layout that was read is one that can be written.
@@ -84,8 +88,16 @@ impl Layout {
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
     pub(crate) fn images_of(&self, seed: u64, shard: u64, frame: &FrameSummary) -> [Option<String>; 2] {
         let image = self.formats.first().map(|format| format.image(seed, shard, frame));
-        let mut sharp = self.formats.iter().filter_map(|format| format.all_in_focus(shard, frame.index));
+        let mut sharp = self.formats.iter().filter_map(|format| format.all_in_focus(seed, shard, frame));
         [image, (Form::of(frame.planes_um.len()) == Form::Stack).then(|| sharp.next()).flatten()]
+    }
+
+    /// The feature without which this build cannot write it, and what wants it.
+    pub(crate) fn needs(&self) -> Option<(&'static str, String)> {
+        let format = self.formats.iter().find_map(|format| Some((format.needs()?, format.title())));
+        let table = (self.objects_parquet && !crate::parquet::IS_HERE)
+            .then(|| ("parquet", "the table of objects as Parquet".to_owned()));
+        format.or(table)
     }
 
     /// Whether a format is among the data set's.
@@ -98,7 +110,8 @@ impl Layout {
 impl fmt::Display for Layout {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.formats.iter().map(|format| format.name()).collect();
-        write!(f, "{} with {} a shard, {}", names.join(","), self.frames_per_shard, self.flatten.name())
+        let table = if self.objects_parquet { ", objects also as Parquet" } else { "" };
+        write!(f, "{} with {} a shard, {}{table}", names.join(","), self.frames_per_shard, self.flatten.name())
     }
 }
 
@@ -146,6 +159,10 @@ pub(crate) fn layers(index: u64) -> String {
 
 pub(crate) fn table(shard: u64) -> String {
     format!("{TABLES}/{shard:06}.csv")
+}
+
+pub(crate) fn objects(shard: u64) -> String {
+    format!("{TABLES}/{shard:06}.parquet")
 }
 
 pub(crate) fn coco(shard: u64) -> String {

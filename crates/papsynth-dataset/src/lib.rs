@@ -17,6 +17,8 @@ mod inspect;
 mod layers;
 mod layout;
 mod merge;
+#[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
+mod parquet;
 mod picture;
 mod polygon;
 pub mod read;

@@ -1,6 +1,6 @@
 //! What is known of all frames, in one place. Only one shard is held at a time.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -10,8 +10,10 @@ use crate::coco::{Annotation, Document, Info};
 use crate::dataset::{Dataset, read_record, recorded_shards};
 use crate::error::Error;
 use crate::files::{Folder, hex};
+use crate::formats::Format;
 use crate::image_of::picture;
 use crate::layout;
+use crate::parquet;
 use crate::picture::ContactSheet;
 use crate::read;
 use crate::record::{Check, Entry, FORMAT, FORMAT_VERSION, FileRecord, ManifestHead, WRITER, broken};
@@ -35,7 +37,7 @@ pub struct Summary {
 const SHARD_FILE_BYTES: u64 = 1 << 32;
 
 /// Takes the content of a file piece by piece.
-type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + 'a;
+pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
 
 /// Does with a file of this name and content what is to be done, and says how it is.
 type Keep<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
@@ -74,7 +76,10 @@ pub(crate) fn given(dataset: &Dataset) -> impl Iterator<Item = &str> {
 /// The shards that are whole, and what their records say.
 struct Whole {
     shards: Vec<u64>,
-    tars: Vec<FileRecord>,
+    /// Files of formats that keep many frames in a file.
+    sharded: Vec<FileRecord>,
+    /// The splits by slide that frames fall into, in order.
+    splits: Vec<Split>,
     summary: Summary,
 }
 
@@ -82,7 +87,8 @@ impl Whole {
     fn find(dataset: &Dataset) -> Result<Self, Error> {
         let folder = &dataset.folder;
         let summary = Summary { frames: 0, objects: BTreeMap::new(), damaged: Vec::new(), lost_px: BTreeMap::new() };
-        let mut whole = Self { shards: Vec::new(), tars: Vec::new(), summary };
+        let mut whole = Self { shards: Vec::new(), sharded: Vec::new(), splits: Vec::new(), summary };
+        let mut splits = BTreeSet::new();
         for shard in recorded_shards(folder)? {
             let Ok(record) = dataset.whole_or_flaw(shard, Check::Sizes)? else {
                 whole.summary.damaged.push(shard);
@@ -93,9 +99,11 @@ impl Whole {
             for frame in record.frames {
                 add(&mut whole.summary.objects, frame.objects);
                 add(&mut whole.summary.lost_px, frame.lost_px);
+                splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
             }
-            whole.tars.extend(record.files.into_iter().filter(|file| file.path.ends_with(".tar")));
+            whole.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
+        whole.splits.extend(splits);
         Ok(whole)
     }
 }
@@ -103,7 +111,7 @@ impl Whole {
 /// Makes every file that follows from the shards, and lists it with those that were given.
 fn files(
     dataset: &Dataset,
-    Whole { shards, tars, summary }: &Whole,
+    Whole { shards, sharded, splits: splits_there, summary }: &Whole,
     writer: &str,
     given: Vec<FileRecord>,
     keep: &mut Keep,
@@ -114,23 +122,36 @@ fn files(
         if dataset.layout.is_by_frame() {
             merged.push(keep(layout::TABLE, &|out| tables(folder, shards, out))?);
             merged.push(keep(layout::COCO, &|out| documents(dataset, shards, out))?);
+            if dataset.layout.objects_parquet {
+                merged.push(keep(layout::OBJECTS, &|out| parquet::merge(folder, shards, out))?);
+            }
         }
         merged.push(keep(layout::SPLITS, &|out| splits(dataset, shards, out))?);
         let sheet = contact_sheet(dataset, shards)?;
         merged.push(keep(layout::SHEET, &|out| out(&sheet))?);
         let classes: Vec<String> = dataset.categories.iter().map(|category| category.name.clone()).collect();
-        for (name, bytes) in dataset.layout.formats.iter().flat_map(|format| format.shared(&classes)) {
-            merged.push(keep(&name, &|out| out(&bytes))?);
+        for format in &dataset.layout.formats {
+            for (name, bytes) in format.shared(&classes, splits_there)? {
+                merged.push(keep(&name, &|out| out(&bytes))?);
+            }
         }
         let card = card(dataset, writer, summary);
         merged.push(keep(layout::CARD, &|out| out(card.as_bytes()))?);
-        let described: Vec<FileRecord> = merged.iter().chain(tars).cloned().collect();
+        let described: Vec<FileRecord> = merged.iter().chain(sharded).cloned().collect();
         let text = serde_json::to_vec_pretty(&croissant(dataset, &described));
         let text = text.map_err(|e| Error::io("encode", &folder.path(layout::CROISSANT))(e.into()))?;
         merged.push(keep(layout::CROISSANT, &|out| out(&text))?);
     }
     merged.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(merged)
+}
+
+/// Whether a file is one of a format that keeps many frames in a file.
+fn is_sharded(path: &str) -> bool {
+    Format::ALL
+        .into_iter()
+        .filter(|format| format.is_sharded())
+        .any(|format| path.split('/').next() == Some(format.name()))
 }
 
 fn add(sums: &mut BTreeMap<String, u64>, counts: BTreeMap<String, u64>) {

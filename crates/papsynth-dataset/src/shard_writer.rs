@@ -15,6 +15,7 @@ use crate::files::Output;
 use crate::flatten::Flatten;
 use crate::formats::{Field, Place, Sink};
 use crate::layout::{self, Form};
+use crate::parquet::ObjectTable;
 use crate::record::{FORMAT_VERSION, FrameSummary, Geometry, ShardRecord, WRITER};
 use crate::table::table;
 
@@ -43,6 +44,8 @@ struct Begun {
 struct TruthFiles {
     coco: Output,
     table: Output,
+    /// The table as Parquet, if it is wanted.
+    objects: Option<ObjectTable>,
     annotations: u64,
     images: Vec<crate::coco::Image>,
 }
@@ -154,7 +157,7 @@ impl<'a> ShardWriter<'a> {
             sink.field(&field)?;
         }
         let rows = table(truth, geometry.key.index, self.done.is_empty());
-        self.truth.add(document, &rows.map_err(|e| geometry.wrong(e.to_string()))?)?;
+        self.truth.add(document, &rows.map_err(|e| geometry.wrong(e.to_string()))?, truth, geometry.key.index)?;
         self.done.push(summary);
         Ok(&self.done[self.done.len() - 1])
     }
@@ -171,8 +174,9 @@ impl<'a> ShardWriter<'a> {
         for sink in self.sinks {
             files.extend(sink.close()?);
         }
-        let [coco, table] = self.truth.end()?;
-        files.extend([coco.commit()?, table.commit()?]);
+        for pending in self.truth.end()? {
+            files.push(pending.commit()?);
+        }
         files.sort_by(|a, b| a.path.cmp(&b.path));
         let record = ShardRecord {
             version: FORMAT_VERSION,
@@ -209,10 +213,12 @@ impl TruthFiles {
         coco.bytes(b",\"licenses\":[],\"categories\":")?;
         coco.json(&dataset.categories)?;
         coco.bytes(b",\"annotations\":[")?;
-        Ok(Self { coco, table: output(layout::table(shard))?, annotations: 0, images: Vec::new() })
+        let objects = dataset.layout.objects_parquet.then(|| dataset.folder.pending(&layout::objects(shard)));
+        let objects = objects.transpose()?.map(ObjectTable::begin).transpose()?;
+        Ok(Self { coco, table: output(layout::table(shard))?, objects, annotations: 0, images: Vec::new() })
     }
 
-    fn add(&mut self, frame: Document, rows: &[u8]) -> Result<(), Error> {
+    fn add(&mut self, frame: Document, rows: &[u8], truth: &Truth, index: u64) -> Result<(), Error> {
         let before = self.annotations;
         for annotation in frame.annotations {
             self.coco.bytes(if self.annotations == 0 { b"\n" } else { b",\n" })?;
@@ -220,14 +226,17 @@ impl TruthFiles {
             self.annotations += 1;
         }
         self.images.extend(frame.images);
+        self.objects.as_mut().map_or(Ok(()), |objects| objects.add(truth, index))?;
         self.table.bytes(rows)
     }
 
-    fn end(mut self) -> Result<[crate::files::Pending; 2], Error> {
+    fn end(mut self) -> Result<Vec<crate::files::Pending>, Error> {
         self.coco.bytes(b"],\"images\":[")?;
         self.coco.json_lines(self.images.iter().map(Ok))?;
         self.coco.bytes(b"]}\n")?;
-        Ok([self.coco.into_pending()?, self.table.into_pending()?])
+        let mut ended = vec![self.coco.into_pending()?, self.table.into_pending()?];
+        ended.extend(self.objects.map(ObjectTable::end).transpose()?);
+        Ok(ended)
     }
 }
 

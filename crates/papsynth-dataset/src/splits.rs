@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 /// A part of a data set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Split {
     Train,
     Val,

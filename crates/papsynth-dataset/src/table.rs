@@ -3,56 +3,105 @@
 use papsynth::truth::{Bounds, ObjectTruth, Part, Truth};
 
 /// An object, or a part of a cell, of an image.
-struct Entry<'a> {
+pub(crate) struct Entry<'a> {
     image: u64,
     object: &'a ObjectTruth,
 }
 
-/// What a column is called, and what stands in it.
-type Column = (&'static str, fn(&Entry) -> String);
+/// What stands in a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(not(feature = "parquet"), allow(dead_code, reason = "text needs no types"))]
+pub(crate) enum Sort {
+    Id,
+    Whole,
+    WholeOrNone,
+    Number,
+    NumberOrNone,
+    Text,
+    Flag,
+    /// One a plane.
+    Numbers,
+}
 
-/// The columns: what each is called and what stands in it. A number is printed with as few digits as read back to
-/// it; lists have one value a plane, separated by semicolons.
-const COLUMNS: [Column; 28] = [
-    ("image", |e| e.image.to_string()),
-    ("id", |e| e.object.id.to_string()),
-    ("part", |e| part(e.object.part).to_owned()),
-    ("kind", |e| e.object.kind.name().to_owned()),
-    ("class", |e| e.object.class.clone()),
-    ("bethesda", |e| e.object.bethesda.clone()),
-    ("traits", |e| e.object.traits.clone()),
-    ("cluster", |e| e.object.cluster.to_string()),
-    ("centre_x_um", |e| e.object.centre_um[0].to_string()),
-    ("centre_y_um", |e| e.object.centre_um[1].to_string()),
-    ("depth_um", |e| e.object.depth_um.to_string()),
-    ("rotation_deg", |e| e.object.rotation_deg.to_string()),
-    ("stain", |e| e.object.stain.to_string()),
-    ("tint", |e| e.object.tint.to_owned()),
-    ("area_um2", |e| e.object.area_um2.to_string()),
-    ("area_px", |e| e.object.amodal.area().to_string()),
-    ("front_area_px", |e| e.object.front.area().to_string()),
-    ("bbox_x_px", |e| bounds(e, |b| b.x)),
-    ("bbox_y_px", |e| bounds(e, |b| b.y)),
-    ("bbox_width_px", |e| bounds(e, |b| b.width)),
-    ("bbox_height_px", |e| bounds(e, |b| b.height)),
-    ("centroid_x_px", |e| centroid(e, 0)),
-    ("centroid_y_px", |e| centroid(e, 1)),
-    ("truncated", |e| e.object.truncated.to_string()),
-    ("best_plane", |e| best(e).map_or_else(String::new, |plane| plane.to_string())),
-    ("best_detectability", |e| best(e).map_or_else(String::new, |plane| e.object.detectability[plane].to_string())),
-    ("defocus_um", |e| list(&e.object.defocus_um)),
-    ("detectability", |e| list(&e.object.detectability)),
+/// What stands in one place.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cell {
+    Nothing,
+    Id(u32),
+    Whole(u64),
+    Number(f64),
+    Text(String),
+    Flag(bool),
+    Numbers(Vec<f64>),
+}
+
+impl Cell {
+    /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
+    fn print(&self) -> String {
+        match self {
+            Self::Nothing => String::new(),
+            Self::Id(id) => id.to_string(),
+            Self::Whole(whole) => whole.to_string(),
+            Self::Number(number) => number.to_string(),
+            Self::Text(text) => text.clone(),
+            Self::Flag(flag) => flag.to_string(),
+            Self::Numbers(numbers) => numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(";"),
+        }
+    }
+}
+
+/// What a column is called, and what stands in it.
+type Column = (&'static str, Sort, fn(&Entry) -> Cell);
+
+/// The columns: what each is called and what stands in it.
+pub(crate) const COLUMNS: [Column; 28] = [
+    ("image", Sort::Whole, |e| Cell::Whole(e.image)),
+    ("id", Sort::Id, |e| Cell::Id(e.object.id)),
+    ("part", Sort::Text, |e| text(part(e.object.part))),
+    ("kind", Sort::Text, |e| text(e.object.kind.name())),
+    ("class", Sort::Text, |e| text(&e.object.class)),
+    ("bethesda", Sort::Text, |e| text(&e.object.bethesda)),
+    ("traits", Sort::Text, |e| text(&e.object.traits)),
+    ("cluster", Sort::Id, |e| Cell::Id(e.object.cluster)),
+    ("centre_x_um", Sort::Number, |e| Cell::Number(e.object.centre_um[0])),
+    ("centre_y_um", Sort::Number, |e| Cell::Number(e.object.centre_um[1])),
+    ("depth_um", Sort::Number, |e| Cell::Number(e.object.depth_um)),
+    ("rotation_deg", Sort::Number, |e| Cell::Number(e.object.rotation_deg)),
+    ("stain", Sort::Number, |e| Cell::Number(e.object.stain)),
+    ("tint", Sort::Text, |e| text(e.object.tint)),
+    ("area_um2", Sort::Number, |e| Cell::Number(e.object.area_um2)),
+    ("area_px", Sort::Whole, |e| Cell::Whole(e.object.amodal.area())),
+    ("front_area_px", Sort::Whole, |e| Cell::Whole(e.object.front.area())),
+    ("bbox_x_px", Sort::WholeOrNone, |e| bounds(e, |b| b.x)),
+    ("bbox_y_px", Sort::WholeOrNone, |e| bounds(e, |b| b.y)),
+    ("bbox_width_px", Sort::WholeOrNone, |e| bounds(e, |b| b.width)),
+    ("bbox_height_px", Sort::WholeOrNone, |e| bounds(e, |b| b.height)),
+    ("centroid_x_px", Sort::NumberOrNone, |e| centroid(e, 0)),
+    ("centroid_y_px", Sort::NumberOrNone, |e| centroid(e, 1)),
+    ("truncated", Sort::Flag, |e| Cell::Flag(e.object.truncated)),
+    ("best_plane", Sort::WholeOrNone, |e| best(e).map_or(Cell::Nothing, |plane| Cell::Whole(plane as u64))),
+    ("best_detectability", Sort::NumberOrNone, |e| {
+        best(e).map_or(Cell::Nothing, |plane| Cell::Number(e.object.detectability[plane]))
+    }),
+    ("defocus_um", Sort::Numbers, |e| Cell::Numbers(e.object.defocus_um.clone())),
+    ("detectability", Sort::Numbers, |e| Cell::Numbers(e.object.detectability.clone())),
 ];
+
+/// The cells of one object.
+#[cfg(feature = "parquet")]
+pub(crate) fn cells(object: &ObjectTruth, image: u64) -> impl Iterator<Item = Cell> {
+    COLUMNS.into_iter().map(move |(_, _, cell)| cell(&Entry { image, object }))
+}
 
 /// The rows of one frame, if wanted below a header, which stands even if there is no object.
 pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     if header {
-        writer.write_record(COLUMNS.map(|(name, _)| name))?;
+        writer.write_record(COLUMNS.map(|(name, _, _)| name))?;
     }
     for object in &truth.objects {
         let entry = Entry { image, object };
-        writer.write_record(COLUMNS.map(|(_, print)| print(&entry)))?;
+        writer.write_record(COLUMNS.map(|(_, _, cell)| cell(&entry).print()))?;
     }
     writer.into_inner().map_err(|e| e.into_error().into())
 }
@@ -65,20 +114,20 @@ pub(crate) fn part(part: Part) -> &'static str {
     }
 }
 
-fn bounds(entry: &Entry, side: fn(Bounds) -> u32) -> String {
-    entry.object.amodal.bounds().map_or_else(String::new, |b| side(b).to_string())
+fn text(text: &str) -> Cell {
+    Cell::Text(text.to_owned())
 }
 
-fn centroid(entry: &Entry, axis: usize) -> String {
-    entry.object.amodal.centroid().map_or_else(String::new, |c| c[axis].to_string())
+fn bounds(entry: &Entry, side: fn(Bounds) -> u32) -> Cell {
+    entry.object.amodal.bounds().map_or(Cell::Nothing, |b| Cell::Whole(side(b).into()))
+}
+
+fn centroid(entry: &Entry, axis: usize) -> Cell {
+    entry.object.amodal.centroid().map_or(Cell::Nothing, |c| Cell::Number(c[axis]))
 }
 
 /// The plane in which an object is easiest to detect; of equal ones the first.
 fn best(entry: &Entry) -> Option<usize> {
     let detectability = &entry.object.detectability;
     (0..detectability.len()).reduce(|best, i| if detectability[i] > detectability[best] { i } else { best })
-}
-
-fn list(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(";")
 }

@@ -13,6 +13,7 @@ use crate::coco::categories;
 use crate::dataset::{Dataset, Flaw, read_record, recorded_shards};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, is_temporary, sha256};
+use crate::formats::huggingface;
 use crate::layout;
 use crate::merge;
 use crate::read;
@@ -200,9 +201,9 @@ fn merged_flaws(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Resul
     let expected = merge::expected(dataset, writer, given)?;
     let mut flaws = Vec::new();
     for file in &expected {
-        // The words of the card and the bytes of a compressed picture are those of one program.
-        let is_ours =
-            writer == WRITER || ![layout::CARD, layout::CROISSANT, layout::SHEET].contains(&file.path.as_str());
+        // The words of a card and the bytes of what is compressed are those of one program.
+        let of_program = [layout::CARD, layout::CROISSANT, layout::SHEET, layout::OBJECTS, huggingface::CARD];
+        let is_ours = writer == WRITER || !of_program.contains(&file.path.as_str());
         let message = match merged.iter().find(|found| found.path == file.path) {
             Some(found) if found == file || !is_ours => continue,
             Some(_) => "is not what the shards make it",

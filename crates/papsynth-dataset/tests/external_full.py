@@ -2,13 +2,15 @@
 
 Usage: python external_full.py DIR PAGES [JAR]
 
-Needs mlcroissant, datasets, opencv-python-headless and what external_formats.py needs. JAR is the package of Bio-Formats, by
+DIR was written by a program built with the feature `parquet`, huggingface among its formats. Needs mlcroissant, datasets, pyarrow, opencv-python-headless and what external_formats.py needs. JAR is the package of Bio-Formats, by
 which Fiji and QuPath read; it runs where there is a Java. Prints a line for each check and ends with status 1 at the first
 that fails.
 """
 
 import contextlib
+import csv
 import io
+import json
 import logging
 import re
 import subprocess
@@ -18,10 +20,13 @@ from pathlib import Path
 
 import cv2
 import datasets
+import imagecodecs
 import mlcroissant
 import numpy as np
+import pyarrow.parquet as pq
 import tifffile
 from PIL import Image
+from pycocotools import mask as rle
 
 from external import check, check_manifest, equal, passed
 from external_formats import check_truth, same
@@ -38,10 +43,13 @@ def check_croissant(folder, frames):
     equal("warnings of croissant.json", unexpected, [])
     rows = list(dataset.records(record_set="splits"))
     equal("rows of splits", [row["splits/image"] for row in rows], [frame.index for frame in frames])
-    objects = [record for record in dataset.metadata.record_sets if record.name == "objects"]
-    if objects:
-        count = sum(1 for _ in dataset.records(record_set="objects"))
-        equal("rows of objects", count, sum(len(frame.objects) for frame in frames))
+    count = sum(1 for _ in dataset.records(record_set="objects"))
+    equal("rows of objects", count, sum(len(frame.objects) for frame in frames))
+    rows = sorted(dataset.records(record_set="frames"), key=lambda row: row["frames/index"])
+    sizes = [(row["frames/index"], row["frames/height"], row["frames/width"]) for row in rows]
+    equal("rows of frames", sizes, [(frame.index, *frame.shape) for frame in frames])
+    sets = {entry["@id"] for entry in json.loads((folder / "croissant.json").read_text())["distribution"] if entry["@type"] == "cr:FileSet"}
+    check({"webdataset", "huggingface"} <= sets, f"croissant.json names the sets {sets}")
     with tempfile.TemporaryDirectory() as copy:
         for name in ["croissant.json", "splits.csv"]:
             (Path(copy) / name).write_bytes((folder / name).read_bytes())
@@ -69,6 +77,94 @@ def check_datasets(folder, frames):
             labels = np.array(row["nucleus.png"]).astype(np.int64)
             same(f"nucleus.png {frame.name} by datasets", labels, frame.labels("nucleus", frame.policy))
     passed(f"webdataset: datasets reads {len(frames)} rows")
+
+
+def check_tables(folder, frames, records):
+    """The tables of objects as Parquet by pyarrow: what the CSV says, and masks that pycocotools takes."""
+    count = 0
+    names = [f"objects/{record['shard']:06}" for record in records]
+    for name in names + ["objects"] * (folder / "objects.parquet").exists():
+        table = pq.read_table(folder / f"{name}.parquet")
+        with open(folder / f"{name}.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        equal(f"rows of {name}.parquet", table.num_rows, len(rows))
+        check(table.column_names[: len(rows[0])] == list(rows[0]), f"columns of {name}.parquet: {table.column_names}")
+        by_place = {(frame.index, one.id, one.annotation["part"]): one for frame in frames for one in frame.objects}
+        for found, row in zip(table.to_pylist(), rows):
+            for key, text in row.items():
+                value = found[key]
+                if isinstance(value, list):
+                    equal(f"{key} in {name}.parquet", value, [float(v) for v in text.split(";")])
+                elif isinstance(value, bool):
+                    equal(f"{key} in {name}.parquet", str(value).lower(), text)
+                else:
+                    equal(f"{key} in {name}.parquet", value, type(value)(text) if value is not None else text or None)
+            one = by_place[found["image"], found["id"], found["part"]]
+            size = [found["image_height_px"], found["image_width_px"]]
+            for key, area, written in [("rle", "area_px", "segmentation"), ("front_rle", "front_area_px", "front")]:
+                counts = one.annotation[written]["counts"]
+                counts = counts.decode() if isinstance(counts, bytes) else counts
+                equal(f"{key} of {one.name} in {name}.parquet", found[key], counts)
+                equal(f"area of {key} of {one.name}", int(rle.area({"size": size, "counts": found[key]})), found[area])
+            count += 1
+    passed(f"objects/*.parquet: pyarrow reads {count} rows as the CSV has them, run lengths byte by byte as COCO")
+
+
+def check_huggingface(folder, frames, categories, splits):
+    """`datasets` reads the folder without a script: images, planes and objects by split."""
+    names = {"train": "train", "val": "validation", "test": "test"}
+    by_index = {frame.index: frame for frame in frames}
+    expected = {}
+    for frame in frames:
+        expected.setdefault(names[splits[frame.index]], []).append(frame.index)
+    with tempfile.TemporaryDirectory() as cache:
+        # By the card, and by the files alone.
+        files = {}
+        for path in sorted(folder.glob("huggingface/data/*.parquet")):
+            files.setdefault(path.name.split("-")[0], []).append(str(path))
+        ways = [
+            datasets.load_dataset(str(folder / "huggingface"), cache_dir=f"{cache}/card"),
+            datasets.load_dataset("parquet", data_files=files, cache_dir=f"{cache}/files"),
+        ]
+        for data in ways:
+            equal("splits of datasets", {name: part["index"] for name, part in data.items()}, expected)
+            for name, part in data.items():
+                check(isinstance(part.features["image"], datasets.Image), f"the image of {name} is {part.features['image']}")
+                classes = part.features["objects"].feature["category"].names
+                equal(f"classes of {name}", classes, [category["name"] for category in categories])
+                raw = part.cast_column("image", datasets.Image(decode=False))
+                for row, bare in zip(part, raw):
+                    check_row(row, bare, by_index[row["index"]], categories)
+    passed(f"huggingface: datasets reads {len(frames)} frames in {len(expected)} splits, pixels, areas and run lengths as elsewhere")
+
+
+def check_row(row, bare, frame, categories):
+    what = f"row of frame {frame.index}"
+    check(isinstance(row["image"], Image.Image), f"the image of {what} is {type(row['image'])}")
+    same(f"image of {what}", imagecodecs.png_decode(bare["image"]["bytes"]), frame.picture())
+    # Pillow reads 16-bit colour as 8 bits.
+    if frame.summary["bits"] <= 8 or not frame.colour:
+        same(f"image of {what} by Pillow", np.array(row["image"]), frame.picture())
+    planes = frame.stack() if frame.planes > 1 else []
+    equal(f"planes of {what}", len(row["planes"]), len(planes))
+    for plane, expected in zip(row["planes"], planes):
+        if frame.summary["bits"] <= 8:
+            same(f"plane of {what}", np.array(plane), expected)
+    for key in ["slide", "width", "height", "pixel_um", "bits", "planes_um"]:
+        equal(f"{key} of {what}", row[key], frame.summary[key])
+    equal(f"objects of {what}", len(row["objects"]), len(frame.objects))
+    for found, one in zip(row["objects"], frame.objects):
+        annotation = one.annotation
+        keys = ["part", "kind", "class", "bethesda", "traits", "cluster", "bbox", "area", "front_area", "area_um2", "depth_um", "stain", "tint", "truncated"]
+        for key in keys:
+            equal(f"{key} of {one.name} in {what}", found[key], annotation[key])
+        equal(f"id of {one.name} in {what}", found["id"], one.id)
+        equal(f"category of {one.name}", categories[found["category"]]["id"], annotation["category_id"])
+        for key, written in [("rle", "segmentation"), ("front_rle", "front")]:
+            counts = annotation[written]["counts"]
+            equal(f"{key} of {one.name} in {what}", found[key], counts.decode() if isinstance(counts, bytes) else counts)
+        area = int(rle.area({"size": list(frame.shape), "counts": found["rle"]}))
+        equal(f"area of {one.name} in {what}", area, annotation["area"])
 
 
 def check_opencv(folder, frames):
@@ -122,15 +218,18 @@ def check_pages(folder, pages):
 
 
 def main(folder, pages, jar=None):
-    _, records = check_manifest(folder)
+    manifest, records = check_manifest(folder)
     frames = check_truth(folder, records)
+    with open(folder / "splits.csv", newline="") as file:
+        splits = {int(row["image"]): row["by_slide"] for row in csv.DictReader(file)}
     check_croissant(folder, frames)
     check_datasets(folder, frames)
+    check_tables(folder, frames, records)
+    check_huggingface(folder, frames, manifest["categories"], splits)
     check_opencv(folder, frames)
     if jar is not None:
         check_bio_formats(folder, frames, jar)
-    if (folder / "objects.csv").exists():
-        check_pages(folder, pages)
+    check_pages(folder, pages)
 
 
 if __name__ == "__main__":

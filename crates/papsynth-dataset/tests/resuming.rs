@@ -89,7 +89,7 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
         fs::write(&path, bytes).unwrap();
         count += 1;
     }
-    assert_eq!(count, 9);
+    assert_eq!(count, if cfg!(feature = "parquet") { 10 } else { 9 });
     write(&dataset, 0);
     assert_eq!(contents(scratch.path()), files);
 }
@@ -256,7 +256,12 @@ fn damage_that_keeps_the_size_is_found_and_mended() {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         fs::write(&path, bytes).unwrap();
-        assert!(verify(scratch.path(), None).unwrap().findings.iter().any(|f| f.path == *name), "{name}");
+        // Of a file that the manifest names otherwise than it lies there, that file is missing.
+        let findings = verify(scratch.path(), None).unwrap().findings;
+        match name.as_str() {
+            "manifest.json" => assert!(!findings.is_empty(), "{name}"),
+            _ => assert!(findings.iter().any(|f| f.path == *name), "{name}: {findings:?}"),
+        }
         let again = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
         let made = again.generate(&engine, &run(Check::Hashes), &|_| ()).unwrap().made;
         assert_eq!(made, u64::from(name.contains('/')), "{name}");

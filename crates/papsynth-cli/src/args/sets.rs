@@ -18,9 +18,13 @@ pub(crate) struct LayoutArgs {
     /// What a pixel shows that belongs to several objects, in formats with one label a pixel
     #[arg(long, value_name = "POLICY", value_parser = flatten_parser(), default_value = Flatten::Top.name())]
     pub(crate) flatten: Flatten,
-    /// Frames that are written and made again together [default: 1; 256 with webdataset]
+    /// Frames that are written and made again together [default: 1; 256 with webdataset and huggingface]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(crate) frames_per_shard: Option<u64>,
+    /// Write the table of objects as CSV alone, not as Parquet too
+    #[cfg(feature = "parquet")]
+    #[arg(long)]
+    pub(crate) no_parquet: bool,
 }
 
 impl LayoutArgs {
@@ -34,6 +38,10 @@ impl LayoutArgs {
         let formats = if self.format.is_empty() { vec![usual] } else { self.format.clone() };
         let mut layout = Layout::new(formats);
         layout.flatten = self.flatten;
+        #[cfg(feature = "parquet")]
+        if self.no_parquet {
+            layout.objects_parquet = false;
+        }
         if let Some(frames) = self.frames_per_shard {
             layout.frames_per_shard = frames;
         }

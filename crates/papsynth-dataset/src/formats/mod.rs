@@ -7,6 +7,7 @@
 mod cellpose;
 mod flat;
 mod folder;
+pub(crate) mod huggingface;
 mod ome_tiff;
 #[cfg(feature = "zarr")]
 mod ome_zarr;
@@ -33,6 +34,7 @@ use crate::coco::Document;
 use crate::error::Error;
 use crate::files::Folder;
 use crate::layout::{self, Form, Layout};
+use crate::parquet;
 use crate::record::{FileRecord, FrameSummary, Geometry};
 use crate::splits::Split;
 use crate::write;
@@ -57,11 +59,13 @@ pub enum Format {
     Qupath,
     /// OME-Zarr groups with their labels; of builds with the feature `zarr`.
     OmeZarr,
+    /// Parquet files of many frames, as the library `datasets` reads them; of builds with the feature `parquet`.
+    Huggingface,
 }
 
 impl Format {
     /// All formats, also those that this build cannot write ([`needs`](Self::needs)).
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Folder,
         Self::Webdataset,
         Self::OmeTiff,
@@ -70,6 +74,7 @@ impl Format {
         Self::YoloSeg,
         Self::Qupath,
         Self::OmeZarr,
+        Self::Huggingface,
     ];
 
     /// The formats that this build writes and reads.
@@ -80,14 +85,22 @@ impl Format {
     /// The feature that a build must have to write and read it, if this one has it not.
     #[must_use]
     pub fn needs(self) -> Option<&'static str> {
-        (self == Self::OmeZarr && !cfg!(feature = "zarr")).then_some("zarr")
+        match self {
+            Self::OmeZarr if !cfg!(feature = "zarr") => Some("zarr"),
+            Self::Huggingface if !parquet::IS_HERE => Some("parquet"),
+            _ => None,
+        }
+    }
+
+    /// How it is called where it is missing.
+    pub(crate) fn title(self) -> String {
+        format!("the format `{}`", self.name())
     }
 
     /// What to say of a data set where a format is missing.
+    #[cfg_attr(all(feature = "zarr", feature = "parquet"), expect(dead_code, reason = "no format is missing"))]
     pub(crate) fn missing(self, path: &Path) -> Error {
-        let (name, feature) = (self.name(), self.needs().unwrap_or_default());
-        let message = format!("the format `{name}` needs a build of papsynth with `--features {feature}`");
-        Error::Folder { path: path.to_owned(), message }
+        missing(&self.title(), self.needs().unwrap_or_default(), path)
     }
 
     /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
@@ -102,6 +115,7 @@ impl Format {
             Self::YoloSeg => "yolo-seg",
             Self::Qupath => "qupath",
             Self::OmeZarr => "ome-zarr",
+            Self::Huggingface => "huggingface",
         }
     }
 
@@ -117,13 +131,14 @@ impl Format {
             Self::YoloSeg => "images/ and labels/ by split, with polygons, and data.yaml",
             Self::Qupath => "GeoJSON with nuclei within cells, beside OME-TIFF images",
             Self::OmeZarr => "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap",
+            Self::Huggingface => "Parquet shards by split for `datasets`: images, objects with masks",
         }
     }
 
     /// Whether it keeps many frames in a file.
     #[must_use]
     pub fn is_sharded(self) -> bool {
-        self == Self::Webdataset
+        matches!(self, Self::Webdataset | Self::Huggingface)
     }
 
     /// Whether it has room for one object of a group a pixel.
@@ -146,14 +161,15 @@ impl Format {
             Self::OmeZarr => Box::new(ome_zarr::Images::new(place)),
             #[cfg(not(feature = "zarr"))]
             Self::OmeZarr => return Err(self.missing(place.folder.root())),
+            Self::Huggingface => parquet::sink(place)?,
         })
     }
 
-    /// Whether the files of a frame hold what its truth says; those of a tar file follow each other in `tar`.
-    pub(crate) fn check(self, written: &Written, tar: Option<&mut Tar<'_>>) -> Result<(), Error> {
+    /// Whether the files of a frame hold what its truth says; in files of many frames they follow each other.
+    pub(crate) fn check(self, written: &Written, shards: &mut Shards<'_>) -> Result<(), Error> {
         match self {
             Self::Folder => folder::check(written),
-            Self::Webdataset => tar.map_or(Ok(()), |tar| webdataset::check(written, tar)),
+            Self::Webdataset => shards.tar.as_mut().map_or(Ok(()), |tar| webdataset::check(written, tar)),
             Self::OmeTiff => ome_tiff::check(written),
             Self::Cellpose => cellpose::check(written),
             Self::Stardist => stardist::check(written),
@@ -163,6 +179,7 @@ impl Format {
             Self::OmeZarr => ome_zarr::check(written),
             #[cfg(not(feature = "zarr"))]
             Self::OmeZarr => Err(self.missing(written.folder.root())),
+            Self::Huggingface => shards.frames.as_mut().map_or(Ok(()), |frames| frames.check(written)),
         }
     }
 
@@ -178,30 +195,45 @@ impl Format {
             Self::YoloSeg => yolo::image(Split::of_slide(seed, frame.slide), index),
             Self::Qupath => qupath::image(index),
             Self::OmeZarr => zarr_group(index),
+            Self::Huggingface => huggingface::image(seed, shard, frame, form),
         }
     }
 
     /// Where the picture of a stack with everything in focus lies, if the format has it beside the planes.
-    pub(crate) fn all_in_focus(self, shard: u64, index: u64) -> Option<String> {
+    pub(crate) fn all_in_focus(self, seed: u64, shard: u64, frame: &FrameSummary) -> Option<String> {
         match self {
-            Self::Folder => Some(layout::all_in_focus(index)),
-            Self::Webdataset => Some(webdataset::all_in_focus(shard, index)),
+            Self::Folder => Some(layout::all_in_focus(frame.index)),
+            Self::Webdataset => Some(webdataset::all_in_focus(shard, frame.index)),
+            Self::Huggingface => Some(huggingface::image(seed, shard, frame, Form::Single)),
             _ => None,
         }
     }
 
     /// Whether it has all planes of a stack, rather than its picture with everything in focus alone.
     pub(crate) fn has_planes(self) -> bool {
-        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::OmeZarr)
+        matches!(self, Self::Folder | Self::Webdataset | Self::OmeTiff | Self::OmeZarr | Self::Huggingface)
     }
 
-    /// Files that it has once in a data set.
-    pub(crate) fn shared(self, classes: &[String]) -> Vec<(String, Vec<u8>)> {
-        match self {
+    /// Files that it has once in a data set, frames of which fall into these splits by slide.
+    pub(crate) fn shared(self, classes: &[String], splits: &[Split]) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Ok(match self {
             Self::YoloSeg => vec![yolo::description(classes)],
+            Self::Huggingface => vec![parquet::card(classes, splits)?],
             _ => Vec::new(),
-        }
+        })
     }
+}
+
+/// What to say of a data set that has something which this build misses for want of a feature.
+pub(crate) fn missing(what: &str, feature: &str, path: &Path) -> Error {
+    let message = format!("{what} needs a build of papsynth with `--features {feature}`");
+    Error::Folder { path: path.to_owned(), message }
+}
+
+/// Files of many frames that are read again, frame by frame.
+pub(crate) struct Shards<'a> {
+    pub(crate) tar: Option<Tar<'a>>,
+    pub(crate) frames: Option<parquet::Frames>,
 }
 
 /// The folder of a frame that is a group of Zarr.

@@ -37,16 +37,29 @@ impl<'a> Written<'a> {
     pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
         let planes = self.field.geometry.planes_um.len();
         let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
-        self.pages(bytes, planes, seen)
+        self.pages([bytes], planes, seen)
+    }
+
+    /// The same of planes in a file each.
+    #[cfg(feature = "parquet")]
+    pub(crate) fn planes_apart<'b>(&self, files: impl IntoIterator<Item = &'b [u8]>) -> Result<(), Problem> {
+        self.pages(files, self.field.geometry.planes_um.len(), &self.planes)
     }
 
     /// The one picture of a frame, the same in every format.
-    pub(super) fn picture(&self, bytes: &[u8]) -> Result<(), Problem> {
-        self.pages(bytes, 1, &self.picture)
+    pub(crate) fn picture(&self, bytes: &[u8]) -> Result<(), Problem> {
+        self.pages([bytes], 1, &self.picture)
     }
 
-    fn pages(&self, bytes: &[u8], planes: usize, seen: &OnceCell<Vec<String>>) -> Result<(), Problem> {
-        self.compare(planes, seen, |take| LevelImage::pages(bytes, &LIMITS, take))
+    fn pages<'b>(
+        &self,
+        files: impl IntoIterator<Item = &'b [u8]>,
+        planes: usize,
+        seen: &OnceCell<Vec<String>>,
+    ) -> Result<(), Problem> {
+        self.compare(planes, seen, |take| {
+            files.into_iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut *take))
+        })
     }
 
     /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
