@@ -8,14 +8,17 @@ use anyhow::{Result, bail, ensure};
 use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
-use crate::{Chore, bench, browser, dataset, deps, equations, external, hashes, publish, shell, supply, test, wasm};
+use crate::{
+    Chore, bench, browser, covered, dataset, deps, equations, external, hashes, publish, shell, supply, test, wasm,
+};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
-    usage: "[--full]",
+    usage: "[--full | --changed]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give. All steps run even if one fails; each tells its time. Where CI \
+              readers, the study in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give; if all passes, .ci/full records what of \
+              the workspace that covers. With --changed that too, but only where it differs from what .ci/full records. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
@@ -58,8 +61,12 @@ const STEPS: [Step; 14] = [
 ];
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let full = arguments.flag("--full");
+    let (mut full, changed) = (arguments.flag("--full"), arguments.flag("--changed"));
     arguments.finish()?;
+    if changed && !full {
+        full = covered::has_changed(workspace)?;
+        println!("what --full covers {} since it last passed", if full { "has changed" } else { "has not changed" });
+    }
     let mut table = String::new();
     let mut failed = Vec::new();
     let mut total = Duration::ZERO;
@@ -82,6 +89,9 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     println!("\n{table}{:<18} {:>6.0} s", "together", total.as_secs_f64());
     if !failed.is_empty() {
         bail!("failed: {}", failed.join(", "));
+    }
+    if full {
+        covered::record(workspace)?;
     }
     Ok(Outcome::Done)
 }

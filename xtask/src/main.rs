@@ -9,6 +9,7 @@ mod arguments;
 mod bench;
 mod browser;
 mod ci;
+mod covered;
 mod dataset;
 mod deps;
 mod equations;

@@ -26,9 +26,9 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     for target in TARGETS {
         // A toolchain that came without rustup, or a machine without a network, cannot have it: everything else is still worth the while.
-        if !is_installed(target)?
-            && !(shell::answers(Command::new("rustup").args(["target", "add", target])) && is_installed(target)?)
-        {
+        let can_be_had = is_installed(target)?
+            || shell::answers(Command::new("rustup").args(["target", "add", target])) && is_installed(target)?;
+        if !can_be_had {
             return Ok(Outcome::Skipped(format!("the target {target} is not installed, and rustup cannot add it")));
         }
     }

@@ -17,7 +17,7 @@ use support::{SEED, Scratch, frame, recipe};
 const RECORD: &str = "shards/000000.json";
 const COCO: &str = "shards/000000.coco.json";
 
-/// A shard in every format, of a stack and an image.
+/// A shard in every format of this build, of a stack and an image.
 struct Shard {
     scratch: Scratch,
     dataset: Dataset,
@@ -28,7 +28,7 @@ struct Shard {
 
 fn begin() -> Shard {
     let scratch = Scratch::new("fuzz-shard");
-    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::ALL) };
+    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::built()) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).expect("a folder for it");
     let mut writer = dataset.shard_writer(0).expect("a shard");
