@@ -28,7 +28,7 @@ const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\np
 const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nopencv-python-headless\n";
 
 /// Readers of OME-Zarr; napari's reader brings the library of the format's authors along.
-const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\n";
+const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\npyarrow\n";
 
 /// Those who measure cameras.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
@@ -165,7 +165,8 @@ fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBu
 fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     let _ = std::fs::remove_dir_all(out);
     let mut cargo = workspace.cargo();
-    cargo.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features", "zarr", "--"]);
+    cargo.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features"]);
+    cargo.args([workspace::heavy_features().as_str(), "--"]);
     cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
     for place in ["x_um=200", "y_um=150", "radius_um=400"] {
         cargo.args(["--set", &format!("scan.deposit.{place}")]);

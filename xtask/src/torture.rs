@@ -9,11 +9,11 @@ use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "torture",
-    usage: "[--kills N] [--fuzz N] [--tiny N]",
-    about: "kills runs a thousand times, turns a thousand bits over, fills a disk, makes a hundred thousand images",
+    usage: "[--kills N] [--fuzz N] [--tiny N] [--windows N]",
+    about: "kills runs a thousand times, turns a thousand bits over, fills a disk, makes a hundred thousand images, cuts a slide in a thousand ways",
     details: "Runs are killed at N random moments (1000 unless it is said) and completed again, once on a disk that is full; a thousand bits of a data set in every format are turned \
               over, one at a time, it is cut a hundred times and loses each of its files, and all must be found. Every field of a recipe gets whatever it cannot be. Inputs of every fuzz target are \
-              changed N times (100000). N tiny images (100000) must not need more memory than a tenth of them, and estimates of memory are held against what is needed. By \
+              changed N times (100000). N tiny images (100000) must not need more memory than a tenth of them, and estimates of memory are held against what is needed. N windows (1000) of a slide are put together from tiles of three sizes. By \
               hand, before a release: with these numbers it takes hours.",
     run,
 };
@@ -24,6 +24,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         None => Ok(usual),
     };
     let (kills, fuzz, tiny) = (number("--kills", 1000)?, number("--fuzz", 100_000)?, number("--tiny", 100_000)?);
+    let windows = number("--windows", 1000)?;
     arguments.finish()?;
     let test = |package: &str, suite: &str, filter: &str| {
         let mut cargo = workspace.cargo();
@@ -41,6 +42,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ]);
         cargo.env("PAPSYNTH_KILLS", kills.to_string()).env("PAPSYNTH_TORTURE", "1");
         cargo.env("PAPSYNTH_FUZZ", fuzz.to_string()).env("PAPSYNTH_TINY", tiny.to_string());
+        cargo.env("PAPSYNTH_WINDOWS", windows.to_string());
         shell::run(&mut cargo)
     };
     test("papsynth-cli", "sets", "whatever_is_killed")?;
@@ -49,5 +51,6 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     test("papsynth-cli", "hostile", "")?;
     test("papsynth-dataset", "corpus", "")?;
     test("papsynth-cli", "memory", "")?;
+    test("papsynth", "slide", "windows_of_tiles")?;
     Ok(Outcome::Done)
 }

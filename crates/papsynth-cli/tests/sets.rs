@@ -56,12 +56,12 @@ fn four_writers_on_the_same_shards_do_no_harm() {
 #[test]
 fn whatever_is_killed_is_completed_by_the_next_run() {
     let bench = Bench::new("kills");
-    let frames = format!("--quiet --threads 2 --frames 12 --format folder,webdataset --frames-per-shard 3 {TINY}");
+    let frames = format!("--quiet --threads 2 --frames 6 --format folder,webdataset --frames-per-shard 2 {TINY}");
     #[expect(clippy::disallowed_methods, reason = "moments of a run are spread over as long as it takes here")]
     let start = std::time::Instant::now();
     bench.good(&format!("generate --out whole {frames}"));
     let whole = u64::try_from(start.elapsed().as_micros()).unwrap();
-    let expected = root(&bench, "whole", 12);
+    let expected = root(&bench, "whole", 6);
     let kills: u64 = std::env::var("PAPSYNTH_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(50);
     let mut state = 20_261_122_u64;
     let (mut killed, mut rounds) = (0, 0);
@@ -93,7 +93,7 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
             }
         }
         bench.good("clean out");
-        assert_eq!(root(&bench, "out", 12), expected, "round {rounds}");
+        assert_eq!(root(&bench, "out", 6), expected, "round {rounds}");
         fs::remove_dir_all(bench.path("out")).unwrap();
     }
     eprintln!("{killed} kills in {rounds} rounds");
@@ -190,7 +190,10 @@ fn parquet_of_another_build_is_refused_before_anything_is_written() {
     let run = bench.run("generate --out out --frames 1 --format huggingface");
     assert!(run.code == 2 && run.err.contains("needs a build of papsynth with `--features parquet`"), "{}", run.err);
     assert!(!bench.path("out").exists());
-    assert!(bench.good("generate --help").out.contains("wants a build with --features parquet"));
+    // Lines of the help break anywhere.
+    let help = bench.good("generate --help").out;
+    let words: Vec<&str> = help.split_whitespace().collect();
+    assert!(words.join(" ").contains("(wants a build with --features parquet)"), "{help}");
 }
 
 #[test]

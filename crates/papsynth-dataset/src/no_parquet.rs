@@ -10,6 +10,8 @@ use crate::files::{Folder, Pending};
 use crate::formats::{Format, Place, Sink, Written, huggingface, missing};
 use crate::merge;
 use crate::splits::Split;
+#[cfg(feature = "zarr")]
+use crate::table::{Cell, Sort};
 
 pub(crate) const IS_HERE: bool = false;
 
@@ -31,6 +33,15 @@ pub(crate) fn merge(folder: &Folder, _: &[u64], _: &mut merge::Sink) -> Result<(
 
 pub(crate) fn card(_: &[String], _: &[Split]) -> Result<(String, Vec<u8>), Error> {
     Err(Format::Huggingface.missing(Path::new(huggingface::CARD)))
+}
+
+#[cfg(feature = "zarr")]
+pub(crate) fn write_cells<R: Iterator<Item = Cell>>(
+    pending: &Pending,
+    _: &[(&'static str, Sort)],
+    _: impl Iterator<Item = R>,
+) -> Result<(), Error> {
+    table(pending.path())
 }
 
 /// A table that is not written.

@@ -12,6 +12,8 @@ use papsynth_parquet::{Limits, Reader};
 
 pub(crate) use features::card;
 pub(crate) use frames::{Frames, images, sink};
+#[cfg(feature = "zarr")]
+pub(crate) use objects::write_cells;
 pub(crate) use objects::{ObjectRows, ObjectTable, merge};
 
 use crate::error::{Error, Problem};

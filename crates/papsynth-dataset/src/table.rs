@@ -37,7 +37,7 @@ pub(crate) enum Cell {
 
 impl Cell {
     /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
-    fn print(&self) -> String {
+    pub(crate) fn print(&self) -> String {
         match self {
             Self::Nothing => String::new(),
             Self::Id(id) => id.to_string(),
@@ -114,7 +114,7 @@ pub(crate) fn part(part: Part) -> &'static str {
     }
 }
 
-fn text(text: &str) -> Cell {
+pub(crate) fn text(text: &str) -> Cell {
     Cell::Text(text.to_owned())
 }
 

@@ -1,4 +1,4 @@
-"""Has a whole slide read by zarr-python, tensorstore, ome-zarr-models, pycocotools and shapely: every pixel of every level, every mask.
+"""Has a whole slide read by zarr-python, tensorstore, ome-zarr-models, pyarrow, pycocotools and shapely: every pixel of every level, every mask.
 
 Usage: python external_slide.py DIR PAGE
 
@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow.dataset
 import tensorstore
 import zarr
 from ome_zarr_models.v05.image import Image
@@ -28,6 +29,30 @@ def half(values):
     rows, columns = values.shape
     values = np.pad(values.astype(np.int64), [(0, rows % 2), (0, columns % 2)], mode="edge")
     return sum(values[y::2, x::2] for y in (0, 1) for x in (0, 1)) + 2 >> 2
+
+
+def read_table(folder):
+    """Every value of the Parquet tables is that of the CSV beside it."""
+    count = 0
+    for path in sorted(folder.glob("*.parquet")):
+        typed = pyarrow.dataset.dataset(path, format="parquet").to_table().to_pylist()
+        with path.with_suffix(".csv").open() as file:
+            texts = list(csv.DictReader(file))
+        check(len(typed) == len(texts), "as many rows")
+        for values, row in zip(typed, texts):
+            check(list(values) == list(row), "the same columns")
+            for name, value in values.items():
+                if isinstance(value, float):
+                    same = value == float(row[name])
+                elif isinstance(value, list):
+                    same = value == [float(number) for number in row[name].split(";")]
+                else:
+                    same = row[name] == {None: "", True: "true", False: "false"}.get(value, str(value))
+                check(same, f"{name} is the same in both tables")
+        count += len(typed)
+    whole = pyarrow.dataset.dataset([str(path) for path in folder.glob("*.parquet")])
+    check(count == whole.count_rows() > 0, "the files are one table")
+    return count
 
 
 def main(folder, page):
@@ -48,6 +73,8 @@ def main(folder, page):
         for above, below in zip(arrays, arrays[1:]):
             check(np.array_equal(above[::2, ::2], below), f"a level of {name} is every other pixel of the one before")
         labels[name] = arrays[0]
+    rows = read_table(folder / "objects")
+    passed(f"pyarrow: {rows} rows with the values of the CSV")
     layers = np.zeros(labels["layers"].shape, dtype=np.int64)
     told, outlines = {}, {}
     for table in sorted((folder / "objects").glob("*.csv")):

@@ -38,10 +38,14 @@ impl Drop for Folder {
     }
 }
 
+fn info<'a>(recipe: &'a Recipe, model: &'a Model) -> SlideInfo<'a> {
+    SlideInfo { recipe, model, seed: SEED, shard_px: 512, objects_parquet: cfg!(feature = "parquet") }
+}
+
 fn make(path: &Path, engine: &Engine, share: Share, check: Check) -> SlideSet {
     let slide = engine.slide(SEED, 0).unwrap();
     let (recipe, model) = (recipe(), Model::builtin());
-    let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512 };
+    let info = info(&recipe, &model);
     let set = SlideSet::create_or_resume(path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
     let run = SlideRun { share, threads: Threads::All, check, stop: &stop };
@@ -89,7 +93,8 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
     // Another recipe does not go on here.
     let mut other = recipe();
     other.scan.frame_px = 256;
-    let info = SlideInfo { recipe: &other, model: &Model::builtin(), seed: SEED, shard_px: 512 };
+    let model = Model::builtin();
+    let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
     assert!(refused.to_string().contains("another recipe"), "{refused}");
 }

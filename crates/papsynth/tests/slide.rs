@@ -93,6 +93,51 @@ fn a_part_is_that_part_whatever_its_size_and_the_slides() {
     assert_eq!(of_larger.labels, of_smaller.labels);
 }
 
+/// Random windows, each put together from tiles of one of three sizes, in any order: as many as `PAPSYNTH_WINDOWS` says.
+#[test]
+fn windows_of_tiles_are_that_part() {
+    const TILES_PX: [u32; 3] = [61, 128, 300];
+    let count: u64 = std::env::var("PAPSYNTH_WINDOWS").ok().and_then(|n| n.parse().ok()).unwrap_or(6);
+    let mut recipe = recipe();
+    recipe.scan.frame_px = 128;
+    let engine = engine(&recipe);
+    let slide = engine.slide(7, 1).unwrap();
+    let whole = slide.picture([0, 0], slide.size_px(), Threads::All).unwrap();
+    let mut numbers = 0x5EED_u64;
+    let mut below = |end: u32| {
+        numbers = numbers.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        u32::try_from((numbers >> 33) % u64::from(end)).unwrap()
+    };
+    for window in 0..count {
+        let side = TILES_PX[usize::try_from(window % 3).unwrap()];
+        let size = [1 + below(400), 1 + below(400)];
+        let origin = [below(901 - size[0]), below(701 - size[1])];
+        let mut tiles: Vec<[u32; 2]> =
+            (0..size[1].div_ceil(side)).flat_map(|row| (0..size[0].div_ceil(side)).map(move |c| [c, row])).collect();
+        let turn = below(u32::try_from(tiles.len()).unwrap()) as usize;
+        tiles.rotate_left(turn);
+        for tile in tiles {
+            let corner = [0, 1].map(|axis| origin[axis] + tile[axis] * side);
+            let size = [0, 1].map(|axis| side.min(origin[axis] + size[axis] - corner[axis]));
+            let alone = slide.picture(corner, size, Threads::All).unwrap();
+            for (y, line) in (corner[1]..corner[1] + size[1]).zip((0..).step_by(size[0] as usize)) {
+                let (here, there) = (line..line + size[0] as usize, (y * 900 + corner[0]) as usize);
+                let there = there..there + size[0] as usize;
+                assert_eq!(
+                    alone.planes[0].grey[here.clone()],
+                    whole.planes[0].grey[there.clone()],
+                    "{window} {corner:?}"
+                );
+                assert_eq!(alone.layers[here.clone()], whole.layers[there.clone()], "{window} {corner:?}");
+                for (labels, of_whole) in alone.labels.iter().zip(&whole.labels) {
+                    assert_eq!(labels.ids[here.clone()], of_whole.ids[there.clone()], "{window} {corner:?}");
+                }
+            }
+        }
+    }
+    eprintln!("{count} windows");
+}
+
 #[test]
 fn threads_and_order_change_nothing() {
     let recipe = recipe();

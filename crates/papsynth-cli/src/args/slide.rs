@@ -55,6 +55,10 @@ pub(crate) struct SlideMake {
     /// Side of the squares that are written and made again together, px
     #[arg(long, value_name = "PX", default_value = "4096", value_parser = ["512", "1024", "2048", "4096", "8192"])]
     pub(crate) shard_px: String,
+    /// Write tables of objects as CSV alone, not as Parquet too
+    #[cfg(feature = "parquet")]
+    #[arg(long)]
+    pub(crate) no_parquet: bool,
     #[command(flatten)]
     pub(crate) share: ShareArgs,
     /// Read all files of shards that are there before they are kept

@@ -30,7 +30,12 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     // One of the sizes that can be typed.
     let shard_px = args.shard_px.parse().unwrap_or(4096);
     let interrupt = Interrupt::watch()?;
-    let info = SlideInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, shard_px };
+    #[cfg(feature = "parquet")]
+    let objects_parquet = !args.no_parquet;
+    #[cfg(not(feature = "parquet"))]
+    let objects_parquet = false;
+    let (recipe, model) = (&setup.recipe.recipe, &setup.model);
+    let info = SlideInfo { recipe, model, seed, shard_px, objects_parquet };
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
     let check = if args.verify { Check::Hashes } else { Check::Sizes };

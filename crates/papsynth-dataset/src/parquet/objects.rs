@@ -16,26 +16,28 @@ use crate::table::{COLUMNS, Cell, Sort, cells};
 
 /// The columns of the CSV, size of the image, and the complete and the visible mask as COCO's run lengths.
 fn columns() -> Vec<Column> {
-    let of = |(name, sort, _): (&str, Sort, _)| {
-        let column = |kind| Column::new(name, kind);
-        match sort {
-            Sort::Id => column(Kind::U32),
-            Sort::Whole => column(Kind::I64),
-            Sort::WholeOrNone => column(Kind::I64).or_null(),
-            Sort::Number => column(Kind::F64),
-            Sort::NumberOrNone => column(Kind::F64).or_null(),
-            Sort::Text => column(Kind::Text),
-            Sort::Flag => column(Kind::Bool),
-            Sort::Numbers => column(Kind::list(Kind::F64)),
-        }
-    };
     let sizes = ["image_width_px", "image_height_px"].map(|name| Column::new(name, Kind::I64));
     let masks = ["rle", "front_rle"].map(|name| Column::new(name, Kind::Text));
-    COLUMNS.into_iter().map(of).chain(sizes).chain(masks).collect()
+    COLUMNS.into_iter().map(|(name, sort, _)| column(name, sort)).chain(sizes).chain(masks).collect()
 }
 
-fn row(truth: &Truth, object: &ObjectTruth, image: u64) -> Vec<Value> {
-    let value = |cell| match cell {
+/// A column of such cells.
+fn column(name: &str, sort: Sort) -> Column {
+    let column = |kind| Column::new(name, kind);
+    match sort {
+        Sort::Id => column(Kind::U32),
+        Sort::Whole => column(Kind::I64),
+        Sort::WholeOrNone => column(Kind::I64).or_null(),
+        Sort::Number => column(Kind::F64),
+        Sort::NumberOrNone => column(Kind::F64).or_null(),
+        Sort::Text => column(Kind::Text),
+        Sort::Flag => column(Kind::Bool),
+        Sort::Numbers => column(Kind::list(Kind::F64)),
+    }
+}
+
+fn value(cell: Cell) -> Value {
+    match cell {
         Cell::Nothing => Value::Null,
         Cell::Id(id) => id.into(),
         Cell::Whole(whole) => signed(whole),
@@ -43,11 +45,29 @@ fn row(truth: &Truth, object: &ObjectTruth, image: u64) -> Vec<Value> {
         Cell::Text(text) => text.into(),
         Cell::Flag(flag) => flag.into(),
         Cell::Numbers(numbers) => Value::List(numbers.into_iter().map(Value::F64).collect()),
-    };
+    }
+}
+
+fn row(truth: &Truth, object: &ObjectTruth, image: u64) -> Vec<Value> {
     let (width, height) = (truth.width, truth.height);
     let sizes = [width, height].map(|side| signed(side as u64));
     let masks = [&object.amodal, &object.front].map(|mask| rle::encode(mask, width, height).into());
     cells(object, image).map(value).chain(sizes).chain(masks).collect()
+}
+
+/// Writes a table of such columns.
+#[cfg(feature = "zarr")]
+pub(crate) fn write_cells<R: Iterator<Item = Cell>>(
+    pending: &Pending,
+    columns: &[(&'static str, Sort)],
+    rows: impl Iterator<Item = R>,
+) -> Result<(), Error> {
+    let columns: Vec<Column> = columns.iter().map(|&(name, sort)| column(name, sort)).collect();
+    let mut writer = begin(pending, &columns, &[])?;
+    for row in rows {
+        writer.row(row.map(value).collect()).map_err(failed("write", pending.path()))?;
+    }
+    writer.finish().map(drop).map_err(failed("write", pending.path()))
 }
 
 /// Tables have no unsigned numbers of 64 bits that everybody reads; none of ours is so large.

@@ -5,7 +5,7 @@
 //! | `slide.json` | what the slide is made from, and how it is cut |
 //! | `recipe.toml`, `model.json` | what to make it again with |
 //! | `slide.ome.zarr/` | the picture and its labels: front-most cytoplasm, nucleus and debris, and the number of layers |
-//! | `objects/ROW-COLUMN.csv`, `.geojson` | every object whose middle lies in a shard: numbers, mask, outline |
+//! | `objects/ROW-COLUMN.csv`, `.parquet`, `.geojson` | every object whose middle lies in a shard: numbers, mask, outline |
 //! | `shards/ROW-COLUMN.json` | files of a shard with sizes and hashes, written last: the shard is whole |
 //! | `upper.json` | the same of what [`SlideSet::finish`] adds: the upper levels, `thumbnail.png`, `README.md` |
 
@@ -60,6 +60,8 @@ pub struct SlideInfo<'a> {
     pub seed: u64,
     /// Side of the squares that are written and made again together, px: 512 times a power of two.
     pub shard_px: u32,
+    /// Whether tables of objects are also written as Parquet, which wants the feature `parquet`.
+    pub objects_parquet: bool,
 }
 
 /// A slide in a folder. Shards may be written in any order, by several processes; nothing outside the folder is touched.
@@ -86,7 +88,10 @@ impl SlideSet {
             recipe_sha256: sha256(recipe.as_bytes()),
             model_sha256: sha256(model.as_bytes()),
         };
-        let head = SlideHead::new(identity, slide, info.shard_px);
+        let head = SlideHead::new(identity, slide, info);
+        if info.objects_parquet && !crate::parquet::IS_HERE {
+            return Err(crate::formats::missing("the table of objects as Parquet", "parquet", path));
+        }
         let folder = Folder::new(path);
         let forms = Forms::new(&head).map_err(|message| wrong(path, message))?;
         if folder.path(HEAD).exists() {

@@ -1,42 +1,44 @@
 //! What is known of the objects of a shard: a table with their masks, and their outlines as GeoJSON.
 
-use papsynth::truth::{Mask, ObjectTruth, Part, Run};
+use papsynth::truth::{Bounds, Mask, ObjectTruth, Part, Run};
 use serde_json::{Value, json};
 
 use crate::coco::category_name;
 use crate::formats::qupath;
 use crate::rle;
+use crate::table::{Cell, Sort, part, text};
+
+/// What a column is called, and what stands in it.
+type Column = (&'static str, Sort, fn(&ObjectTruth) -> Cell);
 
 /// The columns. A mask stands in its box alone: the run lengths are those of an image of the box's size.
-type Column = (&'static str, fn(&ObjectTruth) -> String);
-
 const COLUMNS: [Column; 22] = [
-    ("id", |o| o.id.to_string()),
-    ("part", |o| crate::table::part(o.part).to_owned()),
-    ("kind", |o| o.kind.name().to_owned()),
-    ("class", |o| o.class.clone()),
-    ("bethesda", |o| o.bethesda.clone()),
-    ("traits", |o| o.traits.clone()),
-    ("cluster", |o| o.cluster.to_string()),
-    ("centre_x_um", |o| o.centre_um[0].to_string()),
-    ("centre_y_um", |o| o.centre_um[1].to_string()),
-    ("depth_um", |o| o.depth_um.to_string()),
-    ("rotation_deg", |o| o.rotation_deg.to_string()),
-    ("stain", |o| o.stain.to_string()),
-    ("tint", |o| o.tint.to_owned()),
-    ("area_um2", |o| o.area_um2.to_string()),
-    ("area_px", |o| o.amodal.area().to_string()),
-    ("truncated", |o| o.truncated.to_string()),
-    ("bbox_x_px", |o| side(o, |b| b.x)),
-    ("bbox_y_px", |o| side(o, |b| b.y)),
-    ("bbox_width_px", |o| side(o, |b| b.width)),
-    ("bbox_height_px", |o| side(o, |b| b.height)),
-    ("defocus_um", |o| o.defocus_um.iter().map(f64::to_string).collect::<Vec<_>>().join(";")),
-    ("rle", |o| run_lengths(&o.amodal)),
+    ("id", Sort::Id, |o| Cell::Id(o.id)),
+    ("part", Sort::Text, |o| text(part(o.part))),
+    ("kind", Sort::Text, |o| text(o.kind.name())),
+    ("class", Sort::Text, |o| text(&o.class)),
+    ("bethesda", Sort::Text, |o| text(&o.bethesda)),
+    ("traits", Sort::Text, |o| text(&o.traits)),
+    ("cluster", Sort::Id, |o| Cell::Id(o.cluster)),
+    ("centre_x_um", Sort::Number, |o| Cell::Number(o.centre_um[0])),
+    ("centre_y_um", Sort::Number, |o| Cell::Number(o.centre_um[1])),
+    ("depth_um", Sort::Number, |o| Cell::Number(o.depth_um)),
+    ("rotation_deg", Sort::Number, |o| Cell::Number(o.rotation_deg)),
+    ("stain", Sort::Number, |o| Cell::Number(o.stain)),
+    ("tint", Sort::Text, |o| text(o.tint)),
+    ("area_um2", Sort::Number, |o| Cell::Number(o.area_um2)),
+    ("area_px", Sort::Whole, |o| Cell::Whole(o.amodal.area())),
+    ("truncated", Sort::Flag, |o| Cell::Flag(o.truncated)),
+    ("bbox_x_px", Sort::WholeOrNone, |o| side(o, |b| b.x)),
+    ("bbox_y_px", Sort::WholeOrNone, |o| side(o, |b| b.y)),
+    ("bbox_width_px", Sort::WholeOrNone, |o| side(o, |b| b.width)),
+    ("bbox_height_px", Sort::WholeOrNone, |o| side(o, |b| b.height)),
+    ("defocus_um", Sort::Numbers, |o| Cell::Numbers(o.defocus_um.clone())),
+    ("rle", Sort::Text, |o| Cell::Text(run_lengths(&o.amodal))),
 ];
 
-fn side(object: &ObjectTruth, side: fn(papsynth::truth::Bounds) -> u32) -> String {
-    object.amodal.bounds().map_or_else(String::new, |b| side(b).to_string())
+fn side(object: &ObjectTruth, side: fn(Bounds) -> u32) -> Cell {
+    object.amodal.bounds().map_or(Cell::Nothing, |b| Cell::Whole(side(b).into()))
 }
 
 /// The mask in its box, as COCO writes it.
@@ -47,12 +49,22 @@ fn run_lengths(mask: &Mask) -> String {
     rle::encode(&within, bounds.width as usize, bounds.height as usize)
 }
 
+/// Names and sorts of the columns.
+pub(super) fn columns() -> [(&'static str, Sort); COLUMNS.len()] {
+    COLUMNS.map(|(name, sort, _)| (name, sort))
+}
+
+/// What stands in the columns of an object's row.
+pub(super) fn cells(object: &ObjectTruth) -> impl Iterator<Item = Cell> {
+    COLUMNS.into_iter().map(move |(_, _, cell)| cell(object))
+}
+
 /// The table of a shard.
 pub(super) fn table(objects: &[ObjectTruth]) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(COLUMNS.map(|(name, _)| name))?;
+    writer.write_record(COLUMNS.map(|(name, _, _)| name))?;
     for object in objects {
-        writer.write_record(COLUMNS.map(|(_, print)| print(object)))?;
+        writer.write_record(cells(object).map(|cell| cell.print()))?;
     }
     writer.into_inner().map_err(|e| e.into_error().into())
 }

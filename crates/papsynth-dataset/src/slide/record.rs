@@ -5,7 +5,7 @@ use std::path::{Component, Path};
 use papsynth::Slide;
 use serde::{Deserialize, Serialize};
 
-use super::HEAD;
+use super::{HEAD, SlideInfo};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, sha256};
 use crate::record::{FileRecord, Identity, WRITER, broken};
@@ -46,10 +46,13 @@ pub struct SlideHead {
     pub frame_px: u32,
     /// Side of a shard, px.
     pub shard_px: u32,
+    /// Whether tables of objects are also written as Parquet; wants the feature `parquet`.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub objects_parquet: bool,
 }
 
 impl SlideHead {
-    pub(super) fn new(identity: Identity, slide: &Slide, shard_px: u32) -> Self {
+    pub(super) fn new(identity: Identity, slide: &Slide, info: &SlideInfo) -> Self {
         let [width_px, height_px] = slide.size_px();
         Self {
             format: FORMAT.to_owned(),
@@ -64,7 +67,8 @@ impl SlideHead {
             channels: slide.channels(),
             bits: slide.bits(),
             frame_px: slide.side_px(),
-            shard_px,
+            shard_px: info.shard_px,
+            objects_parquet: info.objects_parquet,
         }
     }
 
@@ -123,6 +127,7 @@ impl SlideHead {
             ("stream version", a.stream_version != b.stream_version),
             ("slide number", self.slide != other.slide),
             ("shard size", self.shard_px != other.shard_px),
+            ("kind of tables (with or without Parquet)", self.objects_parquet != other.objects_parquet),
         ];
         let known = pairs.into_iter().find(|(_, differs)| *differs).map(|(name, _)| name);
         known.or_else(|| (self != other).then_some("kind"))

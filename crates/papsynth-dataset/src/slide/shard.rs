@@ -7,10 +7,11 @@ use papsynth::{Slide, Threads};
 use papsynth_zarr::{Array, Pyramid, Sample, ShardEncoder, halved, halved_labels};
 
 use super::document::{LAYERS, folder};
-use super::objects::{collection, table};
+use super::objects::{cells, collection, columns, table};
 use super::{SlideSet, name_of, place, record_name, wrong};
 use crate::error::Error;
 use crate::generate::Share;
+use crate::parquet;
 use crate::record::{Check, FileRecord};
 
 /// Which shards to make, and how.
@@ -94,6 +95,11 @@ impl SlideSet {
         let objects = &part.objects;
         let rows = table(objects).map_err(|e| wrong(self.path(), format!("objects of {name}: {e}")))?;
         files.push(self.folder.write(&format!("objects/{name}.csv"), &rows)?);
+        if self.head.objects_parquet {
+            let pending = self.folder.pending(&format!("objects/{name}.parquet"))?;
+            parquet::write_cells(&pending, &columns(), objects.iter().map(cells))?;
+            files.push(pending.commit()?);
+        }
         let outlines = collection(objects, self.head.identity.seed, self.head.slide);
         let outlines = serde_json::to_vec(&outlines).map_err(|e| wrong(self.path(), e.to_string()))?;
         files.push(self.folder.write(&format!("objects/{name}.geojson"), &outlines)?);
