@@ -270,7 +270,9 @@ fn json_type(value: &DeValue<'_>) -> &'static str {
         DeValue::Boolean(_) => "boolean",
         DeValue::Array(_) => "array",
         DeValue::Table(_) => "object",
-        DeValue::String(_) | DeValue::Datetime(_) => "string",
+        DeValue::String(_) => "string",
+        // No field is one.
+        DeValue::Datetime(_) => "date",
     }
 }
 

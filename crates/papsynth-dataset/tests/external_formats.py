@@ -487,6 +487,17 @@ def check_pages(folder, pages):
             passed(f"the Python of {page.name} runs")
 
 
+def check_tiffs(folder):
+    """What ImageJ reads by itself: nothing, or zlib without differences, which it would show as they are."""
+    paths = sorted(folder.rglob("*.tif"))
+    for path in paths:
+        with tifffile.TiffFile(path) as file:
+            for page in file.pages:
+                plain = page.predictor == 1 and page.compression.name in ("NONE", "ADOBE_DEFLATE")
+                check(plain, f"{path} is compressed in a way that ImageJ does not know")
+    passed(f"{len(paths)} TIFF files are of the kinds that ImageJ reads")
+
+
 def main(folder, pages=None):
     manifest, records = check_manifest(folder)
     frames = check_truth(folder, records)
@@ -494,6 +505,7 @@ def main(folder, pages=None):
     splits = check_splits(folder, frames, manifest["identity"]["seed"])
     check_folder(frames)
     check_ome_tiff(frames)
+    check_tiffs(folder)
     check_webdataset(folder, frames, records, splits)
     check_cellpose(folder, frames)
     check_stardist(folder, frames)
