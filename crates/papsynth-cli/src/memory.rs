@@ -26,6 +26,10 @@ const AT_WORK: f64 = 64.0;
 /// How much more than counted is asked for, since no two frames are alike.
 const SPARE: f64 = 1.15;
 
+/// What the border of a slide's frame adds to its side, px.
+#[cfg(feature = "zarr")]
+const BORDER_PX: f64 = 256.0;
+
 const MIB: f64 = 1_048_576.0;
 
 /// Memory that frames of a recipe need, bytes: at least what the program was measured to use, and less than 2.5 times that.
@@ -105,6 +109,38 @@ impl Need {
         let frame = pixels * a_pixel + objects + largest * work;
         let shared = pixels * a_pixel + objects + largest * works * count.min(AT_WORK).max(work / works);
         Self { program: PROGRAM, frame: SPARE * frame, shared: SPARE * shared }
+    }
+
+    /// What a shard of a slide may need, each of whose frames is made by a thread of its own.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn of_slide(recipe: &Recipe, shard_px: u32) -> Self {
+        let most = |number: &Number| number.bounds()[1];
+        // With the border that is exposed and cut off.
+        let side = f64::from(recipe.scan.frame_px) + BORDER_PX;
+        let grown = side * side / (recipe.field.width_px.bounds()[0] * recipe.field.height_px.bounds()[0]).max(1.0);
+        let mut frame = recipe.clone();
+        (frame.field.width_px, frame.field.height_px) = (side.into(), side.into());
+        frame.cells.values_mut().for_each(|mix| mix.count = (most(&mix.count) * grown).into());
+        let of_frame = Self::of(&frame, &Layout::default());
+        let channels = if matches!(recipe.light, Light::Monochrome { .. }) { 1.0 } else { 3.0 };
+        // Grey levels, three labels and layers of a pixel; and once more what is being packed.
+        let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;
+        let shard = f64::from(shard_px) * f64::from(shard_px) * (a_pixel + 4.0 * channels);
+        let program = of_frame.program + SPARE * shard;
+        Self { program, frame: of_frame.frame + side * side * a_pixel, shared: f64::INFINITY }
+    }
+
+    /// Why not even one frame of a slide fits.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn refuse_slide(&self, recipe: &Recipe, shard_px: u32, budget: u64) -> Failure {
+        let message = format!(
+            "shards of {shard_px} pixels a side with frames of {} need about {}; {} may be used",
+            recipe.scan.frame_px,
+            shown(self.program + self.frame),
+            shown(budget as f64)
+        );
+        let help = "--shard-px 2048 or less, or a smaller scan.frame_px, needs less; --max-memory allows more";
+        Failure::input(Complaint::new(message).help(help))
     }
 
     /// How a run of that many frames side by side, or of one that threads share, goes within a budget: with fewer if need be. Nothing if not

@@ -48,6 +48,13 @@ fn a_build_without_zarr_says_what_it_lacks() {
 fn a_slide_made_in_shares_is_closed_and_verified() {
     let bench = Bench::new("slide-make");
     let make = format!("slide make {SMALL} --out slide --size 900,600 --shard-px 512");
+    refused(&bench, &format!("{make} --max-memory 20MB"), "may be used");
+    assert!(!bench.path("slide").exists());
+    // The same files with as much as one thread needs.
+    bench.good(&format!("{make} --threads 8 --max-memory 300MiB"));
+    bench.good(&format!("slide make {SMALL} --out other --size 900,600 --shard-px 512 --threads 1"));
+    assert_eq!(bench.files("slide"), bench.files("other"));
+    fs::remove_dir_all(bench.path("slide")).unwrap();
     bench.good(&format!("{make} --shard 0/2"));
     refused(&bench, "slide finalize slide", "shards are missing");
     bench.good(&format!("{make} --shard 1/2"));

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use super::EngineArgs;
 use super::sets::ShareArgs;
 use super::values::parse_pair;
+use crate::memory::parse_size;
 
 /// Whole slides, larger than memory, and any part of one.
 ///
@@ -61,6 +62,10 @@ pub(crate) struct SlideMake {
     pub(crate) no_parquet: bool,
     #[command(flatten)]
     pub(crate) share: ShareArgs,
+    /// Memory to use at most, such as 2GiB: fewer frames are made side by side if need be [default: 80 % of what is available, where the
+    /// system tells]
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub(crate) max_memory: Option<u64>,
     /// Read all files of shards that are there before they are kept
     #[arg(long)]
     pub(crate) verify: bool,

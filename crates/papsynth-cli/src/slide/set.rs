@@ -10,6 +10,7 @@ use super::open;
 use crate::args::{SlideFinalize, SlideMake};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
+use crate::memory::{self, Need};
 use crate::report::Bar;
 use crate::setup::Setup;
 use crate::share;
@@ -20,15 +21,16 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
         let sides = [("width_px", width), ("height_px", height)];
         args.engine.recipe.set.extend(sides.map(|(name, side)| format!("scan.{name}={side}")));
     }
-    let setup = Setup::load(&args.engine, None)?;
+    let mut setup = Setup::load(&args.engine, None)?;
+    // One of the sizes that can be typed.
+    let shard_px = args.shard_px.parse().unwrap_or(4096);
+    setup.threads = fitting(&args, &setup, shard_px)?;
     let seed = args.engine.seed;
     let slide = open(&setup, seed, args.slide)?;
     let share = match args.share.shard {
         Some(shards) => share::of(shards)?,
         None => Share::ALL,
     };
-    // One of the sizes that can be typed.
-    let shard_px = args.shard_px.parse().unwrap_or(4096);
     let interrupt = Interrupt::watch()?;
     #[cfg(feature = "parquet")]
     let objects_parquet = !args.no_parquet;
@@ -60,6 +62,21 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
         return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
     }
     if share == Share::ALL { close(&set, args.quiet) } else { Ok(()) }
+}
+
+/// As many threads as fit, each with a frame of its own.
+fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Failure> {
+    let recipe = &setup.recipe.recipe;
+    let need = Need::of_slide(recipe, shard_px);
+    let budget = memory::budget(args.max_memory);
+    let Some(fit) = need.fit(setup.threads, false, budget) else {
+        return Err(need.refuse_slide(recipe, shard_px, budget.unwrap_or_default()));
+    };
+    if fit.at_once < setup.threads {
+        let may = memory::shown(budget.unwrap_or_default() as f64);
+        exit::note(&format!("{} of {} threads make frames, so that they fit into {may}", fit.at_once, setup.threads));
+    }
+    Ok(fit.at_once)
 }
 
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {
