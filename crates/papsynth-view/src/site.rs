@@ -14,6 +14,7 @@ use crate::source::{At, Source};
 
 const PAGE: &str = include_str!("page/index.html");
 const STYLE: &str = include_str!("page/view.css");
+const TILES: &str = include_str!("page/tiles.js");
 const SCRIPT: &str = include_str!("page/view.js");
 
 /// A data set or a slide, as a page shows it. Nothing is written, and of what is read a few frames are kept.
@@ -42,6 +43,7 @@ impl View {
         match words[..] {
             [""] => Ok(Reply::page("text/html; charset=utf-8", PAGE)),
             ["view.css"] => Ok(Reply::page("text/css; charset=utf-8", STYLE)),
+            ["tiles.js"] => Ok(Reply::page("text/javascript; charset=utf-8", TILES)),
             ["view.js"] => Ok(Reply::page("text/javascript; charset=utf-8", SCRIPT)),
             ["info"] => {
                 let (kind, pictures) = (self.source.kind(), self.source.count()?);

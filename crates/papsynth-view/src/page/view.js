@@ -1,230 +1,6 @@
 "use strict";
 
-// The picture lies on the canvas by its middle (view.x, view.y, in pixels of the picture) and its zoom (pixels of the page a pixel of the
-// picture). Of every tile in view the finest level that suits the zoom is asked for; until it is here, its part of a coarser one stands for it.
-
-/** Tiles that are asked for at a time, tiles that are kept. */
-const AT_ONCE = 6;
-const KEPT = 400;
-const RETRY_MS = 2000;
-
-/** Nearest zoom: pixels of the page a pixel of the picture. */
-const NEAREST = 32;
-
-/** How far the pointer may move in a click. */
-const CLICK_PX = 4;
-
-const element = (id) => document.getElementById(id);
-const canvas = element("canvas");
-const context = canvas.getContext("2d");
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-
-let info = null;
-let picture = null;
-const view = { number: 0, plane: 0, x: 0, y: 0, zoom: 1 };
-
-/** The plane that was shown before: it stands in while the next one is on its way. */
-let before = 0;
-
-/** Whether the labels of a group are shown, and how opaque. */
-const groups = new Map();
-
-/** Where was clicked. */
-let mark = null;
-
-/** Tiles by their address: an image, "asked", "absent" or "broken". The last that were used are the last. */
-const tiles = new Map();
-let underway = 0;
-
-// What is asked
-
-async function ask(path) {
-  const response = await fetch(path, { cache: "no-store" });
-  if (response.ok) return response;
-  const { error } = await response.json().catch(() => ({ error: response.statusText }));
-  throw Object.assign(new Error(error), { status: response.status });
-}
-
-function say(text) {
-  element("message").textContent = text;
-  element("message").hidden = !text;
-}
-
-async function load(address) {
-  tiles.set(address, "asked");
-  underway += 1;
-  try {
-    const response = await ask(address);
-    tiles.set(address, await createImageBitmap(await response.blob()));
-  } catch (error) {
-    if (error.status === 404) {
-      tiles.set(address, "absent");
-    } else if (error.status) {
-      tiles.set(address, "broken");
-      say(error.message);
-    } else {
-      say("The program does not answer. It is asked again.");
-      await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-      tiles.delete(address);
-      say("");
-    }
-  }
-  underway -= 1;
-  redraw();
-}
-
-/** A tile if it is here; it counts as used. */
-function ready(address) {
-  const tile = tiles.get(address);
-  if (!(tile instanceof ImageBitmap)) return null;
-  tiles.delete(address);
-  tiles.set(address, tile);
-  return tile;
-}
-
-/** Lets the tiles go that were not used for longest; those of two views may always stay. */
-function forget(needed) {
-  for (const [address, tile] of tiles) {
-    if (tiles.size <= Math.max(KEPT, 2 * needed)) return;
-    if (tile === "asked") continue;
-    if (tile instanceof ImageBitmap) tile.close();
-    tiles.delete(address);
-  }
-}
-
-// What is drawn
-
-const addressOf = (layer, level, row, column) => `${layer}/${level}/${row}-${column}.png`;
-const planeLayer = (plane) => `tile/${view.number}/${plane}`;
-
-/** A column and a row of the picture in pixels of the screen; whole ones, so that tiles meet without a seam. */
-const onScreenX = (x) => Math.round(((x - view.x) * view.zoom + canvas.clientWidth / 2) * devicePixelRatio);
-const onScreenY = (y) => Math.round(((y - view.y) * view.zoom + canvas.clientHeight / 2) * devicePixelRatio);
-
-/** The level whose pixels are at most as large as those of the screen, or the finest. */
-function levelOf(zoom) {
-  return clamp(Math.floor(Math.log2(1 / (zoom * devicePixelRatio)) + 1e-6), 0, picture.levels - 1);
-}
-
-/** The tiles of a level in view, those in the middle first. */
-function inView(level) {
-  const side = picture.tile * 2 ** level;
-  const [across, down] = [canvas.clientWidth / view.zoom / 2, canvas.clientHeight / view.zoom / 2];
-  const along = (middle, half, end) =>
-    [Math.floor(clamp(middle - half, 0, end - 1) / side), Math.floor(clamp(middle + half, 0, end - 1) / side)];
-  const [left, right] = along(view.x, across, picture.width);
-  const [top, bottom] = along(view.y, down, picture.height);
-  const found = [];
-  for (let row = top; row <= bottom; row += 1) {
-    for (let column = left; column <= right; column += 1) found.push([row, column]);
-  }
-  const far = ([row, column]) => Math.hypot((row + 0.5) * side - view.y, (column + 0.5) * side - view.x);
-  return found.sort((a, b) => far(a) - far(b));
-}
-
-/** Draws the part of a picture's layer under a tile: the tile, or its part of the nearest coarser one that is here. */
-function drawTile(layers, level, row, column) {
-  const side = picture.tile;
-  const [left, top] = [column * side, row * side];
-  const [width, height] = [picture.width, picture.height].map((full) => Math.ceil(full / 2 ** level));
-  const [right, bottom] = [Math.min(left + side, width), Math.min(top + side, height)];
-  const [x0, y0] = [onScreenX(left * 2 ** level), onScreenY(top * 2 ** level)];
-  const x1 = onScreenX(Math.min(right * 2 ** level, picture.width));
-  const y1 = onScreenY(Math.min(bottom * 2 ** level, picture.height));
-  for (let up = 0; level + up < picture.levels; up += 1) {
-    const [over, beside] = [row >> up, column >> up];
-    for (const layer of layers) {
-      const tile = ready(addressOf(layer, level + up, over, beside));
-      if (!tile) continue;
-      const [u, v] = [left / 2 ** up - beside * side, top / 2 ** up - over * side];
-      context.imageSmoothingEnabled = up > 0 || view.zoom * devicePixelRatio < 1;
-      const [across, down] = [(right - left) / 2 ** up, (bottom - top) / 2 ** up];
-      context.drawImage(tile, u, v, across, down, x0, y0, x1 - x0, y1 - y0);
-      return;
-    }
-  }
-}
-
-let drawing = false;
-
-function redraw() {
-  document.body.dataset.ready = false;
-  if (drawing) return;
-  drawing = true;
-  requestAnimationFrame(() => {
-    drawing = false;
-    if (picture) draw();
-  });
-}
-
-function draw() {
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.round(side * devicePixelRatio));
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  context.clearRect(0, 0, width, height);
-  drawGround();
-  const layers = [[[planeLayer(view.plane), planeLayer(before)], 1]];
-  for (const [name, { on, opacity }] of groups) if (on) layers.push([[`label/${view.number}/${name}`], opacity]);
-  const [level, coarsest] = [levelOf(view.zoom), picture.levels - 1];
-  const [fine, coarse] = [inView(level), inView(coarsest)];
-  const needed = [];
-  for (const [[layer]] of layers) {
-    for (const [row, column] of coarse) needed.push(addressOf(layer, coarsest, row, column));
-    for (const [row, column] of fine) needed.push(addressOf(layer, level, row, column));
-  }
-  for (const [names, opacity] of layers) {
-    context.globalAlpha = opacity;
-    for (const [row, column] of fine) drawTile(names, level, row, column);
-  }
-  context.globalAlpha = 1;
-  drawMark();
-  const isHere = needed.every((address) => tiles.has(address) && tiles.get(address) !== "asked");
-  if (isHere) {
-    before = view.plane;
-    // The planes beside this one will be asked for next.
-    for (const plane of [view.plane - 1, view.plane + 1]) {
-      if (!(plane in picture.planes_um)) continue;
-      for (const [row, column] of fine) needed.push(addressOf(planeLayer(plane), level, row, column));
-    }
-  }
-  for (const address of needed) if (underway < AT_ONCE && !tiles.has(address)) load(address);
-  forget(needed.length);
-  document.body.dataset.ready = isHere;
-  drawScale();
-  keepPlace();
-}
-
-/** Where the picture lies, also where nothing of it is made yet. */
-function drawGround() {
-  const [x, y] = [onScreenX(0), onScreenY(0)];
-  context.fillStyle = "#24282d";
-  context.fillRect(x, y, onScreenX(picture.width) - x, onScreenY(picture.height) - y);
-}
-
-function drawMark() {
-  if (!mark) return;
-  const [x, y] = [onScreenX(mark.x + 0.5), onScreenY(mark.y + 0.5)];
-  const [inner, outer] = [5, 13].map((length) => length * devicePixelRatio);
-  for (const [width, colour] of [[4, "#000a"], [2, "#fff"]]) {
-    context.beginPath();
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-      context.moveTo(x + inner * dx, y + inner * dy);
-      context.lineTo(x + outer * dx, y + outer * dy);
-    }
-    Object.assign(context, { lineWidth: width * devicePixelRatio, strokeStyle: colour });
-    context.stroke();
-  }
-}
-
-/** A bar of 1, 2 or 5 times a power of ten, at most 160 pixels long. */
-function drawScale() {
-  const most = (160 * picture.pixel_um) / view.zoom;
-  const power = 10 ** Math.floor(Math.log10(most));
-  const um = [5, 2, 1].map((times) => times * power).find((length) => length <= most) ?? power;
-  const text = um >= 1000 ? `${um / 1000} mm` : `${Number(um.toPrecision(1))} µm`;
-  element("scale-bar").style.width = `${(um / picture.pixel_um) * view.zoom}px`;
-  element("scale-text").textContent = text;
-  element("scale").setAttribute("aria-label", `Scale bar of ${text}`);
-}
+// What hands and keys do, and what the panel says. What is shown of it, tiles.js draws.
 
 // Where one looks
 
@@ -233,7 +9,9 @@ function fit() {
   redraw();
 }
 
-const farthest = () => 0.96 * Math.min(canvas.clientWidth / picture.width, canvas.clientHeight / picture.height);
+/** The zoom that shows all of the picture. */
+const farthest = () =>
+  Math.max(0.96 * Math.min(canvas.clientWidth / picture.width, canvas.clientHeight / picture.height), 1e-6);
 
 function move(dx, dy) {
   view.x = clamp(view.x + dx / view.zoom, 0, picture.width);
@@ -251,6 +29,9 @@ function zoomBy(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2)
   move(0, 0);
 }
 
+/** What the panel says of the plane in view. */
+let perPlane = [];
+
 const minus = (number, digits) => number.toFixed(digits).replace("-", "−");
 
 function showPlane(plane) {
@@ -260,7 +41,7 @@ function showPlane(plane) {
   const text = `${minus(um, 2)} µm`;
   element("plane").setAttribute("aria-valuetext", text);
   element("plane-text").textContent = `${text} · ${view.plane + 1} of ${picture.planes_um.length}`;
-  for (const row of document.querySelectorAll("[data-planes]")) row.textContent = ofPlane(JSON.parse(row.dataset.planes), row.dataset.unit);
+  for (const { node, values, unit } of perPlane) node.textContent = ofPlane(values, unit);
   redraw();
 }
 
@@ -278,7 +59,7 @@ async function showPicture(number, place) {
     const stays = picture && next.width === picture.width && next.height === picture.height;
     picture = next;
     view.number = number;
-    mark = null;
+    [mark, perPlane] = [null, []];
     element("objects").replaceChildren(made("p", "Click on something to see what it is.", "quiet"));
     element("here-at").textContent = "";
     element("name").textContent = picture.name;
@@ -320,10 +101,11 @@ function keepPlace() {
   keeping = setTimeout(() => {
     // Somebody has typed another, which is being looked at.
     if (location.hash !== kept) return;
-    const shown = [...groups].filter(([, { on }]) => on).map(([name, { opacity }]) => `${name}:${Math.round(opacity * 100)}`);
+    const shown = [...groups].filter(([, { on }]) => on);
+    const labels = shown.map(([name, { opacity }]) => `${name}:${Math.round(opacity * 100)}`).join(",");
     const { number, plane, x, y, zoom } = view;
-    const place = [`n=${number}`, `p=${plane}`, `x=${x.toFixed(1)}`, `y=${y.toFixed(1)}`, `z=${Number(zoom.toPrecision(5))}`];
-    history.replaceState(null, "", `#${[...place, `l=${shown.join(",")}`].join("&")}`);
+    const place = `#n=${number}&p=${plane}&x=${x.toFixed(1)}&y=${y.toFixed(1)}&z=${Number(zoom.toPrecision(5))}`;
+    history.replaceState(null, "", `${place}&l=${labels}`);
     kept = location.hash;
   }, 150);
 }
@@ -332,12 +114,13 @@ function keptPlace() {
   kept = location.hash;
   const words = new URLSearchParams(location.hash.slice(1));
   const [number, plane, x, y, zoom] = ["n", "p", "x", "y", "z"].map((key) => Number.parseFloat(words.get(key)));
-  for (const word of words.get("l")?.split(",") ?? []) {
-    const [name, opacity] = word.split(":");
-    if (groups.has(name)) setGroup(name, true, clamp(Number(opacity) / 100 || 1, 0.05, 1));
+  const labels = new Map(words.get("l")?.split(",").map((word) => word.split(":")));
+  for (const name of groups.keys()) {
+    setGroup(name, labels.has(name), clamp(Number(labels.get(name)) / 100 || 1, 0.05, 1));
   }
-  const isPlace = [number, plane, x, y, zoom].every(Number.isFinite) && zoom > 0;
-  return isPlace ? { number: clamp(Math.floor(number), 0, info.pictures - 1), place: { plane: Math.floor(plane), x, y, zoom } } : { number: 0 };
+  if (![number, plane, x, y, zoom].every(Number.isFinite) || zoom <= 0) return { number: 0 };
+  const place = { plane: Math.floor(plane), x, y, zoom };
+  return { number: clamp(Math.floor(number), 0, info.pictures - 1), place };
 }
 
 // What lies there
@@ -366,9 +149,10 @@ function card(object) {
   row("tint", object.tint);
   if (object.class !== undefined) {
     row("depth", `${minus(object.depth_um, 1)} µm`);
-    for (const [name, values, unit] of [["defocus", object.defocus_um, " µm"], ["contrast / noise", object.detectability, ""]]) {
-      if (values.length) Object.assign(row(name, ofPlane(values, unit)).dataset, { planes: JSON.stringify(values), unit });
-    }
+    const planes = (name, values, unit) =>
+      values.length && perPlane.push({ node: row(name, ofPlane(values, unit)), values, unit });
+    planes("defocus", object.defocus_um, " µm");
+    planes("contrast / noise", object.detectability, "");
     row("area", `${object.area_um2.toFixed(object.area_um2 < 100 ? 1 : 0)} µm²`);
     row("stain", object.stain.toFixed(2));
     row("cluster", object.cluster || "");
@@ -387,6 +171,7 @@ async function look(x, y) {
   try {
     const { objects } = await (await ask(`at/${view.number}/${x}/${y}`)).json();
     if (mark?.x !== x || mark?.y !== y) return;
+    perPlane = [];
     const nodes = objects.length ? objects.map(card) : [made("p", "Nothing but the slide.", "quiet")];
     element("objects").replaceChildren(...nodes);
   } catch (error) {
@@ -455,21 +240,15 @@ canvas.addEventListener("wheel", (event) => {
 }, { passive: false });
 
 const step = () => 0.15 * Math.min(canvas.clientWidth, canvas.clientHeight);
+const [nearer, deeper, higher] = [() => zoomBy(Math.SQRT2), () => showPlane(view.plane - 1), () => showPlane(view.plane + 1)];
+const [previous, next] = [() => go(wanted - 1), () => go(wanted + 1)];
 const KEYS = {
   ArrowLeft: () => move(-step(), 0),
   ArrowRight: () => move(step(), 0),
   ArrowUp: () => move(0, -step()),
   ArrowDown: () => move(0, step()),
-  "+": () => zoomBy(Math.SQRT2),
-  "=": () => zoomBy(Math.SQRT2),
-  "-": () => zoomBy(Math.SQRT1_2),
-  0: fit,
-  "[": () => showPlane(view.plane - 1),
-  "]": () => showPlane(view.plane + 1),
-  PageDown: () => showPlane(view.plane - 1),
-  PageUp: () => showPlane(view.plane + 1),
-  n: () => go(wanted + 1),
-  p: () => go(wanted - 1),
+  ...{ "+": nearer, "=": nearer, "-": () => zoomBy(Math.SQRT1_2), 0: fit },
+  ...{ "[": deeper, PageDown: deeper, "]": higher, PageUp: higher, n: next, p: previous },
 };
 
 document.addEventListener("keydown", (event) => {
@@ -504,9 +283,9 @@ function addGroup(name) {
 }
 
 element("plane").addEventListener("input", (event) => showPlane(Number(event.target.value)));
-element("previous").addEventListener("click", () => go(wanted - 1));
-element("next").addEventListener("click", () => go(wanted + 1));
-element("number").addEventListener("change", (event) => go(Math.floor(Number(event.target.value) || 1) - 1));
+element("previous").addEventListener("click", previous);
+element("next").addEventListener("click", next);
+element("number").addEventListener("change", ({ target }) => go(Math.floor(Number(target.value) || 1) - 1));
 new ResizeObserver(redraw).observe(canvas);
 
 // What was not there may have been made since.

@@ -37,9 +37,11 @@ impl Drop for Scratch {
     }
 }
 
-/// A recipe of the default, of fields that take more than a tile.
+/// The default recipe with few cells, of fields that take more than a tile.
 pub(crate) fn recipe(settings: &str) -> Recipe {
-    toml::from_str(&format!("[field]\nwidth_px = 300\nheight_px = 270\n{settings}")).unwrap()
+    let mut recipe: Recipe = toml::from_str(&format!("[field]\nwidth_px = 300\nheight_px = 270\n{settings}")).unwrap();
+    recipe.cells.values_mut().for_each(|mix| mix.count = 1.0.into());
+    recipe
 }
 
 /// Writes frames as a data set and gives them.
