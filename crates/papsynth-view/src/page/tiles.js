@@ -186,7 +186,7 @@ function drawMark() {
   if (!mark) return;
   const [x, y] = [onScreenX(mark.x + 0.5), onScreenY(mark.y + 0.5)];
   const [inner, outer] = [5, 13].map((length) => length * devicePixelRatio);
-  for (const [width, colour] of [[4, "#000a"], [2, "#fff"]]) {
+  for (const [width, colour] of [[5, "#fff"], [2, "#111"]]) {
     context.beginPath();
     for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
       context.moveTo(x + inner * dx, y + inner * dy);
