@@ -1,7 +1,7 @@
-//! Whether people could take part in a study.
+//! Whether people could take part in a study, and look at data sets.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
@@ -15,11 +15,12 @@ use crate::{Chore, dataset, shell};
 pub(crate) const CHORE: Chore = Chore {
     name: "browser",
     usage: "",
-    about: "goes through `papsynth study` in headless Chromium, with keyboard and mouse",
-    details: "Shortened, with the page and the program started anew in the middle; holds results against what was clicked, and looks \
-              that nothing left loopback and no answer was in what was sent. Screenshots go to target/browser/study. Where \
-              Chromium is missing it is installed, by root on Debian; else it is left out, with a sentence; a failure where CI \
-              is set.",
+    about: "goes through `papsynth study` and `papsynth view` in headless Chromium, with keyboard and mouse",
+    details: "The study shortened, with the page and the program started anew in the middle; holds results against what was clicked, and \
+              looks that nothing left loopback and no answer was in what was sent. The viewer on a focus stack: what is on the \
+              canvas is held against its pixels and its tables. Screenshots go to target/browser/study and target/browser/view. \
+              Where Chromium is missing it is installed, by root on Debian; else it is left out, with a sentence; a failure where \
+              CI is set.",
     run,
 };
 
@@ -28,8 +29,12 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "goog
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
-    let script = workspace.root.join("crates/papsynth-study/tests/browser.py");
-    ensure!(script.exists(), "{} is missing", workspace.shown(&script));
+    let script = |package: &str| -> Result<PathBuf> {
+        let script = workspace.root.join("crates").join(package).join("tests/browser.py");
+        ensure!(script.exists(), "{} is missing", workspace.shown(&script));
+        Ok(script)
+    };
+    let (study, view) = (script("papsynth-study")?, script("papsynth-view")?);
     let python = match Python::system() {
         Python::Ready(python) => python,
         Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
@@ -46,9 +51,17 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     copy_pictures(&other.join("images"), &real)?;
     let program = workspace.target.join("release").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
     ensure!(program.exists(), "{} was not built", workspace.shown(&program));
-    let mut command = Command::new(python);
-    command.arg(&script).arg(program).arg(chromium).args([&real, &synthetic, &folder.join("study")]);
-    shell::run(&mut command)?;
+    let stack = folder.join("stack");
+    dataset::generate(
+        workspace,
+        &stack,
+        small.iter().chain(&["--set", "focus.planes=5", "--set", "focus.step_um=1.5"]),
+    )?;
+    let run = |script: &Path, folders: &[&PathBuf]| {
+        shell::run(Command::new(&python).arg(script).arg(&program).arg(chromium).args(folders))
+    };
+    run(&study, &[&real, &synthetic, &folder.join("study")])?;
+    run(&view, &[&stack, &folder.join("view")])?;
     Ok(Outcome::Done)
 }
 

@@ -17,7 +17,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full | --changed]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give; if all passes, .ci/full records what of \
+              readers, the study and the viewer in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give; if all passes, .ci/full records what of \
               the workspace that covers. With --changed that too, but only where it differs from what .ci/full records. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,

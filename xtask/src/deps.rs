@@ -12,7 +12,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
     details: "The transforms know no one here, technique crates the transforms, the engine knows techniques alone, the data set the engine and kinds of files, which know \
-              no one, the study the data set, the judge nobody, the program all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
+              no one, the study and the viewer the data set and the server on loopback, which knows no one, the judge nobody, the program all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -28,7 +28,10 @@ enum Role {
     Dataset,
     Judge,
     Match,
+    /// Talks with a browser on the same machine, and knows nothing of what about.
+    Loopback,
     Study,
+    View,
     Program,
     Benches,
     Hashes,
@@ -36,7 +39,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 21] = [
+const PLACES: [(&str, Role); 23] = [
     ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -52,7 +55,9 @@ const PLACES: [(&str, Role); 21] = [
     ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
+    ("papsynth-loopback", Role::Loopback),
     ("papsynth-study", Role::Study),
+    ("papsynth-view", Role::View),
     ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
     ("papsynth-benches", Role::Benches),
@@ -68,8 +73,8 @@ impl Role {
     /// Whom a crate in this place may depend on.
     fn may_know(self) -> &'static [Self] {
         match self {
-            // Who judges must not know what is judged, nor a kind of file what lies in it.
-            Self::Transforms | Self::Container | Self::Judge | Self::Chores => &[],
+            // Who judges must not know what is judged, nor a kind of file what lies in it, nor a server what it serves.
+            Self::Transforms | Self::Container | Self::Judge | Self::Loopback | Self::Chores => &[],
             // Those that compute in frequencies share the transforms.
             Self::Technique => &[Self::Transforms],
             Self::Engine => &[Self::Technique],
@@ -79,11 +84,22 @@ impl Role {
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
             // It shows files, whoever made them.
-            Self::Study => &[Self::Dataset],
+            Self::Study => &[Self::Dataset, Self::Loopback],
+            // The same, and groups of truth are the engine's.
+            Self::View => &[Self::Engine, Self::Dataset, Self::Loopback],
             // They time what is called from outside.
             Self::Benches => &[Self::Technique, Self::Engine, Self::Dataset],
             // It measures microscopes and cameras, which are no business of the engine.
-            Self::Program => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Match, Self::Study],
+            Self::Program => &[
+                Self::Technique,
+                Self::Engine,
+                Self::Dataset,
+                Self::Judge,
+                Self::Match,
+                Self::Loopback,
+                Self::Study,
+                Self::View,
+            ],
         }
     }
 }

@@ -17,8 +17,11 @@ pub(crate) struct Heavy {
 
 /// All of them; each is missing in the `default-members` of the workspace, too.
 pub(crate) const HEAVY: &[Heavy] = &[
-    Heavy { package: "papsynth-parquet", features: &["papsynth-dataset/parquet", "papsynth-cli/parquet"] },
-    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-cli/zarr"] },
+    Heavy {
+        package: "papsynth-parquet",
+        features: &["papsynth-dataset/parquet", "papsynth-view/parquet", "papsynth-cli/parquet"],
+    },
+    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-view/zarr", "papsynth-cli/zarr"] },
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.

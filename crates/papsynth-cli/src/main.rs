@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod browser;
 mod calibrate;
 mod convert;
 mod diagnose;
@@ -31,6 +32,7 @@ mod submit;
 mod sweep;
 mod text_file;
 mod verify;
+mod view;
 
 use std::process::ExitCode;
 
@@ -86,6 +88,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Clean(args) => verify::clean(&args),
         Verb::Slide(args) => slide::run(args.verb),
         Verb::Study(args) => study::run(&args),
+        Verb::View(args) => view::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))

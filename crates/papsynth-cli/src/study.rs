@@ -1,10 +1,10 @@
 //! `papsynth study`: can people tell?
 
-use std::process::{Command, Stdio};
-
-use papsynth_study::{Error, Interval, Pool, Server, Session, Side, StudyParams, Summary, breakdown_table, table};
+use papsynth_loopback::Server;
+use papsynth_study::{Error, Interval, Pool, Session, Side, StudyParams, Summary, breakdown_table, serve, table};
 
 use crate::args::Study;
+use crate::browser;
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 
@@ -36,10 +36,10 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
     session.notes().iter().for_each(|note| exit::note(note));
     exit::print(&announcement(&session, &server))?;
     if args.open {
-        open(&server.address());
+        browser::open(&server.address());
     }
     let mut all_answered = session.is_finished();
-    server.run(session, interrupt.flag(), |session| {
+    serve(server, session, interrupt.flag(), |session| {
         all_answered = true;
         // Whoever closed the pipe reads the page or the files.
         let _ = exit::print(&format!(
@@ -112,21 +112,6 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
         text.push_str(&format!("\nright answers by parameter\n{breakdown}"));
     }
     exit::print(&text)
-}
-
-/// Opens a page with what the system opens pages with; if it cannot, the address stands above.
-fn open(address: &str) {
-    let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
-        "macos" => ("open", &[]),
-        // The empty word is the title of a window.
-        "windows" => ("cmd", &["/C", "start", ""]),
-        _ => ("xdg-open", &[]),
-    };
-    let mut command = Command::new(program);
-    command.args(arguments).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    if let Err(error) = command.spawn() {
-        exit::note(&format!("no browser could be opened: {error}"));
-    }
 }
 
 impl From<Error> for Failure {

@@ -15,7 +15,7 @@ use papsynth::model::Model;
 use papsynth::scene::View;
 use papsynth::truth::{Group, Part};
 use papsynth_dataset::read::{GreyImage, Limits, label_map, read_label_map};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, Layout, convert, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, FramePlace, Layout, convert, verify};
 use serde_json::Value;
 use support::{HEIGHT, SEED, Scratch, WIDTH, colour_frame, contents, frame, recipe};
 
@@ -93,6 +93,54 @@ fn what_is_converted_is_what_is_written_at_once() {
         assert!(back.contains("noise-free"), "{back}");
         // A second time nothing is left to do.
         assert_eq!(to(folder.path(), converted.path(), &all(2)).unwrap(), 0);
+    }
+}
+
+#[test]
+fn every_format_gives_back_planes_and_truth_of_any_frame() {
+    let alone = Format::built().map(|format| vec![format]);
+    let layouts = alone.chain([vec![Format::Stardist, Format::Webdataset, Format::OmeTiff]]);
+    for (number, formats) in layouts.enumerate() {
+        for (planes, bits, colour) in [(1, 12, true), (3, 8, false), (2, 16, true)] {
+            let frames: Vec<Frame> = [1, 2, 3, 6]
+                .map(|index| if colour { colour_frame(index, planes, bits) } else { frame(index, planes, bits, 1) })
+                .into();
+            let scratch = Scratch::new(&format!("frames-{number}-{planes}"));
+            let layout = Layout { frames_per_shard: 3, ..Layout::new(formats.iter().copied()) };
+            write(scratch.path(), &layout, &frames);
+            let dataset = Dataset::open(scratch.path()).unwrap();
+            let places = dataset.places().unwrap();
+            assert_eq!(
+                places.iter().map(|place| (place.index, place.shard)).collect::<Vec<_>>(),
+                [(1, 0), (2, 0), (3, 1), (6, 2)]
+            );
+            let flat = [Format::Cellpose, Format::Stardist, Format::YoloSeg, Format::Qupath];
+            assert_eq!(dataset.has_planes(), formats.iter().any(|format| !flat.contains(format)));
+            for (frame, place) in frames.iter().zip(places) {
+                let summary = dataset.summary(place).unwrap();
+                assert_eq!((summary.index, summary.white()), (place.index, u16::MAX >> (16 - bits)));
+                let mut found = Vec::new();
+                dataset
+                    .planes(&summary, place.shard, &mut |number, levels| {
+                        assert_eq!(number, found.len());
+                        found.push(levels);
+                    })
+                    .unwrap();
+                if dataset.has_planes() || planes == 1 {
+                    assert!(found.iter().eq(frame.planes.iter().map(|plane| &plane.grey)), "{formats:?} {planes}");
+                } else {
+                    let sharp = &frame.finished.all_in_focus;
+                    let is_near = |(level, sharp): (&u16, &f32)| (f32::from(*level) - sharp).abs() <= 0.51;
+                    assert!(found.len() == 1 && found[0].iter().zip(sharp).all(is_near), "{formats:?} {planes}");
+                }
+                let truth = dataset.truth(place).unwrap();
+                assert_eq!([truth.width, truth.height], [WIDTH, HEIGHT]);
+                assert_eq!(truth.objects, frame.finished.truth.objects);
+            }
+            let stranger = FramePlace { index: 4, shard: 1 };
+            assert!(dataset.summary(stranger).unwrap_err().to_string().contains("no frame 4"));
+            assert!(dataset.truth(stranger).unwrap_err().to_string().contains("no image 4"));
+        }
     }
 }
 

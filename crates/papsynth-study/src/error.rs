@@ -61,14 +61,9 @@ pub enum Error {
         /// Patches that the study shows.
         needed: usize,
     },
-    /// The port cannot be listened at.
-    #[error("cannot listen at 127.0.0.1, port {port}: {source}; expected a port that is free, or none for any")]
-    Listen {
-        /// The port.
-        port: u16,
-        /// What the system said.
-        source: io::Error,
-    },
+    /// The page cannot be served.
+    #[error(transparent)]
+    Server(#[from] papsynth_loopback::Error),
 }
 
 impl Error {

@@ -29,4 +29,4 @@ pub use saved::{Answer, Exposure};
 pub use score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
 pub use session::{Session, State};
 pub use table::{breakdown_table, table};
-pub use web::Server;
+pub use web::serve;

@@ -2,142 +2,40 @@
 
 Usage: browser.py PAPSYNTH CHROMIUM REAL SYNTHETIC FOLDER
 
-FOLDER is emptied; results and screenshots go there. Chromium is spoken to through a pipe
-(--remote-debugging-pipe), so that Python's own library is enough.
+FOLDER is emptied; results and screenshots go there.
 """
 
 import base64
 import csv
 import json
 import math
-import os
-import re
 import shutil
-import signal
 import struct
 import subprocess
 import sys
-import tempfile
-import time
 from pathlib import Path
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "xtask/python"))
+from chromium import Browser, Served  # noqa: E402
 
 EXPOSURE_MS = 200
 LONG_EXPOSURE_MS = 800
-PATIENCE_S = 30
-FLAGS = [
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--disable-extensions", "--disable-dev-shm-usage", "--hide-scrollbars",
-    "--no-default-browser-check", "--window-size=1280,800", "--remote-debugging-pipe",
-]
 
 
-class Study:
+def serve_study(program, words):
     """The program, serving one subject."""
-
-    def __init__(self, program, words):
-        self.process = subprocess.Popen(
-            [program, "study", *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        self.address = None
-        for line in self.process.stdout:
-            if found := re.search(r"http://127\.0\.0\.1:\d+/", line):
-                self.address = found[0]
-                return
-        raise SystemExit(f"the program ended: {self.process.stderr.read()}")
-
-    def interrupt(self):
-        self.process.send_signal(signal.SIGINT)
-        out, _ = self.process.communicate(timeout=PATIENCE_S)
-        return self.process.returncode, out
+    return Served(program, ["study", *words])
 
 
-class Browser:
-    """Chromium and one page of it."""
-
-    def __init__(self, chromium):
-        self.profile = tempfile.mkdtemp()
-        theirs_in, ours_out = os.pipe()
-        ours_in, theirs_out = os.pipe()
-        # It reads commands from descriptor 3 and writes to 4.
-        shell = f'exec "$@" 3<&{theirs_in} 4>&{theirs_out}'
-        self.process = subprocess.Popen(
-            ["sh", "-c", shell, "sh", chromium, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
-            pass_fds=(theirs_in, theirs_out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )
-        os.close(theirs_in)
-        os.close(theirs_out)
-        self.out, self.into = os.fdopen(ours_out, "wb", 0), os.fdopen(ours_in, "rb")
-        self.count, self.buffer, self.events, self.session = 0, b"", [], None
-        self.collected, self.received = set(), []
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Network", "Log"):
-            self.call(f"{domain}.enable")
-
-    def read(self):
-        while b"\0" not in self.buffer:
-            more = self.into.read1(1 << 16)
-            if not more:
-                raise SystemExit("the browser ended")
-            self.buffer += more
-        message, self.buffer = self.buffer.split(b"\0", 1)
-        return json.loads(message)
-
-    def call(self, method, **params):
-        self.count += 1
-        message = {"id": self.count, "method": method, "params": params}
-        if self.session:
-            message["sessionId"] = self.session
-        self.out.write(json.dumps(message).encode() + b"\0")
-        while True:
-            message = self.read()
-            if message.get("id") == self.count:
-                if "error" in message:
-                    raise RuntimeError(f"{method}: {message['error']}")
-                return message["result"]
-            if "method" in message:
-                self.events.append(message)
-
-    def run(self, script):
-        try:
-            outcome = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
-        except RuntimeError:
-            return None  # The page is being loaded.
-        assert "exceptionDetails" not in outcome, outcome
-        return outcome["result"].get("value")
+class Subject(Browser):
+    """A browser that knows the screens of a study."""
 
     def screen(self):
         return self.run("document.body?.dataset.screen")
 
     def wait(self, screen):
         self.until(f"document.body?.dataset.screen === '{screen}'", lambda: f"the screen is {self.screen()}")
-
-    def until(self, condition, otherwise=lambda: ""):
-        end = time.monotonic() + PATIENCE_S
-        while time.monotonic() < end:
-            if self.run(condition):
-                return
-            time.sleep(0.01)
-        raise SystemExit(f"waited for {condition}; {otherwise()}")
-
-    def press(self, key):
-        codes = {" ": ("Space", 32), "ArrowLeft": ("ArrowLeft", 37), "ArrowRight": ("ArrowRight", 39)}
-        code, number = codes.get(key, (f"Key{key.upper()}", ord(key.upper()[0])))
-        fields = {"key": key, "code": code, "windowsVirtualKeyCode": number}
-        text = {"text": key} if len(key) == 1 else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", **fields, **text)
-        self.call("Input.dispatchKeyEvent", type="keyUp", **fields)
-
-    def click(self, selector):
-        box = self.run(f"(r => [r.x + r.width / 2, r.y + r.height / 2])(document.querySelector('{selector}').getBoundingClientRect())")
-        for kind in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
-
-    def picture(self, path):
-        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
-
-    def open(self, address):
-        self.call("Page.navigate", url=address)
 
     def when(self, screen, script):
         """Has the page do something the next time that it shows a screen, at once, however busy the machine is."""
@@ -151,41 +49,6 @@ class Browser:
         self.run("window.old = true")
         self.call("Page.reload")
         self.until("!window.old && document.body?.dataset.screen !== 'loading'")
-
-    def collect(self):
-        """Keeps what was received since the last time: a page that is loaded anew forgets it."""
-        events = {e["method"]: [] for e in self.events}
-        for event in self.events:
-            events[event["method"]].append(event["params"])
-        done = {e["requestId"] for e in events.get("Network.loadingFinished", [])} - self.collected
-        for event in events.get("Network.responseReceived", []):
-            if event["requestId"] not in done:
-                continue
-            self.collected.add(event["requestId"])
-            try:
-                body = self.call("Network.getResponseBody", requestId=event["requestId"])
-            except RuntimeError:
-                continue  # Forgotten already.
-            raw = base64.b64decode(body["body"]) if body["base64Encoded"] else body["body"].encode()
-            self.received.append((event["response"]["url"], event["response"]["mimeType"], raw))
-
-    def requests(self):
-        return [e["params"]["request"]["url"] for e in self.events if e["method"] == "Network.requestWillBeSent"]
-
-    def complaints(self):
-        errors = [e["params"] for e in self.events if e["method"] == "Runtime.exceptionThrown"]
-        return errors + [
-            e["params"]["entry"] for e in self.events
-            # While the program is away, nobody answers.
-            if e["method"] == "Log.entryAdded" and "ERR_CONNECTION" not in e["params"]["entry"]["text"]
-            and "ERR_EMPTY_RESPONSE" not in e["params"]["entry"]["text"]
-        ]
-
-    def close(self):
-        self.session = None
-        self.call("Browser.close")
-        self.process.wait(timeout=PATIENCE_S)
-        shutil.rmtree(self.profile, ignore_errors=True)
 
 
 def chunks(png):
@@ -261,7 +124,7 @@ def check_results(folder, given, keys, showings, exposure_ms):
 
 def yes_no(program, browser, real, synthetic, folder):
     words = [real, synthetic, "--out", folder / "out", "--subject", "ann", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
-    study = Study(program, words)
+    study = serve_study(program, words)
     address, given, showings = study.address, [], []
     browser.open(address)
     browser.wait("welcome")
@@ -304,7 +167,7 @@ def yes_no(program, browser, real, synthetic, folder):
         if trial == 6:
             browser.wait("lost")
             browser.picture(folder / "lost.png")
-            study = Study(program, words)
+            study = serve_study(program, words)
             assert study.address == address, "the open page finds its server again"
         given.append(answer)
         showings.append(again)
@@ -342,7 +205,7 @@ def yes_no(program, browser, real, synthetic, folder):
 def pairs(program, browser, real, synthetic, folder):
     words = [real, synthetic, "--out", folder / "pairs", "--design", "2afc", "--trials", 4, "--training", 1,
              "--exposure-ms", LONG_EXPOSURE_MS]
-    study = Study(program, words)
+    study = serve_study(program, words)
     browser.open(study.address)
     browser.wait("welcome")
     browser.picture(folder / "pairs-welcome.png")
@@ -385,7 +248,7 @@ def main():
     real, synthetic, folder = Path(real), Path(synthetic), Path(folder)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    browser = Browser(chromium)
+    browser = Subject(chromium)
     try:
         yes_no(program, browser, real, synthetic, folder)
         pairs(program, browser, real, synthetic, folder)

@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-use papsynth_study::{Error, Server, Session, StudyParams};
+use papsynth_loopback::Server;
+use papsynth_study::{Error, Session, StudyParams, serve};
 use serde_json::{Value, json};
 use support::{Scratch, get, post, send, text};
 
@@ -30,7 +31,7 @@ impl Running {
         assert_eq!(server.address(), format!("http://127.0.0.1:{port}/"));
         let (flag, count) = (Arc::clone(&stop), Arc::clone(&finished));
         let thread = std::thread::spawn(move || {
-            server.run(session, &flag, |_| {
+            serve(server, session, &flag, |_| {
                 count.fetch_add(1, Ordering::SeqCst);
             })
         });
@@ -165,15 +166,4 @@ fn whatever_is_sent_it_answers_the_next() {
     assert_eq!(running.state()["answered"], 0);
     drop((silent, half));
     running.end();
-}
-
-#[test]
-fn it_listens_at_loopback_alone_and_a_port_that_is_taken_is_told_of() {
-    let server = Server::bind(0).unwrap();
-    let error = Server::bind(server.port()).unwrap_err();
-    assert!(error.to_string().contains(&format!("127.0.0.1, port {}", server.port())), "{error}");
-    // Somebody else's port of last time is no reason to end.
-    assert_ne!(Server::bind_near(server.port()).unwrap().port(), server.port());
-    // Other addresses of this machine, 127.0.0.2 among them, reach nobody.
-    assert!(TcpStream::connect(("127.0.0.2", server.port())).is_err());
 }

@@ -4,6 +4,7 @@ mod real;
 mod sets;
 mod slide;
 mod values;
+mod view;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]
 pub(crate) use slide::{SlideFinalize, SlideMake};
 use values::{camera_parser, parse_range, preset_parser};
+pub(crate) use view::View;
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
 #[derive(Debug, Parser)]
@@ -65,6 +67,7 @@ pub(crate) enum Verb {
     Clean(Clean),
     Slide(Box<Slide>),
     Study(Box<Study>),
+    View(View),
     Schema(SchemaArgs),
     Completions(Completions),
 }

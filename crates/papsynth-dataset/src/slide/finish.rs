@@ -211,6 +211,13 @@ impl SlideSet {
         self.forms.image.levels().len()
     }
 
+    /// Levels that have been made: all of a slide that was closed, else those that are made with the shards.
+    #[must_use]
+    pub fn levels_there(&self) -> usize {
+        let image = &self.forms.image;
+        if self.folder.path(UPPER).is_file() { image.levels().len() } else { image.with_shard() }
+    }
+
     /// Columns and rows of a level; nothing if there is none.
     #[must_use]
     pub fn level_px(&self, level: usize) -> Option<[usize; 2]> {

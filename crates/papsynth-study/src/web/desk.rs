@@ -1,15 +1,10 @@
 //! What is answered to a request. No network and no files of the study's folders: everything that can be sent lies in memory.
 
-use std::borrow::Cow;
-
+use papsynth_loopback::{Reply, Request, Site};
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
 
 use crate::saved::{Answer, Exposure};
 use crate::session::{Refusal, Session};
-
-/// Longest body of a request, bytes; what the page sends is a tenth of it.
-pub(crate) const LONGEST_BODY: usize = 4096;
 
 const PAGE: &str = include_str!("page/index.html");
 const STYLE: &str = include_str!("page/study.css");
@@ -17,54 +12,6 @@ const SCRIPT: &str = include_str!("page/study.js");
 
 /// Where patches are asked for, before their name.
 const PATCH: &str = "/patch/";
-
-const JSON: &str = "application/json";
-
-/// A request, without what does not matter.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Request<'a> {
-    pub(crate) method: &'a str,
-    /// The target as it stands in the request line.
-    pub(crate) target: &'a str,
-    /// Every header of that name.
-    pub(crate) hosts: &'a [&'a [u8]],
-    /// The origin of the page that asks, if the browser names one.
-    pub(crate) origin: Option<&'a [u8]>,
-    pub(crate) content_type: Option<&'a [u8]>,
-    pub(crate) body: &'a [u8],
-}
-
-/// A reply. All carry the same headers but for the type and length of their body.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Reply {
-    pub(crate) status: u16,
-    pub(crate) content_type: &'static str,
-    pub(crate) body: Cow<'static, [u8]>,
-    /// What is allowed, where something else was asked.
-    pub(crate) allow: Option<&'static str>,
-}
-
-impl Reply {
-    fn page(content_type: &'static str, text: &'static str) -> Self {
-        Self { status: 200, content_type, body: text.as_bytes().into(), allow: None }
-    }
-
-    fn json(value: &impl serde::Serialize) -> Self {
-        match serde_json::to_vec(value) {
-            Ok(body) => Self { status: 200, content_type: JSON, body: body.into(), allow: None },
-            Err(error) => Self::refusal(500, &error.to_string()),
-        }
-    }
-
-    pub(crate) fn refusal(status: u16, message: &str) -> Self {
-        let body = serde_json::json!({ "error": message }).to_string().into_bytes();
-        Self { status, content_type: JSON, body: body.into(), allow: None }
-    }
-
-    fn method(allow: &'static str) -> Self {
-        Self { allow: Some(allow), ..Self::refusal(405, "this is asked for otherwise") }
-    }
-}
 
 /// A report that patches were seen.
 #[derive(Deserialize)]
@@ -83,40 +30,14 @@ struct Said {
     response_ms: f64,
 }
 
-/// A study and who may ask for it.
+/// A study, as it answers.
 #[derive(Debug)]
 pub(crate) struct Desk {
     pub(crate) session: Session,
-    /// What a browser of this machine calls this server.
-    hosts: Vec<String>,
 }
 
-impl Desk {
-    pub(crate) fn new(session: Session, port: u16) -> Self {
-        /// The port that browsers leave out.
-        const UNSAID: u16 = 80;
-        let names = ["127.0.0.1", "localhost"];
-        let mut hosts: Vec<String> = names.iter().map(|name| format!("{name}:{port}")).collect();
-        if port == UNSAID {
-            hosts.extend(names.map(str::to_owned));
-        }
-        Self { session, hosts }
-    }
-
-    pub(crate) fn reply(&mut self, request: &Request) -> Reply {
-        // A page from elsewhere whose name was made to lead here calls this server by that name (DNS rebinding).
-        let [host] = request.hosts else { return Reply::refusal(400, "one Host is expected") };
-        if !self.hosts.iter().any(|own| own.as_bytes() == *host) {
-            return Reply::refusal(421, "this server answers to 127.0.0.1 and localhost alone");
-        }
-        // A page from elsewhere that calls this server by its own name says where it comes from.
-        let own = |origin: &[u8]| {
-            let origin = origin.strip_prefix(b"http://").unwrap_or_default();
-            self.hosts.iter().any(|own| own.as_bytes() == origin)
-        };
-        if request.origin.is_some_and(|origin| !own(origin)) {
-            return Reply::refusal(403, "pages from elsewhere get no answer");
-        }
+impl Site for Desk {
+    fn reply(&mut self, request: &Request) -> Reply {
         match (request.method, request.target) {
             ("GET", "/") => Reply::page("text/html; charset=utf-8", PAGE),
             ("GET", "/study.css") => Reply::page("text/css; charset=utf-8", STYLE),
@@ -125,14 +46,14 @@ impl Desk {
             ("GET", "/result") if self.session.is_finished() => Reply::json(&self.session.summary()),
             ("GET", "/result") => Reply::refusal(409, "there is no result before the last answer"),
             ("GET", target) if target.starts_with(PATCH) => self.patch(&target[PATCH.len()..]),
-            ("POST", "/shown") => match posted::<Shown>(request) {
+            ("POST", "/shown") => match request.json::<Shown>() {
                 Ok(Shown { patch, exposure }) => {
                     let outcome = self.session.shown(&patch, exposure);
                     self.after(outcome)
                 }
                 Err(refusal) => refusal,
             },
-            ("POST", "/answer") => match posted::<Said>(request) {
+            ("POST", "/answer") => match request.json::<Said>() {
                 Ok(Said { patch, answer, response_ms }) => {
                     let outcome = self.session.answer(&patch, answer, response_ms);
                     self.after(outcome)
@@ -145,10 +66,12 @@ impl Desk {
             _ => Reply::refusal(404, "there is nothing here"),
         }
     }
+}
 
+impl Desk {
     fn patch(&mut self, name: &str) -> Reply {
         match self.session.patch(name) {
-            Ok(png) => Reply { status: 200, content_type: "image/png", body: png.to_vec().into(), allow: None },
+            Ok(png) => Reply::png(png.to_vec()),
             Err(refusal) => refused(refusal),
         }
     }
@@ -170,25 +93,13 @@ fn refused(refusal: Refusal) -> Reply {
     }
 }
 
-/// The body of a request. It has to say that it is JSON, which browsers let no page from elsewhere say unasked.
-fn posted<T: DeserializeOwned>(request: &Request) -> Result<T, Reply> {
-    if request.content_type != Some(JSON.as_bytes()) {
-        return Err(Reply::refusal(415, "application/json is expected"));
-    }
-    if request.body.len() > LONGEST_BODY {
-        return Err(Reply::refusal(413, "that is too long"));
-    }
-    serde_json::from_slice(request.body).map_err(|error| Reply::refusal(400, &error.to_string()))
-}
-
 #[cfg(test)]
 mod tests {
+    use papsynth_loopback::{JSON, LONGEST_BODY};
+
     use super::*;
     use crate::design::{StudyParams, Task};
     use crate::support::{Scratch, study_folders};
-
-    const PORT: u16 = 8123;
-    const HOST: &[&[u8]] = &[b"127.0.0.1:8123"];
 
     fn bench(name: &str) -> Scratch {
         let scratch = Scratch::new(name);
@@ -199,23 +110,16 @@ mod tests {
     fn open(scratch: &Scratch, task: Task) -> Desk {
         let params = StudyParams { trials: 4, training: 2, patch_px: 48, task, ..StudyParams::default() };
         let [real, synthetic, out] = ["real", "synthetic", "out"].map(|name| scratch.join(name));
-        Desk::new(Session::open(&params, &real, &synthetic, &out).unwrap(), PORT)
+        Desk { session: Session::open(&params, &real, &synthetic, &out).unwrap() }
     }
 
     fn get(desk: &mut Desk, target: &str) -> Reply {
-        desk.reply(&Request { method: "GET", target, hosts: HOST, ..Request::default() })
+        desk.reply(&Request { method: "GET", target, ..Request::default() })
     }
 
     fn post(desk: &mut Desk, target: &str, body: &str) -> Reply {
         let content_type = Some(JSON.as_bytes());
-        desk.reply(&Request {
-            method: "POST",
-            target,
-            hosts: HOST,
-            content_type,
-            body: body.as_bytes(),
-            ..Request::default()
-        })
+        desk.reply(&Request { method: "POST", target, content_type, body: body.as_bytes(), ..Request::default() })
     }
 
     fn state(desk: &mut Desk) -> serde_json::Value {
@@ -322,39 +226,6 @@ mod tests {
     }
 
     #[test]
-    fn hosts_and_origins_from_elsewhere_get_nothing() {
-        let scratch = bench("desk-hosts");
-        let mut desk = open(&scratch, Task::YesNo);
-        let mut ask = |hosts: &[&[u8]], origin: Option<&[u8]>| {
-            desk.reply(&Request { method: "GET", target: "/state", hosts, origin, ..Request::default() }).status
-        };
-        assert_eq!(ask(&[b"localhost:8123"], None), 200);
-        assert_eq!(ask(HOST, Some(b"http://127.0.0.1:8123")), 200);
-        for host in [
-            "evil.example:8123",
-            "127.0.0.1",
-            "127.0.0.1:8124",
-            "localhost",
-            "",
-            "127.0.0.1:8123.evil.example",
-            "[::1]:8123",
-        ] {
-            assert_eq!(ask(&[host.as_bytes()], None), 421, "{host}");
-        }
-        assert_eq!(ask(&[], None), 400);
-        assert_eq!(ask(&[HOST[0], HOST[0]], None), 400);
-        for origin in
-            ["http://evil.example", "null", "https://127.0.0.1:8123", "http://127.0.0.1:81", "", "http://localhost"]
-        {
-            assert_eq!(ask(HOST, Some(origin.as_bytes())), 403, "{origin}");
-        }
-        let session = desk.session;
-        let mut eighty = Desk::new(session, 80);
-        let ask = Request { method: "GET", target: "/state", hosts: &[b"localhost"], ..Request::default() };
-        assert_eq!(eighty.reply(&ask).status, 200);
-    }
-
-    #[test]
     fn only_known_things_are_answered() {
         let scratch = bench("desk-routes");
         let mut desk = open(&scratch, Task::YesNo);
@@ -381,7 +252,7 @@ mod tests {
             assert!(status == 404 || (status == 409 && target.starts_with(PATCH)), "{target:?}: {status}");
         }
         let mut ask = |method: &str, target: &str| {
-            let reply = desk.reply(&Request { method, target, hosts: HOST, ..Request::default() });
+            let reply = desk.reply(&Request { method, target, ..Request::default() });
             (reply.status, reply.allow)
         };
         for method in ["POST", "PUT", "DELETE", "HEAD", "OPTIONS", "TRACE", "", "get"] {
@@ -424,14 +295,7 @@ mod tests {
         assert_eq!(state(&mut desk), before);
         let garbage = [0xff_u8, 0xfe, 0];
         let content_type = Some(JSON.as_bytes());
-        let request = Request {
-            method: "POST",
-            target: "/answer",
-            hosts: HOST,
-            content_type,
-            body: &garbage,
-            ..Request::default()
-        };
+        let request = Request { method: "POST", target: "/answer", content_type, body: &garbage, ..Request::default() };
         assert_eq!(desk.reply(&request).status, 400);
     }
 }

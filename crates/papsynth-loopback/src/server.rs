@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use http_body_util::{BodyExt, Full, Limited};
@@ -16,9 +16,9 @@ use hyper::{Method, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::Semaphore;
 
-use super::desk::{Desk, LONGEST_BODY, Reply, Request};
 use crate::error::Error;
-use crate::session::Session;
+use crate::gate::Gate;
+use crate::message::{LONGEST_BODY, Reply, Request};
 
 /// How often it is looked whether the server is to end.
 const LOOK: Duration = Duration::from_millis(100);
@@ -36,7 +36,7 @@ const LONGEST_HEAD: usize = 16 * 1024;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Headers of every reply. Nothing is kept by the browser: a patch is seen once.
+/// Headers of every reply, beside that nothing is kept by the browser.
 const HEADERS: [(&str, &str); 5] = [
     ("content-security-policy", POLICY),
     ("cross-origin-opener-policy", "same-origin"),
@@ -45,7 +45,26 @@ const HEADERS: [(&str, &str); 5] = [
     ("x-content-type-options", "nosniff"),
 ];
 
-/// A place on 127.0.0.1 that a study is served at.
+/// What is served.
+pub trait Site {
+    /// What is answered to a request, which comes from a page of this server or from no page at all. Requests are answered one after the other.
+    fn reply(&mut self, request: &Request) -> Reply;
+}
+
+/// What is served, and who gets to it.
+struct House<S> {
+    gate: Gate,
+    site: Mutex<S>,
+}
+
+impl<S: Site> House<S> {
+    /// A site that panicked in the middle of an answer has to be fit for the next one by itself: one request does not end a server.
+    fn site(&self) -> MutexGuard<'_, S> {
+        self.site.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A place on 127.0.0.1 that a site is served at.
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
@@ -87,41 +106,37 @@ impl Server {
         format!("http://127.0.0.1:{}/", self.port)
     }
 
-    /// Serves a study until `stop` is set. `finished` is called once when everything has been answered, at once if it has been
-    /// before.
+    /// Serves a site until `stop` is set. `look` sees the site ten times a second at least, and a last time when `stop` is set.
     ///
     /// # Errors
-    /// If the system refuses what serving takes, or the port cannot be kept with the study.
-    pub fn run(self, mut session: Session, stop: &AtomicBool, finished: impl FnMut(&Session)) -> Result<(), Error> {
-        session.set_port(self.port)?;
+    /// If the system refuses what serving takes.
+    pub fn run<S: Site + Send + 'static>(
+        self,
+        site: S,
+        stop: &AtomicBool,
+        look: impl FnMut(&mut S),
+    ) -> Result<(), Error> {
         let failed = |source: io::Error| Error::Listen { port: self.port, source };
-        // One thread: a reply takes less than a frame of the page, and there is one page.
+        // One thread: there is one page, and its requests are short.
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        let desk = Arc::new(Mutex::new(Desk::new(session, self.port)));
+        let house = Arc::new(House { gate: Gate::new(self.port), site: Mutex::new(site) });
         let _inside = runtime.enter();
         let listener = tokio::net::TcpListener::from_std(self.listener).map_err(failed)?;
-        runtime.block_on(accept(&listener, &desk, stop, finished));
+        runtime.block_on(accept(&listener, &house, stop, look));
         Ok(())
     }
 }
 
-async fn accept(
+async fn accept<S: Site + Send + 'static>(
     listener: &tokio::net::TcpListener,
-    desk: &Arc<Mutex<Desk>>,
+    house: &Arc<House<S>>,
     stop: &AtomicBool,
-    mut finished: impl FnMut(&Session),
+    mut look: impl FnMut(&mut S),
 ) {
     let places = Arc::new(Semaphore::new(CONNECTIONS));
-    let mut told = false;
     loop {
         let ends = stop.load(Ordering::SeqCst);
-        if !told {
-            let desk = locked(desk);
-            told = desk.session.is_finished();
-            if told {
-                finished(&desk.session);
-            }
-        }
+        look(&mut house.site());
         if ends {
             return;
         }
@@ -136,11 +151,11 @@ async fn accept(
         };
         // Who comes while all places are taken is sent away.
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else { continue };
-        let desk = Arc::clone(desk);
+        let house = Arc::clone(house);
         tokio::spawn(async move {
             let service = service_fn(move |request| {
-                let desk = Arc::clone(&desk);
-                async move { Ok::<_, Infallible>(response(answer(&desk, request).await)) }
+                let house = Arc::clone(&house);
+                async move { Ok::<_, Infallible>(response(answer(&house, request).await)) }
             });
             let mut connection = http1::Builder::new();
             connection.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST_HEAD);
@@ -151,12 +166,7 @@ async fn accept(
     }
 }
 
-/// Nothing that holds the lock can leave the study half changed, so that a panic elsewhere does not end it.
-fn locked(desk: &Mutex<Desk>) -> std::sync::MutexGuard<'_, Desk> {
-    desk.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-async fn answer(desk: &Mutex<Desk>, request: hyper::Request<Incoming>) -> Reply {
+async fn answer<S: Site>(house: &House<S>, request: hyper::Request<Incoming>) -> Reply {
     let (head, body) = request.into_parts();
     if body.size_hint().lower() > LONGEST_BODY as u64 {
         return Reply::refusal(413, "that is too long");
@@ -184,7 +194,7 @@ async fn answer(desk: &Mutex<Desk>, request: hyper::Request<Incoming>) -> Reply 
         content_type: head.headers.get(CONTENT_TYPE).map(HeaderValue::as_bytes),
         body: &body,
     };
-    locked(desk).reply(&request)
+    house.gate.refuses(&request).unwrap_or_else(|| house.site().reply(&request))
 }
 
 fn response(reply: Reply) -> Response<Full<Bytes>> {
