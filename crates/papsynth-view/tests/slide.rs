@@ -26,7 +26,7 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
     let model = Model::builtin();
     let engine = Engine::new(&recipe, &model, &Inputs::default()).unwrap();
     let slide = engine.slide(SEED, 0).unwrap();
-    let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512 };
+    let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512, objects_parquet: false };
     let set = SlideSet::create_or_resume(&path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
     let make = |share: Share| {
