@@ -16,7 +16,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full]",
     about: "has other people's programs read what we write, and judge our camera",
     details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
-              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
+              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr, the loaders of Cellpose and StarDist and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
               frames of the camera presets; libjpeg compresses what our JPEG did; with --full the bill of materials is held against the schema of CycloneDX, too. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
     run,
 };
@@ -29,6 +29,10 @@ const HEAVY: &str = "--no-binary jsonpath-rw\nmlcroissant\npyarrow\ndatasets\nop
 
 /// Readers of OME-Zarr; napari's reader brings the library of the format's authors along.
 const ZARR: &str = "zarr\ntensorstore\nome-zarr-models\nome-zarr\nnapari-ome-zarr\npyarrow\n";
+
+/// Those who read for StarDist; Cellpose comes without what it trains with, gigabytes that reading does not need.
+const TRAINERS: &str = "numpy\npillow\npycocotools\ntifffile\nimagecodecs\ncsbdeep\nstardist\nfastremap\nfill-voids\nnatsort\nopencv-python-headless\nroifile\nscipy\ntqdm\n";
+const CELLPOSE: &str = "cellpose==4.2.1.1";
 
 /// Those who measure cameras.
 const MEASURERS: &str = "numpy\npillow\nemva1288==1.0.2\n";
@@ -93,6 +97,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ];
         dataset::generate_with(workspace, &features, &out, own)?;
         heavier(workspace, &written, &pages)?;
+        train(workspace, &written)?;
         read_zarr(workspace, written.iter().chain([&out]), &pages)?;
     }
     measure(workspace)
@@ -144,6 +149,17 @@ fn heavier(workspace: &Workspace, written: &[PathBuf], pages: &Path) -> Result<(
         shell::run(command.envs([("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_DISABLE_PROGRESS_BARS", "1")]))?;
     }
     Ok(())
+}
+
+/// Has the formats of Cellpose and StarDist read by what reads their training data.
+fn train(workspace: &Workspace, written: &[PathBuf]) -> Result<()> {
+    let python = match Python::environment(workspace, "external-trainers", TRAINERS)? {
+        Python::Ready(python) => python,
+        Python::Missing(reason) => bail!("{reason}"),
+    };
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", CELLPOSE];
+    shell::run(Command::new(&python).args(pip))?;
+    shell::run(Command::new(&python).arg(script(workspace, "external_trainers.py")?).args(written))
 }
 
 /// Has OME-Zarr read, in an environment of its own: the others hold its packages back.
