@@ -10,7 +10,7 @@ use crate::setup::Setup;
 #[cfg(feature = "zarr")]
 mod set;
 #[cfg(feature = "zarr")]
-pub(crate) use set::verify;
+pub(crate) use set::{missing, verify};
 
 /// Most pixels of a part that is made as one picture.
 const MOST_PIXELS: u64 = 1 << 28;

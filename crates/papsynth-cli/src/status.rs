@@ -8,26 +8,39 @@ use crate::args::{Merge, Status};
 use crate::exit::{self, Complaint, Failure};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
+    #[cfg(feature = "zarr")]
+    if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
+        let (missing, all) = crate::slide::missing(&args.dir)?;
+        return tell(args, &missing, all, &format!("papsynth slide finalize {}", args.dir.display()));
+    }
     let dataset = Dataset::open(&args.dir)?;
-    let missing = shards_to_make(&dataset, 0..args.frames)?;
+    let Some(frames) = args.frames else {
+        let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
+        return Err(Failure::input(complaint.help("only a slide knows by itself how large it will be")));
+    };
+    let missing = shards_to_make(&dataset, 0..frames)?;
+    let all = frames.div_ceil(dataset.layout().frames_per_shard);
+    tell(args, &missing, all, &format!("papsynth merge {} --frames {frames}", args.dir.display()))
+}
+
+/// What of so many shards is missing, and how to go on if nothing is.
+fn tell(args: &Status, missing: &[u64], all: u64, close: &str) -> Result<(), Failure> {
     if args.missing {
         let mut numbers: Vec<u64> = match args.tasks {
             Some(tasks) => missing.iter().map(|shard| shard % tasks).collect(),
-            None => missing,
+            None => missing.to_vec(),
         };
         numbers.sort_unstable();
         numbers.dedup();
         let text = listed(&numbers);
         return exit::print(&if text.is_empty() { text } else { format!("{text}\n") });
     }
-    let all = args.frames.div_ceil(dataset.layout().frames_per_shard);
     let whole = all - missing.len() as u64;
     let percent = 100.0 * whole as f64 / all as f64;
-    let dir = args.dir.display();
-    exit::print(&format!("{dir}: {whole} of {all} shards are whole ({percent:.1} %)\n"))?;
+    exit::print(&format!("{}: {whole} of {all} shards are whole ({percent:.1} %)\n", args.dir.display()))?;
     match missing.is_empty() {
-        true => exit::print(&format!("Close it with: papsynth merge {dir} --frames {}\n", args.frames)),
-        false => exit::print(&format!("missing: {}\n", listed(&missing))),
+        true => exit::print(&format!("Close it with: {close}\n")),
+        false => exit::print(&format!("missing: {}\n", listed(missing))),
     }
 }
 

@@ -57,6 +57,8 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     fs::remove_dir_all(bench.path("slide")).unwrap();
     bench.good(&format!("{make} --shard 0/2"));
     refused(&bench, "slide finalize slide", "shards are missing");
+    assert_eq!(bench.good("status slide --missing").out, "1,3\n");
+    assert_eq!(bench.good("status slide --missing --tasks 2").out, "1\n");
     bench.good(&format!("{make} --shard 1/2"));
     bench.good("slide finalize slide");
     bench.good("verify slide");

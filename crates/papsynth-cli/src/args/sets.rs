@@ -136,12 +136,12 @@ Examples:
   papsynth status fields --frames 100000 --missing              numbers of the shards that are missing
   sbatch --array=$(papsynth status fields --frames 100000 --missing --tasks 50) job.sh")]
 pub(crate) struct Status {
-    /// Folder of the data set
+    /// Folder of the data set, or of a slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Frames that there will be: those with index 0 to N − 1
+    /// Frames that there will be: those with index 0 to N − 1; a slide knows its size by itself
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub(crate) frames: u64,
+    pub(crate) frames: Option<u64>,
     /// Print only what is missing, as numbers and ranges that `sbatch --array` takes; nothing if nothing is
     #[arg(long)]
     pub(crate) missing: bool,

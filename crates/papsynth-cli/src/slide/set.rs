@@ -79,6 +79,14 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Fail
     Ok(fit.at_once)
 }
 
+/// Numbers of the shards that are missing, row by row, and how many there are in all.
+pub(crate) fn missing(dir: &Path) -> Result<(Vec<u64>, u64), Failure> {
+    let set = SlideSet::open(dir)?;
+    let missing = set.missing(Check::Sizes)?;
+    let numbers = (0_u64..).zip(set.all()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
+    Ok((numbers.collect(), set.all().count() as u64))
+}
+
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {
     close(&SlideSet::open(&args.dir)?, false)
 }
