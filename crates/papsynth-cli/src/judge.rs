@@ -121,7 +121,7 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
         return Err(Failure::input(
-            Complaint::new(message).help(format!("there are {}", crate::schema::quoted(known.into_iter()))),
+            Complaint::new(message).help(format!("there are {}", papsynth_recipe::quoted(known.into_iter()))),
         ));
     }
     Ok(files)

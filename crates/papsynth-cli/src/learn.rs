@@ -9,10 +9,9 @@ use papsynth_dataset::{Error, write_file};
 
 use crate::args::Learn;
 use crate::exit::{self, Complaint, Failure};
-use crate::nearest::nearest;
-use crate::schema::quoted;
 use crate::setup::read_model;
 use crate::text_file;
+use papsynth_recipe::{nearest, quoted};
 
 /// Points of an outline that is traced from a label image: ten for each of the 40 harmonics that are fitted.
 const TRACED_POINTS: usize = 400;

@@ -8,11 +8,9 @@ use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
 use crate::args::RecipeArgs;
-use crate::diagnose::{self, Fault};
 use crate::exit::{Complaint, Failure};
-use crate::nearest::nearest;
-use crate::schema::{Schema, quoted};
 use crate::text_file;
+use papsynth_recipe::{Fault, Schema, nearest, quoted};
 
 /// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
 const LARGEST: u64 = 1 << 20;
@@ -62,7 +60,7 @@ impl RecipeFile {
                 let (name, text) = text_file::read(path, LARGEST, "a recipe, a few kilobytes of text")?;
                 let text = Arc::new(text);
                 let sources = Sources { file: Some((name.clone(), Arc::clone(&text))), sets: Vec::new() };
-                let base = diagnose::read(&text)
+                let base = papsynth_recipe::read(&text)
                     .map_err(|faults| Failure::input(sources.complaint(faults, "the recipe cannot be read")))?;
                 let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
                 (base, Some((name, text)), folder)
@@ -72,7 +70,7 @@ impl RecipeFile {
             let (name, text) = text_file::read(path, LARGEST, "sections of a recipe, a few kilobytes of text")?;
             let text = Arc::new(text);
             let sources = Sources { file: Some((name, Arc::clone(&text))), sets: Vec::new() };
-            let found = diagnose::read(&text)
+            let found = papsynth_recipe::read(&text)
                 .map_err(|faults| Failure::input(sources.complaint(faults, "these sections cannot be read")))?;
             let sections: Table = toml::from_str(&text).unwrap_or_default();
             base.replace(&found, |section| sections.contains_key(section));
@@ -125,7 +123,7 @@ impl RecipeFile {
             papsynth::Error::Recipe(problems) => {
                 let fields = problems
                     .iter()
-                    .map(|p| (p.field.clone(), diagnose::middle_left_out(&p.to_string())))
+                    .map(|p| (p.field.clone(), papsynth_recipe::middle_left_out(&p.to_string())))
                     .collect::<Vec<_>>();
                 (fields, "the recipe asks for what cannot be")
             }
@@ -158,7 +156,7 @@ impl Sources {
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
         // The places found in this text mean nothing to the user; the paths do.
-        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
+        papsynth_recipe::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
     }
 
     /// Faults at the places where the user wrote the fields: the last `--set` that touches one, or the file.
@@ -180,7 +178,7 @@ impl Sources {
             return complaint(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
         }
         match &self.file {
-            Some((name, text)) => match fault.span.or_else(|| diagnose::find(text, &fault.path)) {
+            Some((name, text)) => match fault.span.or_else(|| papsynth_recipe::find(text, &fault.path)) {
                 Some(span) => complaint(fault.message).at(name, text, span),
                 None => complaint(format!("{name}: {}", fault.message)),
             },

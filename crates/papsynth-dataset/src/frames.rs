@@ -10,7 +10,7 @@ use crate::layout;
 use crate::merge::document;
 use crate::read::LevelImage;
 use crate::record::FrameSummary;
-use crate::shard_writer::white;
+use papsynth::white_level as white;
 
 /// Where a recorded frame lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -52,4 +52,5 @@ pub use picture::Picture;
 pub use picture::write_png;
 pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 pub use shard_writer::ShardWriter;
+pub use table::{Column, columns};
 pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};

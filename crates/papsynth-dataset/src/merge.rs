@@ -17,8 +17,8 @@ use crate::parquet;
 use crate::picture::ContactSheet;
 use crate::read;
 use crate::record::{Check, Entry, FORMAT, FORMAT_VERSION, FileRecord, ManifestHead, WRITER, broken};
-use crate::shard_writer::white;
 use crate::splits::Split;
+use papsynth::white_level as white;
 
 /// A data set in a few numbers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

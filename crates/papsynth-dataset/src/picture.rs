@@ -6,8 +6,8 @@ use papsynth::truth::{Group, Mask};
 use papsynth::{Finished, Plane};
 
 use crate::read::LevelImage;
-use crate::shard_writer::white;
 use crate::write::rgb_png;
+use papsynth::white_level as white;
 
 /// A picture in colour.
 #[derive(Debug, Clone, PartialEq, Eq)]

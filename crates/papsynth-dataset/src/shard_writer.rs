@@ -6,7 +6,7 @@ use std::io;
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, Truth};
-use papsynth::{Finished, Plane};
+use papsynth::{Finished, Plane, white_level as white};
 
 use crate::coco::{Document, Info, category_name};
 use crate::dataset::Dataset;
@@ -137,7 +137,7 @@ impl<'a> ShardWriter<'a> {
         }
         let sharp = match Form::of(frame.geometry.planes_um.len()) {
             Form::Single => Vec::new(),
-            Form::Stack => rounded(&finished.all_in_focus, white(frame.geometry.bits)),
+            Form::Stack => finished.sharp(),
         };
         self.end_with(&finished.truth, sharp)
     }
@@ -290,18 +290,6 @@ impl Begun {
         let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
         Err(self.geometry.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
     }
-}
-
-/// The largest grey level.
-pub(crate) fn white(bits: u32) -> u16 {
-    u16::MAX >> 16_u32.saturating_sub(bits.max(1)).min(15)
-}
-
-/// Expected grey levels as a camera without noise would give them.
-fn rounded(values: &[f32], white: u16) -> Vec<u16> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range; NaN becomes 0")]
-    let round = |v: f32| (v + 0.5).clamp(0.0, f32::from(white)) as u16;
-    values.iter().map(|&v| round(v)).collect()
 }
 
 /// Pixels of the masks of each group that one label a pixel does not show.

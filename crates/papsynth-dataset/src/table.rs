@@ -37,6 +37,22 @@ pub(crate) enum Cell {
 
 impl Cell {
     /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
+    fn whole(&self) -> Option<u64> {
+        match *self {
+            Self::Id(id) => Some(id.into()),
+            Self::Whole(whole) => Some(whole),
+            _ => None,
+        }
+    }
+
+    /// NaN where nothing stands.
+    fn number(&self) -> f64 {
+        match *self {
+            Self::Number(number) => number,
+            _ => self.whole().map_or(f64::NAN, |whole| whole as f64),
+        }
+    }
+
     pub(crate) fn print(&self) -> String {
         match self {
             Self::Nothing => String::new(),
@@ -51,10 +67,10 @@ impl Cell {
 }
 
 /// What a column is called, and what stands in it.
-type Column = (&'static str, Sort, fn(&Entry) -> Cell);
+type Named = (&'static str, Sort, fn(&Entry) -> Cell);
 
 /// The columns: what each is called and what stands in it.
-pub(crate) const COLUMNS: [Column; 28] = [
+pub(crate) const COLUMNS: [Named; 28] = [
     ("image", Sort::Whole, |e| Cell::Whole(e.image)),
     ("id", Sort::Id, |e| Cell::Id(e.object.id)),
     ("part", Sort::Text, |e| text(part(e.object.part))),
@@ -104,6 +120,47 @@ pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Result<Vec<u8>, 
         writer.write_record(COLUMNS.map(|(_, _, cell)| cell(&entry).print()))?;
     }
     writer.into_inner().map_err(|e| e.into_error().into())
+}
+
+/// What stands in a column of the table of objects.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Column {
+    /// Whole numbers: ids, pixels.
+    Whole(Vec<u64>),
+    /// Numbers; NaN where there is none.
+    Number(Vec<f64>),
+    /// Truth values.
+    Flag(Vec<bool>),
+    /// Texts.
+    Text(Vec<String>),
+    /// One number a plane.
+    Numbers(Vec<Vec<f64>>),
+}
+
+/// The table of the objects of an image, column by column: those of `objects.csv`.
+#[must_use]
+pub fn columns(truth: &Truth, image: u64) -> Vec<(&'static str, Column)> {
+    let cells = |(name, sort, cell): Named| {
+        let cells = truth.objects.iter().map(move |object| cell(&Entry { image, object }));
+        (name, Column::of(sort, cells))
+    };
+    COLUMNS.into_iter().map(cells).collect()
+}
+
+impl Column {
+    fn of(sort: Sort, cells: impl Iterator<Item = Cell>) -> Self {
+        match sort {
+            Sort::Id | Sort::Whole => Self::Whole(cells.map(|cell| cell.whole().unwrap_or_default()).collect()),
+            Sort::WholeOrNone | Sort::Number | Sort::NumberOrNone => {
+                Self::Number(cells.map(|cell| cell.number()).collect())
+            }
+            Sort::Text => Self::Text(cells.map(|cell| cell.print()).collect()),
+            Sort::Flag => Self::Flag(cells.map(|cell| cell == Cell::Flag(true)).collect()),
+            Sort::Numbers => {
+                Self::Numbers(cells.map(|cell| if let Cell::Numbers(all) = cell { all } else { Vec::new() }).collect())
+            }
+        }
+    }
 }
 
 pub(crate) fn part(part: Part) -> &'static str {

@@ -42,3 +42,30 @@ pub struct Frame {
     /// Everything else.
     pub finished: Finished,
 }
+
+/// The largest grey level of a camera with so many bits, at most 16.
+#[must_use]
+pub fn white_level(bits: u32) -> u16 {
+    u16::MAX >> 16_u32.saturating_sub(bits.max(1)).min(15)
+}
+
+impl Finished {
+    /// [`all_in_focus`](Self::all_in_focus) as a camera without noise would give it.
+    #[must_use]
+    pub fn sharp(&self) -> Vec<u16> {
+        let white = f32::from(white_level(self.scene.camera.bits));
+        // NaN becomes 0.
+        self.all_in_focus.iter().map(|&level| (level + 0.5).clamp(0.0, white) as u16).collect()
+    }
+}
+
+impl Frame {
+    /// The image that shows it in one plane, in grey levels: its only one or, of a stack, the one with everything in focus.
+    #[must_use]
+    pub fn picture(&self) -> Vec<u16> {
+        match self.planes.as_slice() {
+            [plane] => plane.grey.clone(),
+            _ => self.finished.sharp(),
+        }
+    }
+}

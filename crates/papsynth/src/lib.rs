@@ -30,6 +30,6 @@ pub mod truth;
 
 pub use engine::{Engine, Inputs};
 pub use error::Error;
-pub use frame::{Finished, Frame, Plane};
+pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

@@ -23,8 +23,8 @@ use crate::layers::layers;
 use crate::layout::numbered;
 use crate::read::{self, LevelImage};
 use crate::record::{FileRecord, Geometry};
-use crate::shard_writer::white;
 use crate::write::LARGE;
+use papsynth::white_level as white;
 
 /// Side of a chunk: what a viewer reads at least.
 const CHUNK: usize = 512;

@@ -12,7 +12,7 @@ use crate::files::Folder;
 use crate::formats::Format;
 use crate::layout::{self, Form};
 use crate::record::{Check, Manifest};
-use crate::shard_writer::white;
+use papsynth::white_level as white;
 
 /// The table that says which group each image of a folder belongs to.
 const GROUPS: &str = "frames.csv";

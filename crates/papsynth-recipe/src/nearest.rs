@@ -1,7 +1,7 @@
 //! "Did you mean …?": the nearest of some words.
 
 /// The candidate that is most likely meant by a misspelt word, if any is near.
-pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     /// A word is near when at most one in this many of its letters has to change.
     const LETTERS_PER_CHANGE: usize = 3;
     let plain = fold(word);

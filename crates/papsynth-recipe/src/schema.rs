@@ -4,35 +4,43 @@ use papsynth::recipe::Recipe;
 use serde_json::{Map, Value};
 
 /// The schema of recipes.
-pub(crate) struct Schema {
+pub struct Schema {
     root: Value,
 }
 
 /// The schema of one part of a recipe.
 #[derive(Clone, Copy)]
-pub(crate) struct Section<'s> {
+pub struct Section<'s> {
     root: &'s Value,
     /// As it stands where the part is named, with the meaning it has there.
     named: &'s Value,
 }
 
+impl Default for Schema {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Schema {
-    pub(crate) fn new() -> Self {
+    /// That of this version.
+    #[must_use]
+    pub fn new() -> Self {
         Self { root: Recipe::schema() }
     }
 
     /// The whole recipe.
-    pub(crate) fn root(&self) -> Section<'_> {
+    pub fn root(&self) -> Section<'_> {
         Section { root: &self.root, named: &self.root }
     }
 
     /// The part that a dotted path leads to.
-    pub(crate) fn at(&self, path: &[String]) -> Option<Section<'_>> {
+    pub fn at(&self, path: &[String]) -> Option<Section<'_>> {
         path.iter().try_fold(self.root(), |section, name| section.field(name, None))
     }
 
     /// The sections that know a key of this name, as dotted paths.
-    pub(crate) fn homes_of(&self, key: &str) -> Vec<String> {
+    pub fn homes_of(&self, key: &str) -> Vec<String> {
         /// Sections lie three deep: `debris.bacilli.clusters`.
         const DEEPEST: usize = 4;
         let mut found = Vec::new();
@@ -85,7 +93,7 @@ impl<'s> Section<'s> {
     }
 
     /// The keys it knows when its `kind` is this one.
-    pub(crate) fn keys(self, kind: Option<&str>) -> Vec<&'s str> {
+    pub fn keys(self, kind: Option<&str>) -> Vec<&'s str> {
         let fitting = self.alternatives().filter(|a| a.agrees(kind)).filter_map(Self::properties);
         let mut keys: Vec<_> = fitting.flat_map(Map::keys).map(String::as_str).collect();
         keys.sort_unstable();
@@ -94,7 +102,7 @@ impl<'s> Section<'s> {
     }
 
     /// What a key of it may hold, if it knows the key or takes any.
-    pub(crate) fn field(self, name: &str, kind: Option<&str>) -> Option<Self> {
+    pub fn field(self, name: &str, kind: Option<&str>) -> Option<Self> {
         let fitting = || self.alternatives().filter(|a| a.agrees(kind));
         let known = fitting().find_map(|a| a.properties()?.get(name));
         let any = || fitting().find_map(|a| a.named.get("additionalProperties")).filter(|s| s.is_object());
@@ -102,40 +110,40 @@ impl<'s> Section<'s> {
     }
 
     /// Whether it is a table whose keys can be checked.
-    pub(crate) fn is_table(self) -> bool {
+    pub fn is_table(self) -> bool {
         self.alternatives().any(|a| a.properties().is_some() || a.named.get("additionalProperties").is_some())
     }
 
     /// The kinds of table it may be, where it has a `kind`.
-    pub(crate) fn kinds(self) -> Vec<&'s str> {
+    pub fn kinds(self) -> Vec<&'s str> {
         self.alternatives().filter_map(|a| a.named.pointer("/properties/kind/const")?.as_str()).collect()
     }
 
     /// The words it may be, where it is one of a few.
-    pub(crate) fn words(self) -> Vec<&'s str> {
+    pub fn words(self) -> Vec<&'s str> {
         let lists = self.alternatives().filter_map(|a| a.named.get("enum")?.as_array()).flatten();
         let single = self.alternatives().filter_map(|a| a.named.get("const"));
         single.chain(lists).filter_map(Value::as_str).collect()
     }
 
     /// The JSON types it may have; empty if it does not say.
-    pub(crate) fn types(self) -> Vec<&'s str> {
+    pub fn types(self) -> Vec<&'s str> {
         self.alternatives().filter_map(|a| a.named.get("type")?.as_str()).collect()
     }
 
     /// Whether it is a number or a distribution.
-    pub(crate) fn is_number(self) -> bool {
+    pub fn is_number(self) -> bool {
         self.types().contains(&"number")
     }
 
     /// What it means, in the words of its documentation.
-    pub(crate) fn meaning(self) -> Option<&'s str> {
+    pub fn meaning(self) -> Option<&'s str> {
         let text = |value: &'s Value| value.get("description").and_then(Value::as_str);
         text(self.named).or_else(|| text(self.schema()))
     }
 
     /// What would be accepted, in a few words.
-    pub(crate) fn expected(self) -> String {
+    pub fn expected(self) -> String {
         let words = self.words();
         if self.is_number() {
             "a number, or a distribution such as { uniform = [1, 2] }".to_owned()
@@ -156,7 +164,7 @@ impl<'s> Section<'s> {
 }
 
 /// Names in backticks, separated by commas.
-pub(crate) fn quoted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+pub fn quoted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     names.into_iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 

@@ -11,21 +11,24 @@ use crate::schema::{Schema, Section, quoted};
 
 /// Something wrong with the text of a recipe.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Fault {
+pub struct Fault {
     /// The field, from the top; empty if the text is no TOML.
-    pub(crate) path: Vec<String>,
+    pub path: Vec<String>,
     /// The bytes at fault, if known.
-    pub(crate) span: Option<Range<usize>>,
+    pub span: Option<Range<usize>>,
     /// What is wrong.
-    pub(crate) message: String,
+    pub message: String,
     /// What would help.
-    pub(crate) help: Option<String>,
+    pub help: Option<String>,
 }
 
 type Node<'t> = Spanned<DeValue<'t>>;
 
 /// Reads a recipe, or says everything that is wrong with its text.
-pub(crate) fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
+///
+/// # Errors
+/// All faults that are found, in the order of the text: at least one.
+pub fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
     let syntax = |error: toml::de::Error| {
         vec![Fault { path: Vec::new(), span: error.span(), message: one_line(error.message()), help: None }]
     };
@@ -47,7 +50,7 @@ pub(crate) fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
 }
 
 /// The bytes of a field in a text, or of the nearest section around it.
-pub(crate) fn find(text: &str, path: &[String]) -> Option<Range<usize>> {
+pub fn find(text: &str, path: &[String]) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
     let mut table = document.get_ref();
     let mut found = None;
@@ -250,7 +253,7 @@ fn path_to(table: &DeTable<'_>, span: &Range<usize>, path: &mut Vec<String>) {
 }
 
 /// What would be accepted, and what the field means.
-pub(crate) fn help_for(section: Section<'_>) -> String {
+pub fn help_for(section: Section<'_>) -> String {
     let expected = format!("expected {}", section.expected());
     match section.meaning() {
         Some(meaning) => format!("{expected}. The field: {}", one_line(meaning)),
@@ -300,7 +303,7 @@ fn shorten(text: &str) -> String {
 }
 
 /// A message that repeats a value of any length, such as a list: its beginning and its end, where it says what would be accepted.
-pub(crate) fn middle_left_out(text: &str) -> String {
+pub fn middle_left_out(text: &str) -> String {
     /// Characters of either.
     const KEPT: usize = 300;
     let count = text.chars().count();

@@ -1,0 +1,61 @@
+"""The synthetic bright-field microscope for cytology, on NumPy arrays.
+
+>>> import papsynth
+>>> frame = papsynth.render({"field": {"width_px": 320, "height_px": 240}}, seed=7)
+>>> frame.image.shape, frame.labels["nucleus"].dtype
+((240, 320), dtype('int32'))
+
+The same recipe, model, seed and index give the same bytes as the command line, whatever the threads.
+"""
+
+from __future__ import annotations
+
+
+from ._dataset import Dataset, IterableDataset
+from ._errors import Fault, RecipeError
+from ._native import Engine, Frame
+from ._native import recipe_schema as _recipe_schema
+from ._native import resolve as _resolve
+from ._render import render
+
+__all__ = [
+    "Dataset",
+    "Engine",
+    "Fault",
+    "Frame",
+    "IterableDataset",
+    "RecipeError",
+    "recipe",
+    "render",
+    "schema",
+]
+
+
+def recipe(recipe=None) -> dict:
+    """A recipe with everything that was left out.
+
+    Parameters
+    ----------
+    recipe : None, str, os.PathLike or dict
+        Nothing for the default, the name of a preset, the path of a TOML file, or fields by section.
+
+    Returns
+    -------
+    dict
+        Fields by section, as TOML has them.
+
+    Raises
+    ------
+    RecipeError
+        If a field cannot be what it is.
+    """
+    from ._toml import loads
+
+    return loads(_resolve(recipe))
+
+
+def schema() -> dict:
+    """The JSON schema of recipes: every field with its type, range, unit and meaning."""
+    import json
+
+    return json.loads(_recipe_schema())

@@ -1,0 +1,230 @@
+//! Engines and what they make.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use papsynth::key::Key;
+use papsynth::model::Model;
+use papsynth::recipe::{Preset, Recipe};
+use papsynth::{Plane, Threads};
+use papsynth_dataset::read::{Limits, read_inputs};
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+
+use crate::frame::Frame;
+use crate::{convert, error, pool};
+
+/// Largest recipe that is read.
+const LARGEST_RECIPE: u64 = 1 << 20;
+
+/// Largest model that is read.
+const LARGEST_MODEL: u64 = 1 << 28;
+
+/// Makes the images of one recipe.
+///
+/// Parameters
+/// ----------
+/// recipe : None, str, os.PathLike or dict
+///     Nothing for the default, the name of a preset, the path of a TOML file, or fields by section; what is left out is the default.
+/// model : None, str or os.PathLike
+///     A model or a class file, laid over the model that ships.
+///
+/// Raises
+/// ------
+/// RecipeError
+///     If a field of the recipe cannot be what it is; names the field.
+/// OSError
+///     If a file cannot be read.
+/// ValueError
+///     If the model cannot be used.
+#[pyclass(frozen, module = "papsynth")]
+pub(crate) struct Engine {
+    engine: Arc<papsynth::Engine>,
+    source: String,
+}
+
+/// What stops a rendering.
+enum Stop {
+    Engine(papsynth::Error),
+    Python(PyErr),
+}
+
+impl From<papsynth::Error> for Stop {
+    fn from(error: papsynth::Error) -> Self {
+        Self::Engine(error)
+    }
+}
+
+#[pymethods]
+impl Engine {
+    #[new]
+    #[pyo3(signature = (recipe=None, model=None))]
+    fn new(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, model: Option<PathBuf>) -> PyResult<Self> {
+        let Source { mut recipe, folder, name } = Source::read(py, recipe)?;
+        let model = read_model(model.as_deref())?;
+        let (inputs, _) =
+            read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
+        let made = py.detach(|| papsynth::Engine::new(&recipe, &model, &inputs));
+        let engine = made.map_err(|error| error::engine(py, &name, &error))?;
+        Ok(Self { engine: Arc::new(engine), source: name })
+    }
+
+    /// Makes an image and its truth.
+    ///
+    /// Parameters
+    /// ----------
+    /// seed : int
+    ///     The data set, 0 to 2**64 - 1.
+    /// index : int
+    ///     The image in it, 0 to 2**64 - 1.
+    /// threads : int
+    ///     Threads that work on it, 1 for the calling one alone, 0 for as many as there are processors. The bytes are the same.
+    ///
+    /// Returns
+    /// -------
+    /// Frame
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If the scene cannot be drawn.
+    /// KeyboardInterrupt
+    ///     Between the planes of a stack.
+    #[pyo3(signature = (seed=0, index=0, *, threads=1))]
+    fn render(&self, py: Python<'_>, seed: u64, index: u64, threads: usize) -> PyResult<Frame> {
+        let (key, engine) = (Key { seed, index }, Arc::clone(&self.engine));
+        let made = py.detach(|| match threads {
+            1 => render(&engine, key, Threads::One),
+            _ => {
+                let pool = pool::of(threads).map_err(|message| Stop::Python(PyValueError::new_err(message)))?;
+                pool.install(|| render(&engine, key, Threads::All))
+            }
+        });
+        let frame = made.map_err(|stop| match stop {
+            Stop::Engine(error) => error::engine(py, &self.source, &error),
+            Stop::Python(error) => error,
+        })?;
+        Frame::new(py, frame)
+    }
+
+    /// The recipe with everything that was left out, as TOML.
+    #[getter]
+    fn recipe(&self) -> String {
+        self.engine.recipe().to_toml()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<papsynth.Engine of {}>", self.source)
+    }
+}
+
+/// Makes a frame, and looks between its planes whether Python wants to stop.
+fn render(engine: &papsynth::Engine, key: Key, threads: Threads) -> Result<papsynth::Frame, Stop> {
+    let mut planes: Vec<Plane> = Vec::new();
+    let finished = engine.stream(key, threads, |plane| {
+        planes.push(plane.clone());
+        Python::attach(|py| py.check_signals()).map_err(Stop::Python)
+    })?;
+    Ok(papsynth::Frame { planes, finished })
+}
+
+/// A recipe, and where it comes from.
+pub(crate) struct Source {
+    pub(crate) recipe: Recipe,
+    /// Files that it names are relative to this.
+    pub(crate) folder: PathBuf,
+    /// What messages call it.
+    pub(crate) name: String,
+}
+
+impl Source {
+    /// Reads whatever may stand for a recipe.
+    pub(crate) fn read(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let of_preset = |preset: Preset| Self {
+            recipe: preset.recipe(),
+            folder: PathBuf::new(),
+            name: format!("the preset {}", preset.name()),
+        };
+        let Some(recipe) = recipe.filter(|recipe| !recipe.is_none()) else { return Ok(of_preset(Preset::Lbc)) };
+        if let Ok(text) = recipe.cast::<PyString>()
+            && let Some(preset) = Preset::ALL.into_iter().find(|preset| text.to_str().is_ok_and(|t| t == preset.name()))
+        {
+            return Ok(of_preset(preset));
+        }
+        let dict = match recipe.hasattr("to_dict")? {
+            true => Some(recipe.call_method0("to_dict")?),
+            false => None,
+        };
+        if let Ok(dict) = dict.as_ref().unwrap_or(recipe).cast::<PyDict>() {
+            let name = "the recipe".to_owned();
+            let table = convert::table(dict)?;
+            if table.is_empty() {
+                return Ok(Self { name, ..of_preset(Preset::Lbc) });
+            }
+            let text = toml::to_string(&table).map_err(|error| PyValueError::new_err(error.to_string()))?;
+            let recipe = papsynth_recipe::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
+            return Ok(Self { recipe, folder: PathBuf::new(), name });
+        }
+        let path: PathBuf = recipe.extract().map_err(|_| {
+            let presets: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
+            PyValueError::new_err(format!(
+                "recipe: expected None, a dictionary, the path of a TOML file or one of {}",
+                presets.join(", ")
+            ))
+        })?;
+        let text = read(&path, LARGEST_RECIPE)?;
+        let name = path.display().to_string();
+        let recipe = papsynth_recipe::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
+        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Ok(Self { recipe, folder, name })
+    }
+}
+
+fn read_model(path: Option<&Path>) -> PyResult<Model> {
+    let Some(path) = path else { return Ok(Model::builtin()) };
+    let text = read(path, LARGEST_MODEL)?;
+    let named = |error: papsynth::Error| PyValueError::new_err(format!("{}: {error}", path.display()));
+    Model::builtin().with(&text).map_err(named)
+}
+
+fn read(path: &Path, largest: u64) -> PyResult<String> {
+    let named =
+        |error: std::io::Error| PyErr::from(std::io::Error::new(error.kind(), format!("{}: {error}", path.display())));
+    let size = fs::metadata(path).map_err(named)?.len();
+    if size > largest {
+        let message = format!("{}: {size} bytes; expected at most {largest}", path.display());
+        return Err(PyOSError::new_err(message));
+    }
+    fs::read_to_string(path).map_err(named)
+}
+
+/// The JSON schema of recipes, as text.
+#[pyfunction]
+pub(crate) fn recipe_schema() -> String {
+    Recipe::schema().to_string()
+}
+
+/// A recipe with everything that was left out, as TOML.
+///
+/// Parameters
+/// ----------
+/// recipe : None, str, os.PathLike or dict
+///     As of `Engine`.
+#[pyfunction]
+#[pyo3(signature = (recipe=None))]
+pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+    let source = Source::read(py, recipe)?;
+    let problems = source.recipe.problems();
+    if problems.is_empty() {
+        return Ok(source.recipe.to_toml());
+    }
+    Err(error::engine(py, &source.name, &papsynth::Error::Recipe(problems)))
+}
+
+/// What decides of the images of a recipe beside itself: versions of the package and of its random streams.
+#[pyfunction]
+pub(crate) fn identity() -> String {
+    format!("{} (streams of version {})", env!("CARGO_PKG_VERSION"), papsynth::key::STREAM_VERSION)
+}

@@ -1,0 +1,269 @@
+//! Images and their truth as arrays.
+
+use std::sync::OnceLock;
+
+use numpy::{Element, IntoPyArray, PyArrayMethods};
+use papsynth::Plane;
+use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
+use papsynth_dataset::{Column, columns, rle};
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyList};
+
+/// An image or focus stack, with everything that is known of it. Arrays are made when they are first asked for, and then kept.
+///
+/// Attributes
+/// ----------
+/// image : ndarray
+///     (height, width), or (height, width, 3) in colour; uint8, or uint16 for more than 8 bits. Of a stack everything is in focus.
+/// stack : ndarray
+///     (planes, height, width[, 3]), the same type; of an image its one plane.
+/// noise_free : ndarray
+///     float32, as `stack`: the expected grey levels, before noise and rounding.
+/// labels : dict of str to ndarray
+///     (height, width), int32, of "cytoplasm", "nucleus" and "debris": the id of the front-most object at each pixel, 0 where there is none.
+/// layers : ndarray
+///     (height, width), uint16: number of cytoplasms at each pixel.
+/// masks, visible_masks : ndarray
+///     (objects, height, width), bool: complete, and where they are front-most within their group.
+/// boxes : ndarray
+///     (objects, 4), int32: x0, y0, x1, y1 of the complete masks, the last ones exclusive.
+/// rle, visible_rle : list of dict
+///     The masks as pycocotools reads them.
+/// table : dict of str to ndarray
+///     A column each, a row for every object and part: class, places in um, areas and so on.
+/// defocus_um, detectability : ndarray
+///     (objects, planes), float64.
+#[pyclass(frozen, module = "papsynth")]
+pub(crate) struct Frame {
+    #[pyo3(get)]
+    seed: u64,
+    #[pyo3(get)]
+    index: u64,
+    #[pyo3(get)]
+    slide: u64,
+    #[pyo3(get)]
+    pixel_um: f64,
+    #[pyo3(get)]
+    planes_um: Vec<f64>,
+    #[pyo3(get)]
+    bits: u32,
+    #[pyo3(get)]
+    image: Py<PyAny>,
+    #[pyo3(get)]
+    stack: Py<PyAny>,
+    #[pyo3(get)]
+    noise_free: Py<PyAny>,
+    truth: Truth,
+    kept: Kept,
+}
+
+/// What was asked for before.
+#[derive(Default)]
+struct Kept {
+    labels: OnceLock<Py<PyAny>>,
+    layers: OnceLock<Py<PyAny>>,
+    masks: OnceLock<Py<PyAny>>,
+    visible_masks: OnceLock<Py<PyAny>>,
+    table: OnceLock<Py<PyAny>>,
+}
+
+impl Frame {
+    pub(crate) fn new(py: Python<'_>, frame: papsynth::Frame) -> PyResult<Self> {
+        let picture = frame.picture();
+        let papsynth::Frame { planes, finished } = frame;
+        let scene = &finished.scene;
+        let (bits, channels) = (scene.camera.bits, planes.first().map_or(1, |plane| plane.channels));
+        let size = [scene.view.height, scene.view.width];
+        let count = planes.len();
+        let levels = |levels: Vec<u16>, shape: Vec<usize>| -> PyResult<Py<PyAny>> {
+            if bits <= 8 {
+                #[expect(clippy::cast_possible_truncation, reason = "at most 8 bits")]
+                return array(py, levels.into_iter().map(|level| level as u8).collect(), shape);
+            }
+            array(py, levels, shape)
+        };
+        let shape = |planes: Option<usize>| -> Vec<usize> {
+            planes.into_iter().chain(size).chain((channels > 1).then_some(channels)).collect()
+        };
+        let image = levels(picture, shape(None))?;
+        let (mut grey, mut noise_free) = (Vec::new(), Vec::new());
+        for plane in planes {
+            let Plane { grey: levels, noise_free: expected, .. } = plane;
+            if count == 1 {
+                (grey, noise_free) = (levels, expected);
+            } else {
+                grey.extend(levels);
+                noise_free.extend(expected);
+            }
+        }
+        Ok(Self {
+            seed: scene.key.seed,
+            index: scene.key.index,
+            slide: scene.slide,
+            pixel_um: scene.view.pixel_um,
+            planes_um: scene.planes_um.clone(),
+            bits,
+            image,
+            stack: levels(grey, shape(Some(count)))?,
+            noise_free: array(py, noise_free, shape(Some(count)))?,
+            truth: finished.truth,
+            kept: Kept::default(),
+        })
+    }
+
+    fn masks_of(&self, py: Python<'_>, mask: impl Fn(&ObjectTruth) -> &Mask + Sync) -> PyResult<Py<PyAny>> {
+        let Truth { width, height, objects } = &self.truth;
+        let values = py.detach(|| {
+            let mut values = vec![false; objects.len() * width * height];
+            for (object, values) in objects.iter().zip(values.chunks_exact_mut((width * height).max(1))) {
+                mask(object).pixels(*width).for_each(|pixel| values[pixel] = true);
+            }
+            values
+        });
+        array(py, values, vec![objects.len(), *height, *width])
+    }
+
+    fn rle_of(&self, py: Python<'_>, mask: impl Fn(&ObjectTruth) -> &Mask) -> PyResult<Py<PyAny>> {
+        let Truth { width, height, objects } = &self.truth;
+        let list = PyList::empty(py);
+        for object in objects {
+            let one = PyDict::new(py);
+            one.set_item("size", [*height, *width])?;
+            one.set_item("counts", PyBytes::new(py, rle::encode(mask(object), *width, *height).as_bytes()))?;
+            list.append(one)?;
+        }
+        list.into_py_any(py)
+    }
+
+    fn by_plane(&self, py: Python<'_>, values: impl Fn(&ObjectTruth) -> &Vec<f64>) -> PyResult<Py<PyAny>> {
+        let all: Vec<f64> = self.truth.objects.iter().flat_map(|object| values(object).iter().copied()).collect();
+        array(py, all, vec![self.truth.objects.len(), self.planes_um.len()])
+    }
+}
+
+#[pymethods]
+impl Frame {
+    #[getter]
+    fn labels(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        kept(py, &self.kept.labels, || {
+            let Truth { width, height, .. } = self.truth;
+            let dict = PyDict::new(py);
+            for group in Group::ALL {
+                let ids = py.detach(|| self.truth.labels(group).ids);
+                #[expect(clippy::cast_possible_wrap, reason = "ids of a field are far below 2³¹")]
+                let ids = ids.into_iter().map(|id| id as i32).collect();
+                dict.set_item(group.name(), array::<i32>(py, ids, vec![height, width])?)?;
+            }
+            dict.into_py_any(py)
+        })
+    }
+
+    #[getter]
+    fn layers(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        let Truth { width, height, .. } = self.truth;
+        kept(py, &self.kept.layers, || array(py, py.detach(|| self.truth.layers()), vec![height, width]))
+    }
+
+    #[getter]
+    fn masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        kept(py, &self.kept.masks, || self.masks_of(py, |object| &object.amodal))
+    }
+
+    #[getter]
+    fn visible_masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        kept(py, &self.kept.visible_masks, || self.masks_of(py, |object| &object.front))
+    }
+
+    #[getter]
+    fn boxes(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        #[expect(clippy::cast_possible_wrap, reason = "images are smaller than 2³¹ pixels a side")]
+        let of = |bounds: Bounds| {
+            [bounds.x, bounds.y, bounds.x + bounds.width, bounds.y + bounds.height].map(|side| side as i32)
+        };
+        let all: Vec<i32> =
+            self.truth.objects.iter().flat_map(|object| object.amodal.bounds().map_or([0; 4], of)).collect();
+        array(py, all, vec![self.truth.objects.len(), 4])
+    }
+
+    #[getter]
+    fn rle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.rle_of(py, |object| &object.amodal)
+    }
+
+    #[getter]
+    fn visible_rle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.rle_of(py, |object| &object.front)
+    }
+
+    #[getter]
+    fn defocus_um(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.by_plane(py, |object| &object.defocus_um)
+    }
+
+    #[getter]
+    fn detectability(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        self.by_plane(py, |object| &object.detectability)
+    }
+
+    #[getter]
+    fn table(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        kept(py, &self.kept.table, || {
+            let dict = PyDict::new(py);
+            let count = self.truth.objects.len();
+            for (name, column) in columns(&self.truth, self.index) {
+                let values = match column {
+                    Column::Whole(values) => array(py, values, vec![count])?,
+                    Column::Number(values) => array(py, values, vec![count])?,
+                    Column::Flag(values) => array(py, values, vec![count])?,
+                    Column::Text(values) => text(py, values)?,
+                    // In arrays of their own, one value a plane.
+                    Column::Numbers(_) => continue,
+                };
+                dict.set_item(name, values)?;
+            }
+            dict.into_py_any(py)
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.truth.objects.len()
+    }
+
+    fn __repr__(&self) -> String {
+        let Truth { width, height, objects } = &self.truth;
+        let cells = objects.iter().filter(|object| object.part == Part::Cytoplasm).count();
+        format!(
+            "<papsynth.Frame {} of seed {}: {width} x {height} px, {} planes, {cells} cells, {} objects and parts>",
+            self.index,
+            self.seed,
+            self.planes_um.len(),
+            objects.len()
+        )
+    }
+}
+
+/// What was made before, or is made now.
+fn kept(
+    py: Python<'_>,
+    place: &OnceLock<Py<PyAny>>,
+    make: impl FnOnce() -> PyResult<Py<PyAny>>,
+) -> PyResult<Py<PyAny>> {
+    if let Some(found) = place.get() {
+        return Ok(found.clone_ref(py));
+    }
+    let made = make()?;
+    // Of two threads that asked at once, both get what the first made.
+    Ok(place.get_or_init(|| made).clone_ref(py))
+}
+
+/// An array of that shape, over the memory of the values.
+fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: Vec<usize>) -> PyResult<Py<PyAny>> {
+    values.into_pyarray(py).reshape(shape)?.into_py_any(py)
+}
+
+/// An array of texts.
+fn text(py: Python<'_>, values: Vec<String>) -> PyResult<Py<PyAny>> {
+    let numpy = py.import("numpy")?;
+    numpy.call_method1("array", (values, "U"))?.into_py_any(py)
+}

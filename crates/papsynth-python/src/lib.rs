@@ -1,0 +1,24 @@
+//! The engine on NumPy arrays: what `papsynth._native` holds, over which `python/papsynth` lies.
+#![forbid(unsafe_code)]
+
+mod convert;
+mod engine;
+mod error;
+mod frame;
+mod pool;
+
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::engine::Engine;
+    #[pymodule_export]
+    use crate::engine::identity;
+    #[pymodule_export]
+    use crate::engine::recipe_schema;
+    #[pymodule_export]
+    use crate::engine::resolve;
+    #[pymodule_export]
+    use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::pool::after_fork;
+}
