@@ -10,7 +10,7 @@ use toml::{Table, Value};
 use crate::args::RecipeArgs;
 use crate::exit::{Complaint, Failure};
 use crate::text_file;
-use papsynth_recipe::{Fault, Schema, nearest, quoted};
+use papsynth_recipe::{Fault, Schema};
 
 /// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
 const LARGEST: u64 = 1 << 20;
@@ -91,19 +91,7 @@ impl RecipeFile {
 
     /// Every class of cells must be one of the model's.
     pub(crate) fn check_classes(&self, model: &Model) -> Result<(), Failure> {
-        let known = || model.classes.keys().map(String::as_str);
-        let unknown = self.recipe.cells.keys().filter(|class| !model.classes.contains_key(*class));
-        let faults: Vec<Fault> = unknown
-            .map(|class| {
-                let hint = nearest(class, known()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
-                Fault {
-                    path: vec!["cells".to_owned(), class.clone()],
-                    span: None,
-                    message: format!("cells.{class}: the model has no such class"),
-                    help: Some(format!("{hint}The model knows {}", quoted(known()))),
-                }
-            })
-            .collect();
+        let faults = papsynth_recipe::unknown_classes(&self.recipe, model);
         match faults.is_empty() {
             true => Ok(()),
             false => Err(Failure::input(self.sources.complaint(faults, "the model lacks classes"))),

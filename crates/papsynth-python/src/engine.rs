@@ -8,7 +8,7 @@ use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Plane, Threads};
-use papsynth_dataset::read::{Limits, read_inputs};
+use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -41,8 +41,11 @@ const LARGEST_MODEL: u64 = 1 << 28;
 ///     If the model cannot be used.
 #[pyclass(frozen, module = "papsynth")]
 pub(crate) struct Engine {
-    engine: Arc<papsynth::Engine>,
-    source: String,
+    pub(crate) engine: Arc<papsynth::Engine>,
+    pub(crate) model: Model,
+    /// The map that the recipe names.
+    pub(crate) map: Option<InputFile>,
+    pub(crate) source: String,
 }
 
 /// What stops a rendering.
@@ -64,11 +67,15 @@ impl Engine {
     fn new(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, model: Option<PathBuf>) -> PyResult<Self> {
         let Source { mut recipe, folder, name } = Source::read(py, recipe)?;
         let model = read_model(model.as_deref())?;
-        let (inputs, _) =
+        let faults = papsynth_recipe::unknown_classes(&recipe, &model);
+        if !faults.is_empty() {
+            return Err(error::recipe(py, &name, &faults));
+        }
+        let (inputs, map) =
             read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
         let made = py.detach(|| papsynth::Engine::new(&recipe, &model, &inputs));
         let engine = made.map_err(|error| error::engine(py, &name, &error))?;
-        Ok(Self { engine: Arc::new(engine), source: name })
+        Ok(Self { engine: Arc::new(engine), model, map, source: name })
     }
 
     /// Makes an image and its truth.

@@ -6,6 +6,7 @@ mod engine;
 mod error;
 mod frame;
 mod pool;
+mod sets;
 
 #[pyo3::pymodule]
 mod _native {
@@ -21,4 +22,12 @@ mod _native {
     use crate::frame::Frame;
     #[pymodule_export]
     use crate::pool::after_fork;
+    #[pymodule_export]
+    use crate::sets::generate;
+    #[pymodule_export]
+    use crate::sets::merge;
+    #[pymodule_export]
+    use crate::sets::missing;
+    #[pymodule_export]
+    use crate::sets::verify;
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use papsynth::model::Model;
 use papsynth::recipe::{Number, RECIPE_VERSION, Recipe};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -47,6 +48,23 @@ pub fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
         return Err(check.faults);
     }
     toml::from_str(text).map_err(|error: toml::de::Error| vec![type_fault(&error, table.get_ref(), &schema)])
+}
+
+/// Classes of cells that a recipe names and a model lacks.
+#[must_use]
+pub fn unknown_classes(recipe: &Recipe, model: &Model) -> Vec<Fault> {
+    let known = || model.classes.keys().map(String::as_str);
+    let unknown = recipe.cells.keys().filter(|class| !model.classes.contains_key(*class));
+    let fault = |class: &String| {
+        let hint = nearest(class, known()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
+        Fault {
+            path: vec!["cells".to_owned(), class.clone()],
+            span: None,
+            message: format!("cells.{class}: the model has no such class"),
+            help: Some(format!("{hint}The model knows {}", quoted(known()))),
+        }
+    };
+    unknown.map(fault).collect()
 }
 
 /// The bytes of a field in a text, or of the nearest section around it.

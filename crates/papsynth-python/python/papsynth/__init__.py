@@ -17,6 +17,7 @@ from ._native import Engine, Frame
 from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
 from ._render import render
+from ._sets import generate, merge, missing, verify
 
 __all__ = [
     "Dataset",
@@ -25,9 +26,13 @@ __all__ = [
     "Frame",
     "IterableDataset",
     "RecipeError",
+    "generate",
+    "merge",
+    "missing",
     "recipe",
     "render",
     "schema",
+    "verify",
 ]
 
 

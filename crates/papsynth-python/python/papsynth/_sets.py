@@ -1,0 +1,117 @@
+"""Data sets on the disk, as the command line makes them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from . import _native
+from ._render import engine
+
+__all__ = ["generate", "merge", "missing", "verify"]
+
+
+def generate(
+    recipe: Any,
+    out: str | os.PathLike[str],
+    frames: int,
+    seed: int = 0,
+    *,
+    share: tuple[int, int] = (0, 1),
+    formats: Sequence[str] | None = None,
+    frames_per_shard: int | None = None,
+    threads: int = 1,
+    verify: bool = False,
+    model: Any = None,
+    progress: Callable[[int], object] | None = None,
+) -> dict[str, int]:
+    """Makes the frames of a data set that are not whole there, or one share of them.
+
+    Killed and called again it goes on; several processes may work on the same folder. `merge` closes the data set.
+
+    Parameters
+    ----------
+    recipe : None, str, os.PathLike or dict
+        As of `papsynth.render`.
+    out : str or os.PathLike
+        New, empty, or a data set of the same recipe, seed and formats.
+    frames : int
+        Frames that there will be in all, by every share.
+    seed : int
+    share : tuple of int
+        (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
+    formats : list of str
+        Such as ``"folder"`` (the default) or ``"webdataset"``.
+    frames_per_shard : int, optional
+        Frames that are written and made again together.
+    threads : int
+        Frames that are made side by side.
+    verify : bool
+        Whether files that are there are read, rather than their sizes compared.
+    model : None, str or os.PathLike
+    progress : callable, optional
+        Called with the index of each frame that is done.
+
+    Returns
+    -------
+    dict
+        Numbers of frames that were ``"kept"`` and ``"made"``.
+
+    Raises
+    ------
+    RecipeError
+        If a field of the recipe cannot be what it is.
+    OSError
+        If the system refuses to write; what is written is whole, and the same call goes on.
+    ValueError
+        If the folder holds something else.
+    """
+    made_by = engine(recipe, model)
+    return _native.generate(
+        made_by,
+        os.fspath(out),
+        frames,
+        seed,
+        share=tuple(share),
+        formats=None if formats is None else list(formats),
+        frames_per_shard=frames_per_shard,
+        threads=threads,
+        verify=verify,
+        progress=progress,
+    )
+
+
+def merge(out: str | os.PathLike[str], frames: int) -> str:
+    """Closes a data set: fails on any gap, writes the files about all frames.
+
+    Returns
+    -------
+    str
+        The root hash: two data sets of one root hash are the same.
+
+    Raises
+    ------
+    ValueError
+        If shards are missing, which are named, or there is no data set.
+    OSError
+        If the system refuses to read or write.
+    """
+    return _native.merge(os.fspath(out), frames)
+
+
+def missing(out: str | os.PathLike[str], frames: int) -> list[int]:
+    """Numbers of the shards that are not whole, from commit records: also while others work."""
+    return _native.missing(os.fspath(out), frames)
+
+
+def verify(out: str | os.PathLike[str], frames: int | None = None) -> dict[str, Any]:
+    """Reads every file of a data set and says what is wrong.
+
+    Returns
+    -------
+    dict
+        ``"root"``, the root hash of a data set that is whole, else None; numbers of ``"frames"`` and ``"files"``; ``"findings"``, a list of
+        (file, what is wrong with it).
+    """
+    return _native.verify(os.fspath(out), frames)

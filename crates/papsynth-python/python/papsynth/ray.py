@@ -1,0 +1,125 @@
+"""Data sets made by a Ray cluster: one task a share of the shards."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from . import _sets
+from ._dataset import Dataset
+
+__all__ = ["dataset", "generate"]
+
+# Ray itself does not try again what an exception ended.
+_RETRIES = 20
+
+
+def _ray():
+    try:
+        import ray
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError("papsynth.ray needs Ray: pip install 'papsynth[ray]'", name="ray") from error
+    return ray
+
+
+def _share(recipe, out, frames, seed, share, options):
+    _sets.generate(recipe, out, frames, seed, share=share, **options)
+    return share[0]
+
+
+def generate(
+    recipe: Any,
+    out: str | os.PathLike[str],
+    frames: int,
+    seed: int = 0,
+    *,
+    shares: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    **options: Any,
+) -> str:
+    """Makes a data set on a folder that all nodes share, and closes it.
+
+    Tasks are tried again when their worker dies or the system refuses to write. If this process dies, the same call goes on: what there is
+    is known from commit records alone.
+
+    Parameters
+    ----------
+    recipe, out, frames, seed
+        As of `papsynth.generate`.
+    shares : int, optional
+        Number of tasks; by default four for each processor of the cluster. A task should take minutes.
+    progress : callable, optional
+        Called with the number of shares that are done and that there are.
+    **options
+        As of `papsynth.generate`: formats, frames_per_shard, threads, verify, model.
+
+    Returns
+    -------
+    str
+        The root hash.
+    """
+    ray = _ray()
+    if not ray.is_initialized():
+        ray.init()
+    out = os.path.abspath(os.fspath(out))
+    if shares is None:
+        shares = 4 * max(1, int(ray.cluster_resources().get("CPU", 1)))
+    shares = max(1, min(shares, frames))
+    task = ray.remote(max_retries=_RETRIES, retry_exceptions=[OSError], num_cpus=options.get("threads", 1))(_share)
+    pending = [task.remote(recipe, out, frames, seed, (share, shares), options) for share in range(shares)]
+    done = 0
+    while pending:
+        ready, pending = ray.wait(pending, timeout=1.0)
+        ray.get(ready)
+        done += len(ready)
+        if progress is not None and ready:
+            progress(done, shares)
+    return _sets.merge(out, frames)
+
+
+def dataset(
+    recipe: Any = None,
+    seed: int = 0,
+    length: int = 1,
+    *,
+    transform: Callable[[Any], Any] | None = None,
+    ahead: int | None = None,
+    **options: Any,
+) -> Iterator[Any]:
+    """Samples in the order of their indices, made by the cluster while a trainer works.
+
+    Parameters
+    ----------
+    recipe, seed, length, transform
+        As of `papsynth.Dataset`. Without a transform a sample is a dictionary of image, labels and boxes.
+    ahead : int, optional
+        Samples that are made or wait to be taken at most; by default twice the processors of the cluster.
+
+    Yields
+    ------
+    sample
+    """
+    ray = _ray()
+    if not ray.is_initialized():
+        ray.init()
+    samples = Dataset(recipe, seed, length, transform=transform or _arrays, **options)
+    held = ray.put(samples)
+    task = ray.remote(max_retries=_RETRIES, num_cpus=1)(_sample)
+    if ahead is None:
+        ahead = 2 * max(1, int(ray.cluster_resources().get("CPU", 1)))
+    waiting: list[Any] = []
+    for index in range(len(samples)):
+        waiting.append(task.remote(held, index))
+        if len(waiting) >= max(1, ahead):
+            yield ray.get(waiting.pop(0))
+    while waiting:
+        yield ray.get(waiting.pop(0))
+
+
+def _sample(samples, index):
+    return samples[index]
+
+
+def _arrays(frame):
+    return {"image": frame.image, "labels": frame.labels, "boxes": frame.boxes, "table": frame.table}

@@ -1,0 +1,221 @@
+//! Data sets on the disk.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use papsynth::Threads;
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Progress, Run, Share, shards_to_make};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::engine::Engine;
+use crate::error;
+
+/// How often it is looked whether Python wants to stop.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Makes the frames of a data set that are not whole there, or one share of them.
+///
+/// Parameters
+/// ----------
+/// engine : Engine
+/// out : str or os.PathLike
+///     New, empty, or a data set of the same recipe, seed and formats.
+/// frames : int
+///     Frames that there will be in all, by every share.
+/// seed : int
+/// share : tuple of int
+///     (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
+/// formats : list of str
+///     Such as "folder" or "webdataset", as of the command line.
+/// frames_per_shard : int, optional
+///     Frames that are written and made again together; by default as of the command line.
+/// threads : int
+///     Frames that are made side by side.
+/// verify : bool
+///     Whether files that are there are read, rather than their sizes compared.
+/// progress : callable, optional
+///     Called with the index of each frame that is done.
+///
+/// Returns
+/// -------
+/// dict
+///     Numbers of frames that were "kept" and "made".
+///
+/// Raises
+/// ------
+/// OSError
+///     If the system refuses to write; what is written is whole, and the same call goes on.
+/// ValueError
+///     If the folder holds something else.
+#[pyfunction]
+#[pyo3(signature = (engine, out, frames, seed=0, *, share=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn generate<'py>(
+    py: Python<'py>,
+    engine: &Bound<'py, Engine>,
+    out: PathBuf,
+    frames: u64,
+    seed: u64,
+    share: (u64, u64),
+    formats: Option<Vec<String>>,
+    frames_per_shard: Option<u64>,
+    threads: usize,
+    verify: bool,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let made_by = engine.get();
+    let (index, of) = share;
+    if of == 0 || index >= of {
+        return Err(PyValueError::new_err(format!("share: ({index}, {of}) is none; expected (i, n) with i below n")));
+    }
+    if frames == 0 || threads == 0 {
+        return Err(PyValueError::new_err("frames, threads: 0; expected 1 or more"));
+    }
+    let layout = layout(formats, frames_per_shard)?;
+    let info = DatasetInfo {
+        recipe: made_by.engine.recipe(),
+        model: &made_by.model,
+        seed,
+        map: made_by.map.as_ref(),
+        layout: &layout,
+    };
+    let dataset = Dataset::create_or_resume(&out, &info).map_err(|error| error::dataset(&error))?;
+    let stop = AtomicBool::new(false);
+    let check = if verify { Check::Hashes } else { Check::Sizes };
+    let share = Share { index, of };
+    let run =
+        Run { frames: 0..frames, share, at_once: threads, threads: Threads::One, check, stop: &stop, profile: None };
+    let engine = &made_by.engine;
+    let mut interrupted: Option<PyErr> = None;
+    let progress = progress.map(Bound::unbind);
+    let outcome = py.detach(|| {
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let (dataset, run) = (&dataset, &run);
+            let worker = scope.spawn(move || {
+                dataset.generate(engine, run, &|step| {
+                    let done = match step {
+                        Progress::Kept(index) => index,
+                        Progress::Made(frame) => frame.index,
+                    };
+                    // Nobody listens any more where Python has stopped.
+                    let _ = sender.send(done);
+                })
+            });
+            loop {
+                let found = receiver.recv_timeout(LOOK);
+                let heard = Python::attach(|py| {
+                    if let (Ok(index), Some(progress)) = (&found, &progress) {
+                        progress.call1(py, (*index,))?;
+                    }
+                    py.check_signals()
+                });
+                if let Err(error) = heard {
+                    stop.store(true, Ordering::Relaxed);
+                    interrupted.get_or_insert(error);
+                    break;
+                }
+                if matches!(found, Err(mpsc::RecvTimeoutError::Disconnected)) {
+                    break;
+                }
+            }
+            worker.join()
+        })
+    });
+    if let Some(error) = interrupted {
+        return Err(error);
+    }
+    let outcome =
+        outcome.map_err(|_| PyValueError::new_err("the engine has failed"))?.map_err(|error| match error {
+            papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
+            other => error::dataset(&other),
+        })?;
+    let told = PyDict::new(py);
+    told.set_item("kept", outcome.kept)?;
+    told.set_item("made", outcome.made)?;
+    Ok(told)
+}
+
+fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
+    let formats: Vec<Format> = match formats {
+        None => vec![Format::Folder],
+        Some(names) => names.iter().map(|name| format(name)).collect::<PyResult<_>>()?,
+    };
+    let mut layout = Layout::new(formats);
+    if let Some(frames) = frames_per_shard {
+        if !(1..=1_000_000).contains(&frames) {
+            return Err(PyValueError::new_err(format!("frames_per_shard: {frames}; expected 1 to 1000000")));
+        }
+        layout.frames_per_shard = frames;
+    }
+    Ok(layout)
+}
+
+fn format(name: &str) -> PyResult<Format> {
+    Format::built().find(|format| format.name() == name).ok_or_else(|| {
+        let known: Vec<&str> = Format::built().map(Format::name).collect();
+        PyValueError::new_err(format!("formats: `{name}` is not known; expected some of {}", known.join(", ")))
+    })
+}
+
+/// Closes a data set: fails on any gap, writes the files about all frames.
+///
+/// Parameters
+/// ----------
+/// out : str or os.PathLike
+/// frames : int
+///     Frames that must be there.
+///
+/// Returns
+/// -------
+/// str
+///     The root hash: two data sets of one root hash are the same.
+#[pyfunction]
+pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<String> {
+    let gaps = missing(py, out.clone(), frames)?;
+    if !gaps.is_empty() {
+        let some: Vec<String> = gaps.iter().take(20).map(u64::to_string).collect();
+        let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
+        return Err(PyValueError::new_err(message));
+    }
+    py.detach(|| -> Result<String, papsynth_dataset::Error> {
+        Dataset::open(&out)?.finish()?;
+        root(&out, frames)
+    })
+    .map_err(|error| error::dataset(&error))
+}
+
+fn root(out: &Path, frames: u64) -> Result<String, papsynth_dataset::Error> {
+    Ok(papsynth_dataset::verify(out, Some(0..frames))?.root.unwrap_or_default())
+}
+
+/// Numbers of the shards that are not whole, from commit records: also while others work.
+#[pyfunction]
+pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec<u64>> {
+    let found = py.detach(|| shards_to_make(&Dataset::open(&out)?, 0..frames));
+    found.map_err(|error| error::dataset(&error))
+}
+
+/// Reads every file of a data set.
+///
+/// Returns
+/// -------
+/// dict
+///     "root", the root hash or None; numbers of "frames" and "files"; "findings", a list of (path, what is wrong).
+#[pyfunction]
+#[pyo3(signature = (out, frames=None))]
+pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
+    let verdict = py.detach(|| papsynth_dataset::verify(&out, frames.map(|frames| 0..frames)));
+    let verdict = verdict.map_err(|error| error::dataset(&error))?;
+    let told = PyDict::new(py);
+    told.set_item("root", verdict.root)?;
+    told.set_item("frames", verdict.frames)?;
+    told.set_item("files", verdict.files)?;
+    let findings = verdict.findings.into_iter().map(|finding| (finding.path, finding.message));
+    told.set_item("findings", PyList::new(py, findings.collect::<Vec<_>>())?)?;
+    Ok(told)
+}

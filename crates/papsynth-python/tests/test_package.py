@@ -1,0 +1,243 @@
+"""What the package promises: the bytes of the command line, errors that name fields, and no harm from forks, threads and pickles.
+
+PAPSYNTH names the program to compare with.
+"""
+
+import json
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import papsynth
+import pytest
+
+SMALL = {"field": {"width_px": 320, "height_px": 240}}
+WORDS = ["--set", "field.width_px=320", "--set", "field.height_px=240"]
+PROGRAM = os.environ.get("PAPSYNTH")
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return papsynth.render(SMALL, seed=7, index=3)
+
+
+def test_arrays_have_their_shapes_and_types(frame):
+    assert (frame.image.shape, frame.image.dtype) == ((240, 320), np.uint8)
+    assert (frame.stack.shape, frame.noise_free.shape) == ((1, 240, 320), (1, 240, 320))
+    assert np.array_equal(frame.stack[0], frame.image)
+    assert frame.noise_free.dtype == np.float32 and abs(frame.noise_free.mean() - frame.image.mean()) < 1
+    assert frame.image.flags.c_contiguous and frame.image.flags.writeable
+    deep = papsynth.render({**SMALL, "camera": papsynth.recipe()["camera"] | {"bits": 12}}, seed=7)
+    assert deep.image.dtype == np.uint16 and deep.image.max() > 255 and deep.bits == 12
+    stack = papsynth.render({**SMALL, "focus": {"planes": 3}}, seed=7)
+    assert stack.stack.shape == (3, 240, 320) and len(stack.planes_um) == 3 and stack.image.shape == (240, 320)
+    colour = papsynth.render({**SMALL, "light": {"kind": "colour"}}, seed=7)
+    assert colour.image.shape == (240, 320, 3) and colour.noise_free.shape == (1, 240, 320, 3)
+
+
+def test_truth_agrees_with_itself(frame):
+    table = frame.table
+    assert len(frame) == len(frame.masks) == len(table["id"]) == len(frame.boxes) == len(frame.rle) > 0
+    assert all(len(column) == len(frame) for column in table.values())
+    assert np.array_equal(frame.masks.sum(axis=(1, 2)), table["area_px"])
+    assert np.array_equal(frame.visible_masks.sum(axis=(1, 2)), table["front_area_px"])
+    assert not (frame.visible_masks & ~frame.masks).any()
+    for mask, box in zip(frame.masks, frame.boxes):
+        if mask.any():
+            rows, columns = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
+            assert list(box) == [columns[0], rows[0], columns[-1] + 1, rows[-1] + 1]
+    for group, part in (("cytoplasm", "cytoplasm"), ("nucleus", "nucleus"), ("debris", "whole")):
+        labels = np.zeros(frame.image.shape, dtype=np.int32)
+        for mask, number in zip(frame.visible_masks[table["part"] == part], table["id"][table["part"] == part]):
+            labels[mask] = number
+        assert np.array_equal(labels, frame.labels[group])
+    assert np.array_equal(frame.masks[table["part"] == "cytoplasm"].sum(axis=0), frame.layers)
+    assert frame.defocus_um.shape == frame.detectability.shape == (len(frame), 1)
+    assert frame.labels is frame.labels, "made once"
+
+
+@pytest.mark.skipif(PROGRAM is None, reason="PAPSYNTH does not name the program")
+def test_bytes_are_those_of_the_command_line(tmp_path):
+    for preset, words, recipe in ((None, WORDS, SMALL), ("high-grade", [], "high-grade")):
+        out = tmp_path / str(preset)
+        chosen = [] if preset is None else ["--preset", preset]
+        subprocess.run([PROGRAM, "generate", "--out", out, "--frames", "2", "--seed", "7", "--quiet", *chosen, *words], check=True)
+        from PIL import Image
+
+        for index in range(2):
+            found = papsynth.render(recipe, seed=7, index=index)
+            assert np.array_equal(np.asarray(Image.open(out / f"images/{index:06}.png")), found.image)
+            import csv
+
+            rows = [row for row in csv.DictReader((out / "objects.csv").open()) if int(row["image"]) == index]
+            assert [int(row["id"]) for row in rows] == list(found.table["id"])
+            assert [row["class"] for row in rows] == list(found.table["class"])
+            assert [int(row["area_px"]) for row in rows] == list(found.table["area_px"])
+
+
+@pytest.mark.skipif(PROGRAM is None, reason="PAPSYNTH does not name the program")
+def test_data_sets_have_the_root_hash_of_the_command_line(tmp_path):
+    words = ["--frames", "4", "--seed", "7", "--no-parquet"] if has_parquet() else ["--frames", "4", "--seed", "7"]
+    subprocess.run([PROGRAM, "generate", "--out", tmp_path / "cli", "--quiet", *words, *WORDS], check=True)
+    for share in range(3):
+        papsynth.generate(SMALL, tmp_path / "py", 4, seed=7, share=(share, 3))
+    assert papsynth.merge(tmp_path / "py", 4) == papsynth.verify(tmp_path / "cli", 4)["root"]
+
+
+def has_parquet():
+    return "--no-parquet" in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
+
+
+def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
+    seen = []
+    first = papsynth.generate(SMALL, tmp_path / "set", 4, share=(0, 2), progress=seen.append)
+    assert first == {"kept": 0, "made": 2} and sorted(seen) == [0, 2]
+    assert papsynth.missing(tmp_path / "set", 4) == [1, 3]
+    with pytest.raises(ValueError, match="2 shards are missing: 1, 3"):
+        papsynth.merge(tmp_path / "set", 4)
+    assert papsynth.generate(SMALL, tmp_path / "set", 4) == {"kept": 2, "made": 2}
+    papsynth.merge(tmp_path / "set", 4)
+    image = tmp_path / "set/images/000002.png"
+    image.write_bytes(image.read_bytes()[:-1])
+    assert [path for path, _ in papsynth.verify(tmp_path / "set")["findings"]] == ["images/000002.png"]
+    with pytest.raises(ValueError, match="seed"):
+        papsynth.generate(SMALL, tmp_path / "set", 4, seed=1)
+    for wrong in ({"share": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
+        with pytest.raises(ValueError):
+            papsynth.generate(SMALL, tmp_path / "none", 4, **wrong)
+    with pytest.raises(OSError):
+        papsynth.generate(SMALL, "/proc/none", 4)
+
+
+@pytest.mark.parametrize(
+    ("recipe", "field"),
+    [
+        ({"field": {"widht_px": 3}}, "field.widht_px"),
+        ({"field": {"width_px": "wide"}}, "field.width_px"),
+        ({"field": {"width_px": 7}}, "field.width_px"),
+        ({"field": {"width_px": float("nan")}}, "field.width_px"),
+        ({"focus": {"planes": {"uniform": [3, 1]}}}, "focus.planes"),
+        ({"layout": {"kind": "swath"}, "cells": {"nobody": {"count": 3}}}, "cells.nobody"),
+        ({"cytoplasm": {"sheet": "xpdb"}}, "cytoplasm.sheet"),
+    ],
+)
+def test_errors_name_the_field(recipe, field):
+    with pytest.raises(papsynth.RecipeError) as caught:
+        papsynth.render(recipe)
+    assert caught.value.field == field and field in str(caught.value)
+    assert pickle.loads(pickle.dumps(caught.value)).faults == caught.value.faults
+
+
+def test_other_nonsense_is_refused(tmp_path):
+    for recipe in (7, {3: 4}, {"field": None}, {"field": {"width_px": object()}}, "no-such-preset.toml", tmp_path):
+        with pytest.raises((ValueError, TypeError, OSError)):
+            papsynth.render(recipe)
+    loop = {}
+    loop["field"] = loop
+    with pytest.raises((ValueError, RecursionError)):
+        papsynth.render(loop)
+    for words in ({"seed": -1}, {"index": 2**64}, {"seed": 1.5}, {"threads": -1}, {"seed": "1"}):
+        with pytest.raises((OverflowError, TypeError)):
+            papsynth.render(SMALL, **words)
+    (tmp_path / "recipe.toml").write_text("[field]\nwidth_px = = 3\n")
+    with pytest.raises(papsynth.RecipeError, match="recipe.toml"):
+        papsynth.render(tmp_path / "recipe.toml")
+    (tmp_path / "model.json").write_text("{")
+    with pytest.raises(ValueError, match="model.json"):
+        papsynth.render(SMALL, model=tmp_path / "model.json")
+
+
+def test_numbers_of_numpy_and_distributions_are_numbers():
+    plain = papsynth.render(SMALL, seed=1)
+    numpy = papsynth.render({"field": {"width_px": np.int64(320), "height_px": np.float32(240)}}, seed=np.uint8(1))
+    assert np.array_equal(plain.image, numpy.image)
+
+
+def test_threads_change_no_byte_and_work_side_by_side(frame):
+    assert np.array_equal(papsynth.render(SMALL, seed=7, index=3, threads=2).image, frame.image)
+    images = {}
+
+    def work(number):
+        images[number] = papsynth.render(SMALL, seed=7, index=3).image
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(4)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert len(images) == 4 and all(np.array_equal(image, frame.image) for image in images.values())
+
+
+def test_a_fork_after_threads_have_started_renders(frame):
+    papsynth.render(SMALL, seed=7, threads=2)
+    if "fork" not in multiprocessing.get_all_start_methods():
+        pytest.skip("no fork here")
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        found = pool.map_async(_image, [(3, 2), (3, 1)]).get(timeout=120)
+    assert all(np.array_equal(image, frame.image) for image in found)
+
+
+def _image(words):
+    index, threads = words
+    return papsynth.render(SMALL, seed=7, index=index, threads=threads).image
+
+
+def test_a_data_set_is_the_same_in_every_process(frame):
+    samples = papsynth.Dataset(SMALL, seed=7, length=5, transform=_as_image)
+    assert len(samples) == 5 and np.array_equal(samples[3], frame.image) and np.array_equal(samples[-2], frame.image)
+    again = pickle.loads(pickle.dumps(samples))
+    assert np.array_equal(again[3], frame.image)
+    for wrong in (5, -6):
+        with pytest.raises(IndexError):
+            samples[wrong]
+    for wrong in (1.0, "1", True):
+        with pytest.raises(TypeError):
+            samples[wrong]
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert np.array_equal(pool.apply_async(_third, (samples,)).get(timeout=120), frame.image)
+    assert len(list(papsynth.IterableDataset(samples))) == 5
+    for words in ({"length": 0}, {"seed": -1}, {"length": 1.5}):
+        with pytest.raises((ValueError, TypeError)):
+            papsynth.Dataset(SMALL, **words)
+
+
+def _as_image(frame):
+    return frame.image
+
+
+def _third(samples):
+    return samples[3]
+
+
+def test_a_pickle_of_another_version_is_refused():
+    state = papsynth.Dataset(SMALL).__getstate__() | {"_made_by": "0.0.1 (streams of version 0)"}
+    with pytest.raises(ValueError, match=r"0\.0\.1"):
+        papsynth.Dataset(SMALL).__setstate__(state)
+
+
+def test_an_interrupt_ends_a_long_render_and_leaves_nothing_half_written(tmp_path):
+    script = "import papsynth, sys; print('begun', flush=True); papsynth.{}"
+    for call in (
+        "render({'focus': {'planes': 200}, 'field': {'width_px': 600, 'height_px': 600}})",
+        f"generate({SMALL!r}, {str(tmp_path / 'set')!r}, 100000)",
+    ):
+        child = subprocess.Popen([sys.executable, "-c", script.format(call)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert child.stdout.readline() == "begun\n"
+        threading.Event().wait(2)
+        child.send_signal(2)
+        _, complaint = child.communicate(timeout=60)
+        assert child.returncode != 0 and "KeyboardInterrupt" in complaint, complaint
+    assert not list(Path(tmp_path).rglob("*.tmp"))
+    done = 100000 - len(papsynth.missing(tmp_path / "set", 100000))
+    assert papsynth.generate(SMALL, tmp_path / "set", max(done, 1))["kept"] >= done
+
+
+def test_recipes_are_completed_and_described():
+    whole = papsynth.recipe(SMALL)
+    assert whole["field"]["width_px"] == 320 and "optics" in whole and "cells" in whole
+    assert np.array_equal(papsynth.render(whole, seed=2).image, papsynth.render(SMALL, seed=2).image)
+    assert "field" in papsynth.schema()["properties"]
+    assert json.dumps(papsynth.schema())
