@@ -9,7 +9,8 @@ use crate::arguments::Arguments;
 use crate::outcome::{Outcome, in_ci};
 use crate::workspace::Workspace;
 use crate::{
-    Chore, bench, browser, covered, dataset, deps, equations, external, hashes, publish, shell, supply, test, wasm,
+    Chore, bench, browser, covered, dataset, deps, equations, external, hashes, package, publish, shell, supply, test,
+    wasm,
 };
 
 pub(crate) const CHORE: Chore = Chore {
@@ -26,7 +27,7 @@ pub(crate) const CHORE: Chore = Chore {
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
 /// What takes heavy crates, the heavier readers, and other processors; at most 80 minutes with everything before.
-const FULL: [Step; 5] = [
+const FULL: [Step; 7] = [
     ("heavy lints", |workspace| {
         run_cargo(workspace.cargo_heavy("clippy").args(["--all-targets", "--", "-D", "warnings"]))
     }),
@@ -35,6 +36,8 @@ const FULL: [Step; 5] = [
     }),
     ("heavy tests", |workspace| run_cargo(&mut workspace.cargo_heavy("test"))),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+    ("python package", |workspace| chore(workspace, &package::CHORE)),
+    ("cluster", |workspace| chore(workspace, &package::CLUSTER)),
     ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
 

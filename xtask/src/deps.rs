@@ -12,7 +12,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
     details: "The transforms know no one here, technique crates the transforms, the engine knows techniques alone, the data set the engine and kinds of files, which know \
-              no one, the study and the viewer the data set and the server on loopback, which knows no one, the judge nobody, the program all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
+              no one, the study and the viewer the data set and the server on loopback, which knows no one, the judge nobody, who reads recipes the engine, the program and the Python package all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -32,14 +32,18 @@ enum Role {
     Loopback,
     Study,
     View,
+    /// Reads what people wrote.
+    Recipes,
     Program,
+    /// Another front: what the program is to a shell.
+    Python,
     Benches,
     Hashes,
     Chores,
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 23] = [
+const PLACES: [(&str, Role); 25] = [
     ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -59,7 +63,9 @@ const PLACES: [(&str, Role); 23] = [
     ("papsynth-study", Role::Study),
     ("papsynth-view", Role::View),
     ("papsynth-match", Role::Match),
+    ("papsynth-recipe", Role::Recipes),
     ("papsynth-cli", Role::Program),
+    ("papsynth-python", Role::Python),
     ("papsynth-benches", Role::Benches),
     ("papsynth-hashes", Role::Hashes),
     ("xtask", Role::Chores),
@@ -81,6 +87,7 @@ impl Role {
             // It must run where files and threads do not.
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
+            Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
             // It shows files, whoever made them.
@@ -99,7 +106,9 @@ impl Role {
                 Self::Loopback,
                 Self::Study,
                 Self::View,
+                Self::Recipes,
             ],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Recipes],
         }
     }
 }

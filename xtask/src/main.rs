@@ -18,6 +18,7 @@ mod figures;
 mod golden;
 mod hashes;
 mod outcome;
+mod package;
 mod peers;
 mod publish;
 mod python;
@@ -64,6 +65,8 @@ const CHORES: &[Chore] = &[
     wasm::CHORE,
     publish::CHORE,
     supply::CHORE,
+    package::CHORE,
+    package::CLUSTER,
     ci::CHORE,
     torture::CHORE,
 ];

@@ -112,6 +112,7 @@ def main(engine, folder):
     folder.mkdir(parents=True)
     papsynth.generate(RECIPE, folder / "alone", FRAMES, SEED, **WORDS)
     expected = papsynth.merge(folder / "alone", FRAMES)
+    (folder / "root.txt").write_text(expected)
     {"ray": with_ray, "dask": with_dask}[engine](folder, expected)
 
 
