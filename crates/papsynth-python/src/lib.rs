@@ -7,6 +7,7 @@ mod error;
 mod frame;
 mod pool;
 mod sets;
+mod techniques;
 
 #[pyo3::pymodule]
 mod _native {
@@ -30,4 +31,6 @@ mod _native {
     use crate::sets::missing;
     #[pymodule_export]
     use crate::sets::verify;
+    #[pymodule_export]
+    use crate::techniques::{camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture};
 }

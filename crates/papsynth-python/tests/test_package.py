@@ -241,3 +241,54 @@ def test_recipes_are_completed_and_described():
     assert np.array_equal(papsynth.render(whole, seed=2).image, papsynth.render(SMALL, seed=2).image)
     assert "field" in papsynth.schema()["properties"]
     assert json.dumps(papsynth.schema())
+
+
+def test_techniques_work_alone_and_say_what_is_wrong():
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    circle = np.stack([50 + 40 * np.cos(angle), 50 + 30 * np.sin(angle)], axis=1)
+    y, x = np.mgrid[:100, :100]
+    mask = ((x - 50) ** 2 / 40**2 + (y - 50) ** 2 / 30**2 < 1).astype(float)
+    traced = papsynth.fsd.trace(mask)
+    assert traced.shape[1] == 2 and abs(traced.mean(axis=0) - 50).max() < 0.5
+    model = papsynth.fsd.ShapeModel([traced * scale for scale in np.linspace(0.8, 1.2, 12)], harmonics=6)
+    assert np.array_equal(model.draw(seed=3), model.draw(seed=3)) and model.draw(20.0, points=90).shape == (90, 2)
+    layers = papsynth.cloth.crumple(circle, (100, 110), seed=2, vertices=200, excess=1.3)
+    assert layers.shape == (100, 110) and layers.dtype == np.float32 and abs(layers.sum() / (1.3 * mask.sum()) - 1) < 0.1
+    lines = papsynth.cytoskeleton.grow(circle, (100, 100), seed=2)
+    assert 0 < lines.max() <= 1 and lines[0].max() == 0
+    noise = papsynth.fields.perlin((64, 80), 16, seed=1)
+    field = papsynth.fields.matern((64, 80), length_px=2.0, seed=1)
+    assert noise.shape == field.shape == (64, 80) and abs(field.std() - 1) < 0.3
+    quilted = papsynth.texture.quilt(field, np.ones((64, 80)), np.ones((40, 30)))
+    assert np.isin(quilted, field).all()
+    blurred = papsynth.optics.gaussian(mask.T[::2], 2.0)
+    assert blurred.shape == (50, 100) and abs(blurred.sum() / mask.T[::2].sum() - 1) < 0.02
+    light = papsynth.optics.bright_field(np.full((96, 128), 0.3))
+    assert light.shape == (48, 64) and abs(light[24, 32] - 10**-0.3) < 0.01
+    psf = papsynth.optics.gibson_lanni([0.0, 0.5], [-1.0, 0.0, 1.0])
+    assert psf.shape == (3, 2) and psf[1, 0] >= psf[1, 1]
+    counts = papsynth.camera.expose(np.full((40, 50), 9000.0), seed=4)
+    assert counts.dtype == np.uint16 and counts.std() > 1 and np.array_equal(counts, papsynth.camera.expose(np.full((40, 50), 9000), seed=4))
+    colour = papsynth.dyes.transmittance(eosin_y=np.full((4, 5), 0.5))
+    assert colour.shape == (4, 5, 3) and colour[0, 0, 0] > colour[0, 0, 1]
+    for call in (
+        lambda: papsynth.fsd.trace(np.zeros((5, 5))),
+        lambda: papsynth.fsd.trace(np.zeros((0, 5))),
+        lambda: papsynth.fsd.trace(np.zeros(5)),
+        lambda: papsynth.fsd.trace("mask"),
+        lambda: papsynth.fsd.ShapeModel([]),
+        lambda: papsynth.cloth.crumple(circle, (10**6, 10**6)),
+        lambda: papsynth.cloth.crumple(circle, (0, 5)),
+        lambda: papsynth.cloth.crumple(circle.T, (100, 100)),
+        lambda: papsynth.cloth.crumple(np.full((9, 2), np.nan), (100, 100)),
+        lambda: papsynth.cloth.crumple(circle, (100, 100), excess=99),
+        lambda: papsynth.fields.perlin((5, 5), 0),
+        lambda: papsynth.texture.quilt(field, np.ones((3, 3)), np.ones((4, 4))),
+        lambda: papsynth.optics.gaussian(mask, -1),
+        lambda: papsynth.optics.bright_field(mask, na=9),
+        lambda: papsynth.camera.expose(mask, camera="eye"),
+        lambda: papsynth.dyes.transmittance(),
+        lambda: papsynth.dyes.transmittance(eosin_y=np.ones((2, 2)), orange_g=np.ones((2, 3))),
+    ):
+        with pytest.raises((ValueError, TypeError)):
+            call()

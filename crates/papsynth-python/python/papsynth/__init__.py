@@ -11,6 +11,7 @@ The same recipe, model, seed and index give the same bytes as the command line, 
 from __future__ import annotations
 
 
+from . import camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture
 from ._dataset import Dataset, IterableDataset
 from ._errors import Fault, RecipeError
 from ._native import Engine, Frame
@@ -26,12 +27,20 @@ __all__ = [
     "Frame",
     "IterableDataset",
     "RecipeError",
+    "camera",
+    "cloth",
+    "cytoskeleton",
+    "dyes",
+    "fields",
+    "fsd",
     "generate",
     "merge",
     "missing",
+    "optics",
     "recipe",
     "render",
     "schema",
+    "texture",
     "verify",
 ]
 

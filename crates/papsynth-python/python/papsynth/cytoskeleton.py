@@ -1,0 +1,7 @@
+"""Cytoskeletons."""
+
+from ._native import cytoskeleton as _cytoskeleton
+
+grow = _cytoskeleton.grow
+
+__all__ = ["grow"]

@@ -1,0 +1,8 @@
+"""Outlines as Fourier shape descriptors."""
+
+from ._native import fsd as _fsd
+
+ShapeModel = _fsd.ShapeModel
+trace = _fsd.trace
+
+__all__ = ["ShapeModel", "trace"]

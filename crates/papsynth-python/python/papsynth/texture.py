@@ -1,0 +1,7 @@
+"""Textures from pieces of others."""
+
+from ._native import texture as _texture
+
+quilt = _texture.quilt
+
+__all__ = ["quilt"]

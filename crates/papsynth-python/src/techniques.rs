@@ -1,0 +1,576 @@
+//! The techniques alone, on arrays.
+
+use std::fmt::Display;
+
+use numpy::ndarray::ArrayView2;
+use numpy::{AllowTypeChange, IntoPyArray, PyArrayLike2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::SeedableRng;
+
+/// Anything that NumPy can make an array of two dimensions of.
+type Image<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
+
+/// Points as rows of x and y.
+type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
+/// Most pixels of an image that is made here.
+const MOST_PIXELS: usize = 1 << 30;
+
+fn wrong(error: impl Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+fn random(seed: u64) -> Xoshiro256PlusPlus {
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}
+
+/// The pixels of an image row by row, and its width.
+fn pixels(name: &str, image: &Image<'_>) -> PyResult<(Vec<f32>, usize)> {
+    let view: ArrayView2<'_, f32> = image.as_array();
+    let width = view.ncols();
+    if view.is_empty() {
+        return Err(PyValueError::new_err(format!("{name}: {:?} has no pixel", view.shape())));
+    }
+    Ok((view.iter().copied().collect(), width))
+}
+
+fn points(name: &str, points: &Points<'_>) -> PyResult<Vec<[f64; 2]>> {
+    let view = points.as_array();
+    if view.ncols() != 2 {
+        return Err(PyValueError::new_err(format!("{name}: {:?}; expected rows of x and y, (n, 2)", view.shape())));
+    }
+    Ok(view.rows().into_iter().map(|row| [row[0], row[1]]).collect())
+}
+
+/// Zeros of a shape, as rows and columns.
+fn blank((rows, columns): (usize, usize)) -> PyResult<Vec<f32>> {
+    match rows.checked_mul(columns) {
+        Some(pixels @ 1..=MOST_PIXELS) => Ok(vec![0.0; pixels]),
+        _ => Err(PyValueError::new_err(format!("shape: ({rows}, {columns}); expected 1 to {MOST_PIXELS} pixels"))),
+    }
+}
+
+fn image<'py, T: numpy::Element>(py: Python<'py>, values: Vec<T>, width: usize) -> PyResult<Bound<'py, PyAny>> {
+    let rows = values.len() / width.max(1);
+    Ok(values.into_pyarray(py).reshape([rows, width])?.into_any())
+}
+
+fn outline<'py>(py: Python<'py>, points: Vec<[f64; 2]>) -> PyResult<Bound<'py, PyAny>> {
+    let rows = points.len();
+    Ok(points.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([rows, 2])?.into_any())
+}
+
+/// Outlines as Fourier shape descriptors.
+#[pymodule]
+pub(crate) mod fsd {
+    #[pymodule_export]
+    use super::{ShapeModel, trace};
+}
+
+/// The outline of the one object of a mask, through the places where it has a level.
+///
+/// Parameters
+/// ----------
+/// mask : array_like
+///     (height, width), coverage 0 to 1.
+/// level : float
+///     Above 0.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (points, 2), float64: x and y in pixels, 0 at the middle of the first pixel.
+#[pyfunction]
+#[pyo3(signature = (mask, level=0.5))]
+fn trace<'py>(py: Python<'py>, mask: Image<'py>, level: f32) -> PyResult<Bound<'py, PyAny>> {
+    let (mask, width) = pixels("mask", &mask)?;
+    outline(py, fsd_shape::trace(&mask, width, level).map_err(wrong)?)
+}
+
+/// How outlines vary: learned from some, it draws others.
+///
+/// Parameters
+/// ----------
+/// outlines : list of array_like
+///     Each (points, 2).
+/// harmonics : int
+///     Highest number of a descriptor that is kept.
+#[pyclass(frozen, module = "papsynth.fsd")]
+struct ShapeModel(fsd_shape::ShapeModel);
+
+#[pymethods]
+impl ShapeModel {
+    #[new]
+    #[pyo3(signature = (outlines, harmonics=40))]
+    fn new(py: Python<'_>, outlines: Vec<Points<'_>>, harmonics: usize) -> PyResult<Self> {
+        let outlines: Vec<Vec<[f64; 2]>> =
+            outlines.iter().map(|outline| points("outlines", outline)).collect::<PyResult<_>>()?;
+        let params = fsd_shape::ShapeModelParams { harmonics, ..Default::default() };
+        py.detach(|| fsd_shape::ShapeModel::fit(&outlines, &params)).map(Self).map_err(wrong)
+    }
+
+    /// A new outline.
+    ///
+    /// Parameters
+    /// ----------
+    /// radius_px : float, optional
+    ///     Size of its first descriptor; by default as those that were learned.
+    /// seed : int
+    /// points : int
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///     (points, 2), about the origin.
+    #[pyo3(signature = (radius_px=None, seed=0, points=400))]
+    fn draw<'py>(
+        &self,
+        py: Python<'py>,
+        radius_px: Option<f64>,
+        seed: u64,
+        points: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        if points > MOST_PIXELS {
+            return Err(PyValueError::new_err(format!("points: {points}; expected at most {MOST_PIXELS}")));
+        }
+        let mut random = random(seed);
+        let radius_px = radius_px.unwrap_or_else(|| self.0.draw_radius(&mut random));
+        outline(py, self.0.draw(radius_px, &mut random).map_err(wrong)?.descriptors.outline(points))
+    }
+}
+
+/// Cells as cloth that is pressed into their outline.
+#[pymodule]
+pub(crate) mod cloth {
+    #[pymodule_export]
+    use super::crumple;
+}
+
+/// The thickness of a sheet that is pressed into an outline.
+///
+/// Parameters
+/// ----------
+/// outline : array_like
+///     (points, 2), pixels.
+/// shape : tuple of int
+///     Rows and columns of the image.
+/// seed : int
+/// vertices : int
+///     Of the mesh, 32 to 65536.
+/// excess : float
+///     Area of the flat sheet over that of the outline, 1 to 4.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows, columns), float32: number of layers over each pixel.
+#[pyfunction]
+#[pyo3(signature = (outline, shape, seed=0, *, vertices=1200, excess=1.15))]
+fn crumple<'py>(
+    py: Python<'py>,
+    outline: Points<'py>,
+    shape: (usize, usize),
+    seed: u64,
+    vertices: usize,
+    excess: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let outline = points("outline", &outline)?;
+    let mut out = blank(shape)?;
+    let params = cloth_verlet::ClothParams { vertices, excess, ..Default::default() };
+    py.detach(|| {
+        let sheet = cloth_verlet::Cloth::new(&params)?.crumple(&outline, &mut random(seed))?;
+        let view = cloth_verlet::View { origin: [0.0, 0.0], pixel: 1.0 };
+        sheet.thickness_into(&mut out, shape.1, &view, |_| 1.0);
+        Ok(())
+    })
+    .map_err(|error: cloth_verlet::Error| wrong(error))?;
+    image(py, out, shape.1)
+}
+
+/// Cytoskeletons.
+#[pymodule]
+pub(crate) mod cytoskeleton {
+    #[pymodule_export]
+    use super::grow;
+}
+
+/// A cytoskeleton within an outline, drawn.
+///
+/// Parameters
+/// ----------
+/// outline : array_like
+///     (points, 2), pixels.
+/// shape : tuple of int
+///     Rows and columns of the image.
+/// seed : int
+/// rivers : int
+///     Number of trees.
+/// width_px : float
+///     Width of their lines at the mouth.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows, columns), float32, 0 to 1.
+#[pyfunction]
+#[pyo3(signature = (outline, shape, seed=0, *, rivers=15, width_px=1.7))]
+fn grow<'py>(
+    py: Python<'py>,
+    outline: Points<'py>,
+    shape: (usize, usize),
+    seed: u64,
+    rivers: usize,
+    width_px: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let outline = points("outline", &outline)?;
+    let mut out = blank(shape)?;
+    py.detach(|| {
+        let params = voronoi_cytoskeleton::SkeletonParams { rivers, ..Default::default() };
+        let rivers = voronoi_cytoskeleton::Skeleton::new(&params)?.grow(&outline, &mut random(seed))?;
+        let lines = voronoi_cytoskeleton::LineParams { width_px, ..Default::default() };
+        voronoi_cytoskeleton::draw_into(&mut out, shape.1, &rivers, &lines)
+    })
+    .map_err(|error: voronoi_cytoskeleton::Error| wrong(error))?;
+    image(py, out, shape.1)
+}
+
+/// Random fields and noise of backgrounds.
+#[pymodule]
+pub(crate) mod fields {
+    #[pymodule_export]
+    use super::{matern, perlin};
+}
+
+/// Perlin's noise, in several octaves.
+///
+/// Parameters
+/// ----------
+/// shape : tuple of int
+///     Rows and columns.
+/// cell_px : float
+///     Size of its coarsest cells.
+/// seed : int
+/// octaves : int
+/// persistence : float
+///     Height of an octave over that of the one before.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows, columns), float32, about -1 to 1.
+#[pyfunction]
+#[pyo3(signature = (shape, cell_px=64.0, seed=0, *, octaves=4, persistence=0.5))]
+fn perlin(
+    py: Python<'_>,
+    shape: (usize, usize),
+    cell_px: f64,
+    seed: u64,
+    octaves: usize,
+    persistence: f64,
+) -> PyResult<Bound<'_, PyAny>> {
+    if !(cell_px.is_finite() && cell_px > 0.0) {
+        return Err(PyValueError::new_err(format!("cell_px: {cell_px}; expected a number above 0")));
+    }
+    let mut out = blank(shape)?;
+    py.detach(|| {
+        let params = perlin_bg::FractalParams { octaves, persistence, ..Default::default() };
+        let window = perlin_bg::Window::with_cell_px(cell_px);
+        perlin_bg::Fractal::new(&params, seed)?.add_into(&mut out, shape.1, &window, 1.0);
+        Ok(())
+    })
+    .map_err(|error: perlin_bg::Error| wrong(error))?;
+    image(py, out, shape.1)
+}
+
+/// A Gaussian random field of Matern's covariance.
+///
+/// Parameters
+/// ----------
+/// shape : tuple of int
+///     Rows and columns.
+/// length_px : float
+/// nu : float
+///     Smoothness.
+/// seed : int
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows, columns), float32, of mean 0 and variance 1.
+#[pyfunction]
+#[pyo3(signature = (shape, length_px=4.0, nu=1.0, seed=0))]
+fn matern(py: Python<'_>, shape: (usize, usize), length_px: f64, nu: f64, seed: u64) -> PyResult<Bound<'_, PyAny>> {
+    let mut out = blank(shape)?;
+    py.detach(|| {
+        let params = spectral_field::FieldParams {
+            width: shape.1,
+            height: shape.0,
+            spectrum: spectral_field::Spectrum::Matern { nu, length_px },
+            ..Default::default()
+        };
+        spectral_field::SpectralField::new(&params)?.draw_into(&mut out, &mut random(seed));
+        Ok(())
+    })
+    .map_err(|error: spectral_field::Error| wrong(error))?;
+    image(py, out, shape.1)
+}
+
+/// Textures from pieces of others.
+#[pymodule]
+pub(crate) mod texture {
+    #[pymodule_export]
+    use super::quilt;
+}
+
+/// Covers a target with pieces of a texture.
+///
+/// Parameters
+/// ----------
+/// source : array_like
+///     (rows, columns), the texture.
+/// mask : array_like
+///     The same shape: 1 where it may be taken from, else 0.
+/// target : array_like
+///     (rows, columns) of the result: 1 where it is wanted, else 0.
+/// seed : int
+/// patch_px, overlap_px : int
+///     Sides of pieces, and how far they lie over each other.
+///
+/// Returns
+/// -------
+/// ndarray
+///     As `target`, float32.
+#[pyfunction]
+#[pyo3(signature = (source, mask, target, seed=0, *, patch_px=9, overlap_px=3))]
+fn quilt<'py>(
+    py: Python<'py>,
+    source: Image<'py>,
+    mask: Image<'py>,
+    target: Image<'py>,
+    seed: u64,
+    patch_px: usize,
+    overlap_px: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (texture, width) = pixels("source", &source)?;
+    let (mask, mask_width) = pixels("mask", &mask)?;
+    let (target, target_width) = pixels("target", &target)?;
+    if (mask.len(), mask_width) != (texture.len(), width) {
+        return Err(PyValueError::new_err("mask: has another shape than source"));
+    }
+    let made = py.detach(|| {
+        let source = quilt_texture::Source::new(&texture, &mask, width)?;
+        let params = quilt_texture::QuiltParams { patch_px, overlap_px, ..Default::default() };
+        Ok(quilt_texture::Quilter::new(&[&source], &params)?
+            .synthesise(&target, target_width, &mut random(seed))
+            .pixels)
+    });
+    image(py, made.map_err(|error: quilt_texture::Error| wrong(error))?, target_width)
+}
+
+/// How a microscope spreads light.
+#[pymodule]
+pub(crate) mod optics {
+    #[pymodule_export]
+    use super::{bright_field, gaussian, gibson_lanni};
+}
+
+/// A Gaussian blur, mirrored at the border.
+///
+/// Parameters
+/// ----------
+/// image : array_like
+///     (rows, columns).
+/// sigma_px : float
+///     0 to 4096.
+///
+/// Returns
+/// -------
+/// ndarray
+///     As `image`, float32.
+#[pyfunction]
+fn gaussian<'py>(py: Python<'py>, image: Image<'py>, sigma_px: f64) -> PyResult<Bound<'py, PyAny>> {
+    let (values, width) = pixels("image", &image)?;
+    let gaussian = optics_psf::Gaussian::new(sigma_px).map_err(wrong)?;
+    let blurred = py.detach(|| gaussian.blur(&values, width, optics_psf::Border::Reflect));
+    self::image(py, blurred, width)
+}
+
+/// The light that a thin layer of absorbance lets through, as a partially coherent microscope shows it.
+///
+/// Parameters
+/// ----------
+/// absorbance : array_like
+///     (rows, columns), decadic, two samples a pixel.
+/// defocus_um : float
+///     How far below the plane in focus it lies.
+/// na, condenser_na : float
+///     Numerical apertures.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows / 2, columns / 2), float32: light relative to the empty slide.
+#[pyfunction]
+#[pyo3(signature = (absorbance, defocus_um=0.0, *, na=0.95, condenser_na=0.41))]
+fn bright_field<'py>(
+    py: Python<'py>,
+    absorbance: Image<'py>,
+    defocus_um: f64,
+    na: f64,
+    condenser_na: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (values, width) = pixels("absorbance", &absorbance)?;
+    let height = values.len() / width;
+    let made = py.detach(|| {
+        let params = optics_psf::MicroscopeParams { na, condenser_na, ..Default::default() };
+        let microscope = optics_psf::Microscope::new(&params)?;
+        let params =
+            optics_psf::BrightFieldParams { width, height, depths_um: vec![-defocus_um], ..Default::default() };
+        let field = optics_psf::BrightField::new(&microscope, &params)?;
+        let mut specimen = field.specimen();
+        field.set_absorbance(&mut specimen, 0, &values);
+        Ok(field.image(&mut specimen, 0))
+    });
+    let light = made.map_err(|error: optics_psf::Error| wrong(error))?;
+    let columns = light.len() / (height / 2).max(1);
+    self::image(py, light, columns)
+}
+
+/// The point spread function of Gibson and Lanni, of a point below a cover glass.
+///
+/// Parameters
+/// ----------
+/// r_um, z_um : array_like
+///     Distances from the axis, and of the stage.
+/// na, wavelength_um, depth_um : float
+///
+/// Returns
+/// -------
+/// ndarray
+///     (z, r), float64.
+#[pyfunction]
+#[pyo3(signature = (r_um, z_um, *, na=None, wavelength_um=None, depth_um=None))]
+fn gibson_lanni(
+    py: Python<'_>,
+    r_um: Vec<f64>,
+    z_um: Vec<f64>,
+    na: Option<f64>,
+    wavelength_um: Option<f64>,
+    depth_um: Option<f64>,
+) -> PyResult<Bound<'_, PyAny>> {
+    let usual = optics_psf::GibsonLanniParams::default();
+    let params = optics_psf::GibsonLanniParams {
+        na: na.unwrap_or(usual.na),
+        wavelength_um: wavelength_um.unwrap_or(usual.wavelength_um),
+        depth_um: depth_um.unwrap_or(usual.depth_um),
+        ..usual
+    };
+    let made = py.detach(|| optics_psf::GibsonLanni::new(&params)?.profile(&r_um, &z_um));
+    image(py, made.map_err(wrong)?, r_um.len())
+}
+
+/// What a camera makes of light.
+#[pymodule]
+pub(crate) mod camera {
+    #[pymodule_export]
+    use super::expose;
+}
+
+/// A frame of a camera, with shot noise, read noise and everything else of it.
+///
+/// Parameters
+/// ----------
+/// electrons : array_like
+///     (rows, columns), mean photo-electrons.
+/// seed : int
+/// camera : str
+///     "paper", "orca-05g" or "scmos".
+///
+/// Returns
+/// -------
+/// ndarray
+///     As `electrons`, uint16 grey levels.
+#[pyfunction]
+#[pyo3(signature = (electrons, seed=0, *, camera="orca-05g"))]
+fn expose<'py>(py: Python<'py>, electrons: Image<'py>, seed: u64, camera: &str) -> PyResult<Bound<'py, PyAny>> {
+    let (electrons, width) = pixels("electrons", &electrons)?;
+    let params = match camera {
+        "paper" => ccd_noise::CameraParams::paper(),
+        "orca-05g" => ccd_noise::CameraParams::orca_05g(),
+        "scmos" => ccd_noise::CameraParams::scmos(),
+        other => {
+            let message = format!("camera: `{other}` is not known; expected paper, orca-05g or scmos");
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    let camera = ccd_noise::Camera::new(&params).map_err(wrong)?;
+    let mut frame = vec![0_u16; electrons.len()];
+    py.detach(|| camera.expose_window(&electrons, width, [0, 0], seed, &mut frame));
+    image(py, frame, width)
+}
+
+/// The colours of dyes.
+#[pymodule]
+pub(crate) mod dyes {
+    #[pymodule_export]
+    use super::transmittance;
+}
+
+/// The light that a mixture of dyes lets through, in the channels of a colour camera.
+///
+/// Parameters
+/// ----------
+/// haematein, eosin_y, light_green, orange_g : array_like, optional
+///     (rows, columns), decadic absorbance of each dye at its own peak; at least one, all of one shape.
+///
+/// Returns
+/// -------
+/// ndarray
+///     (rows, columns, 3), float32, relative to the empty slide.
+#[pyfunction]
+#[pyo3(signature = (*, haematein=None, eosin_y=None, light_green=None, orange_g=None))]
+fn transmittance<'py>(
+    py: Python<'py>,
+    haematein: Option<Image<'py>>,
+    eosin_y: Option<Image<'py>>,
+    light_green: Option<Image<'py>>,
+    orange_g: Option<Image<'py>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    use dye_spectra::{Colour, ColourParams, DYES, Dye};
+    let given = [
+        (Dye::Haematein, "haematein", haematein),
+        (Dye::EosinY, "eosin_y", eosin_y),
+        (Dye::LightGreen, "light_green", light_green),
+        (Dye::OrangeG, "orange_g", orange_g),
+    ];
+    let mut planes: [Vec<f32>; DYES] = Default::default();
+    let mut shape: Option<[usize; 2]> = None;
+    for (dye, name, plane) in given {
+        let Some(plane) = plane else { continue };
+        let (values, width) = pixels(name, &plane)?;
+        let own = [values.len() / width, width];
+        if shape.is_some_and(|shape| shape != own) {
+            return Err(PyValueError::new_err(format!("{name}: {own:?} is another shape than that of the others")));
+        }
+        shape = Some(own);
+        if let Some(place) = Dye::ALL.iter().position(|known| *known == dye) {
+            planes[place] = values;
+        }
+    }
+    let Some([rows, width]) = shape else {
+        return Err(PyValueError::new_err("at least one dye is needed"));
+    };
+    let colour = Colour::new(&ColourParams::default()).map_err(wrong)?;
+    let light = py.detach(|| {
+        let mut light = [(); 3].map(|()| vec![0.0_f32; rows * width]);
+        colour.transmittance_into(
+            planes.each_ref().map(|plane| &plane[..]),
+            light.each_mut().map(|plane| &mut plane[..]),
+        );
+        let [red, green, blue] = &light;
+        red.iter().zip(green).zip(blue).flat_map(|((red, green), blue)| [*red, *green, *blue]).collect::<Vec<f32>>()
+    });
+    Ok(light.into_pyarray(py).reshape([rows, width, 3])?.into_any())
+}
