@@ -32,7 +32,7 @@ pub(crate) const CLUSTER: Chore = Chore {
 
 const BUILDER: &str = "maturin>=1.9,<2\n";
 
-const TESTERS: &str = "numpy\npillow\npytest\n";
+const TESTERS: &str = "numpy\npillow\npytest\nscipy\nscikit-learn\n";
 
 const ENGINES: &str = "numpy\nray\ndask[distributed]\n";
 
@@ -49,9 +49,10 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
     };
     let program = program(workspace)?;
-    let tests = workspace.root.join(PACKAGE).join("tests/test_package.py");
+    let tests =
+        ["test_package.py", "test_examples.py"].map(|name| workspace.root.join(PACKAGE).join("tests").join(name));
     let mut pytest = Command::new(python);
-    pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(tests);
+    pytest.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).args(tests);
     // Out of the repository, so that the package is the installed one.
     shell::run(pytest.env("PAPSYNTH", program).env("PYTHONDONTWRITEBYTECODE", "1").current_dir(&workspace.target))?;
     Ok(Outcome::Done)

@@ -1,0 +1,38 @@
+"""The scripts of the documentation run, and show what they claim. PAPSYNTH_REFERENCE is the folder of real fields, where there is one."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
+
+REFERENCE = os.environ.get("PAPSYNTH_REFERENCE")
+
+
+def test_a_sweep_shows_where_a_segmenter_breaks():
+    import sweep
+
+    table = sweep.main()
+    assert table["debris.leukocytes.clusters", 30] < table["debris.leukocytes.clusters", 0] - 0.1
+    assert table["focus.centre_um", 12.0] < table["focus.centre_um", 4.0]
+
+
+def test_two_segmenters_are_told_apart():
+    import benchmark
+
+    table = benchmark.main()
+    assert len(table) == 8 and all(0 < value <= 1 for value in table.values())
+    assert table["inflamed", "threshold"] < table["lbc", "threshold"]
+
+
+def test_what_was_trained_on_synthetic_fields_finds_nuclei_in_others_and_in_real_ones():
+    import train
+
+    folder = None if REFERENCE is None else Path(REFERENCE, "cervix93")
+    synthetic, real = train.main(folder)
+    assert synthetic > 0.4
+    if real is None:
+        pytest.skip("PAPSYNTH_REFERENCE is not set: no real fields were tried")
+    assert real > 0.5
