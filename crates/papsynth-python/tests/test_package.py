@@ -292,3 +292,18 @@ def test_techniques_work_alone_and_say_what_is_wrong():
     ):
         with pytest.raises((ValueError, TypeError)):
             call()
+
+
+def test_recipes_are_objects_too_which_know_every_field():
+    from papsynth.recipes import CellMix, Field, OpticsBrightField, Recipe, uniform
+
+    recipe = Recipe(field=Field(width_px=320, height_px=240), optics=OpticsBrightField(na=0.9), cells={"intermediate": CellMix(count=uniform(3, 5))})
+    plain = recipe.to_dict()
+    assert plain["optics"] == {"kind": "bright-field", "na": 0.9} and plain["cells"]["intermediate"]["count"] == {"uniform": [3, 5]}
+    assert np.array_equal(papsynth.render(recipe, seed=1).image, papsynth.render(plain, seed=1).image)
+    assert np.array_equal(pickle.loads(pickle.dumps(papsynth.Dataset(recipe, length=2)))[1].image, papsynth.render(plain, index=1).image)
+    with pytest.raises(TypeError):
+        Field(widht_px=3)
+    tool = Path(__file__).parent.parent / "tools/write_recipes.py"
+    checked = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stderr
