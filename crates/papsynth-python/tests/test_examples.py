@@ -36,3 +36,11 @@ def test_what_was_trained_on_synthetic_fields_finds_nuclei_in_others_and_in_real
     if real is None:
         pytest.skip("PAPSYNTH_REFERENCE is not set: no real fields were tried")
     assert real > 0.5
+
+
+def test_small_tasks_lose_least_to_slow_workers():
+    import plan
+
+    table = plan.main(200_000, 50)
+    tasks = sorted(table)
+    assert table[tasks[-1]] < table[tasks[0]] and 1 <= table[tasks[-1]] < 1.5
