@@ -28,8 +28,8 @@ const LARGEST_MODEL: u64 = 1 << 28;
 /// ----------
 /// recipe : None, str, os.PathLike or dict
 ///     Nothing for the default, the name of a preset, the path of a TOML file, or fields by section; what is left out is the default.
-/// model : None, str or os.PathLike
-///     A model or a class file, laid over the model that ships.
+/// model : None, dict, str or os.PathLike
+///     A model, such as `papsynth.learn` returns, or the path of a model or class file, laid over the model that ships.
 ///
 /// Raises
 /// ------
@@ -64,9 +64,9 @@ impl From<papsynth::Error> for Stop {
 impl Engine {
     #[new]
     #[pyo3(signature = (recipe=None, model=None))]
-    fn new(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, model: Option<PathBuf>) -> PyResult<Self> {
+    fn new(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Source { mut recipe, folder, name } = Source::read(py, recipe)?;
-        let model = read_model(model.as_deref())?;
+        let model = read_model(py, model)?;
         let faults = papsynth_recipe::unknown_classes(&recipe, &model);
         if !faults.is_empty() {
             return Err(error::recipe(py, &name, &faults));
@@ -189,11 +189,17 @@ impl Source {
     }
 }
 
-fn read_model(path: Option<&Path>) -> PyResult<Model> {
-    let Some(path) = path else { return Ok(Model::builtin()) };
-    let text = read(path, LARGEST_MODEL)?;
-    let named = |error: papsynth::Error| PyValueError::new_err(format!("{}: {error}", path.display()));
-    Model::builtin().with(&text).map_err(named)
+/// The model that ships, with the classes of a file, or of a dictionary such as `papsynth.learn` returns.
+pub(crate) fn read_model(py: Python<'_>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Model> {
+    let Some(model) = model.filter(|model| !model.is_none()) else { return Ok(Model::builtin()) };
+    let (name, text) = if model.is_instance_of::<PyDict>() {
+        let text: String = py.import("json")?.call_method1("dumps", (model,))?.extract()?;
+        ("the model".to_owned(), text)
+    } else {
+        let path: PathBuf = model.extract()?;
+        (path.display().to_string(), read(&path, LARGEST_MODEL)?)
+    };
+    Model::builtin().with(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
 fn read(path: &Path, largest: u64) -> PyResult<String> {

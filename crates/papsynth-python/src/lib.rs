@@ -5,6 +5,8 @@ mod convert;
 mod engine;
 mod error;
 mod frame;
+mod judge;
+mod learn;
 mod pool;
 mod sets;
 mod techniques;
@@ -21,6 +23,10 @@ mod _native {
     use crate::engine::resolve;
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::judge::judge;
+    #[pymodule_export]
+    use crate::learn::learn;
     #[pymodule_export]
     use crate::pool::after_fork;
     #[pymodule_export]

@@ -307,3 +307,32 @@ def test_recipes_are_objects_too_which_know_every_field():
     tool = Path(__file__).parent.parent / "tools/write_recipes.py"
     checked = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True)
     assert checked.returncode == 0, checked.stderr
+
+
+def test_a_class_is_learned_and_rendered():
+    nuclei = []
+    for index in range(3):
+        frame = papsynth.render("sparse", seed=3, index=index)
+        chosen = (frame.table["part"] == "nucleus") & (frame.table["area_um2"] > 20) & ~frame.table["truncated"]
+        for number in np.flatnonzero(chosen):
+            x0, y0, x1, y1 = frame.boxes[number] + [-4, -4, 4, 4]
+            if min(x0, y0) >= 0 and x1 <= frame.image.shape[1] and y1 <= frame.image.shape[0]:
+                nuclei.append((frame.image[y0:y1, x0:x1], frame.masks[number, y0:y1, x0:x1]))
+    model = papsynth.learn("mine", 0.25, nuclei=nuclei, like="intermediate", numbers_only=True, source="this test")
+    frame = papsynth.render({**SMALL, "cells": {"mine": {"count": 3}}}, seed=1, model=model)
+    assert "mine" in frame.table["class"]
+    samples = papsynth.Dataset({**SMALL, "cells": {"mine": {"count": 3}}}, seed=1, model=model)
+    assert np.array_equal(pickle.loads(pickle.dumps(samples))[0].image, frame.image)
+    for wrong in ({"like": "nobody"}, {"pixel_um": -1.0}, {"nuclei": nuclei[:1]}, {"cytoplasm_outlines": [np.zeros((4, 3))]}, {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]}):
+        with pytest.raises(ValueError):
+            papsynth.learn(**{"name": "mine", "pixel_um": 0.25, "nuclei": nuclei, "like": "intermediate", **wrong})
+
+
+def test_fields_are_judged():
+    recipe = {"field": {"width_px": 640, "height_px": 480}}
+    one, other = ([papsynth.render(recipe, seed=seed, index=index).image for index in range(6)] for seed in (1, 2))
+    report = papsynth.judge(one, other, 0.25, quick=True)
+    assert report["verdict"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
+    for wrong in ((one[:1], other, 0.25), (one, other, -1.0), (one, [np.zeros(3)] * 3, 0.25), ([], other, 0.25)):
+        with pytest.raises((ValueError, TypeError)):
+            papsynth.judge(*wrong)

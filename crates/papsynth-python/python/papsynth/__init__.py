@@ -14,6 +14,7 @@ from __future__ import annotations
 from . import camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture
 from ._dataset import Dataset, IterableDataset
 from ._errors import Fault, RecipeError
+from ._learn import judge, learn
 from ._native import Engine, Frame
 from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
@@ -34,6 +35,8 @@ __all__ = [
     "fields",
     "fsd",
     "generate",
+    "judge",
+    "learn",
     "merge",
     "missing",
     "optics",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 class Engine:
-    def __new__(cls, recipe: Any = None, model: str | PathLike[str] | None = None) -> Engine: ...
+    def __new__(cls, recipe: Any = None, model: dict[str, Any] | str | PathLike[str] | None = None) -> Engine: ...
     def render(self, seed: int = 0, index: int = 0, *, threads: int = 1) -> Frame: ...
     @property
     def recipe(self) -> str: ...
@@ -71,4 +71,29 @@ def generate(
 def merge(out: str | PathLike[str], frames: int) -> str: ...
 def missing(out: str | PathLike[str], frames: int) -> list[int]: ...
 def verify(out: str | PathLike[str], frames: int | None = None) -> dict[str, Any]: ...
+def judge(
+    real: list[Any],
+    synthetic: list[Any],
+    pixel_um: float,
+    full_scale: float,
+    *,
+    real_nuclei: list[Any] | None = None,
+    synthetic_nuclei: list[Any] | None = None,
+    seed: int = 0,
+    quick: bool = False,
+    threads: int = 0,
+) -> str: ...
+def learn(
+    name: str,
+    pixel_um: float,
+    *,
+    nuclei: list[tuple[Any, Any]] | None = None,
+    nucleus_outlines: list[Any] | None = None,
+    cytoplasm_outlines: list[Any] | None = None,
+    like: str | None = None,
+    bethesda: str = "",
+    source: str = "",
+    numbers_only: bool = False,
+    model: Any = None,
+) -> str: ...
 def _after_fork() -> None: ...

@@ -35,7 +35,7 @@ def _key(recipe, model):
         return path, found.st_mtime_ns, found.st_size
 
     try:
-        model = None if model is None else of_file(model)
+        model = None if model is None else json.dumps(model, sort_keys=True) if isinstance(model, dict) else of_file(model)
         if recipe is None:
             return None, model
         if hasattr(recipe, "to_dict"):
@@ -77,8 +77,8 @@ def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: i
         The data set, 0 to 2**64 - 1.
     index : int
         The image in it, 0 to 2**64 - 1.
-    model : None, str or os.PathLike
-        A model or a class file, laid over the model that ships.
+    model : None, dict, str or os.PathLike
+        A model, such as `papsynth.learn` returns, or the path of a model or class file, laid over the model that ships.
     threads : int
         Threads that work on it; 0 for as many as there are processors. The bytes are the same.
 

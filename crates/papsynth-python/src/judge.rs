@@ -1,0 +1,110 @@
+//! How much synthetic fields are like real ones.
+
+use numpy::{AllowTypeChange, PyArrayLike2};
+use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use rayon::prelude::*;
+
+use crate::pool;
+
+type Image<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
+type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
+fn wrong(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// The report of `papsynth.judge`, as JSON.
+///
+/// Parameters
+/// ----------
+/// real, synthetic : list of array_like
+///     Fields, each (height, width).
+/// pixel_um : float
+/// full_scale : float
+/// real_nuclei, synthetic_nuclei : list of array_like, optional
+///     Middles of the nuclei of each field, (n, 2): x and y in pixels.
+/// seed : int
+/// quick : bool
+/// threads : int
+#[pyfunction]
+#[pyo3(signature = (real, synthetic, pixel_um, full_scale, *, real_nuclei=None, synthetic_nuclei=None, seed=0, quick=false, threads=0))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn judge(
+    py: Python<'_>,
+    real: Vec<Image<'_>>,
+    synthetic: Vec<Image<'_>>,
+    pixel_um: f64,
+    full_scale: f32,
+    real_nuclei: Option<Vec<Points<'_>>>,
+    synthetic_nuclei: Option<Vec<Points<'_>>>,
+    seed: u64,
+    quick: bool,
+    threads: usize,
+) -> PyResult<String> {
+    let nuclei_from = match (&real_nuclei, &synthetic_nuclei) {
+        (Some(_), Some(_)) => NucleiFrom::Points,
+        (None, None) => NucleiFrom::Search,
+        _ => return Err(wrong("real_nuclei, synthetic_nuclei: both or neither must be given")),
+    };
+    let sides = [
+        pictures("real", &real, real_nuclei.as_deref(), full_scale)?,
+        pictures("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
+    ];
+    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
+    let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
+    let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
+    let pool = pool::of(threads).map_err(wrong)?;
+    let report = py.detach(|| {
+        pool.install(|| {
+            let measured = sides.map(|pictures| {
+                let fields: Vec<Result<Field, String>> = pictures
+                    .par_iter()
+                    .map(|picture| gauge.measure(picture).map_err(|error| format!("{}: {error}", picture.name)))
+                    .collect();
+                fields.into_iter().collect::<Result<Vec<Field>, String>>()
+            });
+            let [real, synthetic] = measured;
+            judge.compare(&real?, &synthetic?).map_err(|error| error.to_string())
+        })
+    });
+    serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
+}
+
+fn pictures(
+    side: &str,
+    images: &[Image<'_>],
+    nuclei: Option<&[Points<'_>]>,
+    full_scale: f32,
+) -> PyResult<Vec<Picture>> {
+    if images.len() < 2 {
+        return Err(wrong(format!("{side}: {} fields; expected 2 or more", images.len())));
+    }
+    if nuclei.is_some_and(|nuclei| nuclei.len() != images.len()) {
+        return Err(wrong(format!("{side}_nuclei: must be as many as {side}, {}", images.len())));
+    }
+    let one = |(number, image): (usize, &Image<'_>)| {
+        let view = image.as_array();
+        let nuclei = match nuclei {
+            None => Known::Nothing,
+            Some(nuclei) => {
+                let points = nuclei[number].as_array();
+                if points.ncols() != 2 {
+                    let shape = points.shape();
+                    return Err(wrong(format!("{side}_nuclei[{number}]: {shape:?}; expected rows of x and y, (n, 2)")));
+                }
+                Known::Points(points.rows().into_iter().map(|row| [row[0], row[1]]).collect())
+            }
+        };
+        Ok(Picture {
+            name: format!("{side}[{number}]"),
+            group: String::new(),
+            grey: view.iter().copied().collect(),
+            width: view.ncols(),
+            full_scale,
+            nuclei,
+        })
+    };
+    images.iter().enumerate().map(one).collect()
+}
