@@ -336,3 +336,14 @@ def test_fields_are_judged():
     for wrong in ((one[:1], other, 0.25), (one, other, -1.0), (one, [np.zeros(3)] * 3, 0.25), ([], other, 0.25)):
         with pytest.raises((ValueError, TypeError)):
             papsynth.judge(*wrong)
+
+
+def test_targets_are_those_of_detectors(frame):
+    target = papsynth.detection_target(frame)
+    count = len(target["labels"])
+    assert count == (frame.table["part"] == "nucleus").sum() and target["boxes"].shape == (count, 4)
+    assert (target["boxes"][:, 2:] > target["boxes"][:, :2]).all() and np.array_equal(target["masks"].sum(axis=(1, 2)), target["area"])
+    some = papsynth.detection_target(frame, "cytoplasm", ["superficial", "intermediate"])
+    assert set(some["labels"]) <= {1, 2} and len(some["labels"]) > 0
+    with pytest.raises(ValueError, match="part"):
+        papsynth.detection_target(frame, "cell")

@@ -20,6 +20,7 @@ from ._native import recipe_schema as _recipe_schema
 from ._native import resolve as _resolve
 from ._render import render
 from ._sets import generate, merge, missing, verify
+from ._target import detection_target
 
 __all__ = [
     "Dataset",
@@ -31,6 +32,7 @@ __all__ = [
     "camera",
     "cloth",
     "cytoskeleton",
+    "detection_target",
     "dyes",
     "fields",
     "fsd",
