@@ -67,4 +67,10 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     bench.good(&format!("{make} --verify"));
     bench.good("verify slide");
     refused(&bench, &format!("{make} --seed 4"), "another seed");
+    // As its card says.
+    let card = fs::read_to_string(bench.path("slide/README.md")).unwrap();
+    let said = card.split('`').find(|words| words.starts_with("papsynth slide make")).unwrap();
+    let said = said.replace("recipe.toml", "slide/recipe.toml").replace("model.json", "slide/model.json");
+    bench.good(said.strip_prefix("papsynth ").unwrap().replace("DIR", "again").as_str());
+    assert_eq!(bench.files("slide"), bench.files("again"));
 }

@@ -6,14 +6,13 @@ use std::io;
 use std::ops::Range;
 use std::path::Path;
 
-use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 
 use crate::coco::{Category, categories};
 use crate::contents;
 use crate::error::{Error, Problem};
-use crate::files::{Folder, is_temporary, sha256};
+use crate::files::{Folder, is_temporary};
 use crate::formats;
 use crate::layout::{self, Layout};
 use crate::merge;
@@ -62,15 +61,7 @@ impl Dataset {
     /// If the folder holds something else, or a data set of another recipe, model, seed or stream version (the message
     /// says which), or the system refuses.
     pub fn create_or_resume(path: &Path, info: &DatasetInfo) -> Result<Self, Error> {
-        let (recipe, model) = (info.recipe.to_toml(), info.model.to_json());
-        let identity = Identity {
-            seed: info.seed,
-            stream_version: STREAM_VERSION,
-            recipe_version: info.recipe.version,
-            model_version: info.model.version,
-            recipe_sha256: sha256(recipe.as_bytes()),
-            model_sha256: sha256(model.as_bytes()),
-        };
+        let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let map = info.map.map(|file| file.name.clone());
         let kept = info.map.map(|file| (file.name.clone(), file.bytes.to_vec()));
         let given = [(layout::RECIPE, recipe.into_bytes()), (layout::MODEL, model.into_bytes())];

@@ -7,7 +7,9 @@ use std::io::{self, BufReader};
 use std::ops::Range;
 use std::path::{Component, Path};
 
-use papsynth::key::Key;
+use papsynth::key::{Key, STREAM_VERSION};
+use papsynth::model::Model;
+use papsynth::recipe::Recipe;
 use papsynth::scene::{Scene, View};
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -58,6 +60,22 @@ pub struct Identity {
     pub recipe_sha256: String,
     /// SHA-256 of `model.json`.
     pub model_sha256: String,
+}
+
+impl Identity {
+    /// What decides of what is made from these, and the texts of recipe and model whose hashes stand in it.
+    pub(crate) fn of(recipe: &Recipe, model: &Model, seed: u64) -> (Self, String, String) {
+        let (recipe_toml, model_json) = (recipe.to_toml(), model.to_json());
+        let identity = Self {
+            seed,
+            stream_version: STREAM_VERSION,
+            recipe_version: recipe.version,
+            model_version: model.version,
+            recipe_sha256: sha256(recipe_toml.as_bytes()),
+            model_sha256: sha256(model_json.as_bytes()),
+        };
+        (identity, recipe_toml, model_json)
+    }
 }
 
 /// A file of a data set.

@@ -46,8 +46,10 @@ def read_table(folder):
                     same = value == float(row[name])
                 elif isinstance(value, list):
                     same = value == [float(number) for number in row[name].split(";")]
+                elif isinstance(value, bool):
+                    same = row[name] == str(value).lower()
                 else:
-                    same = row[name] == {None: "", True: "true", False: "false"}.get(value, str(value))
+                    same = row[name] == ("" if value is None else str(value))
                 check(same, f"{name} is the same in both tables")
         count += len(typed)
     whole = pyarrow.dataset.dataset([str(path) for path in folder.glob("*.parquet")])

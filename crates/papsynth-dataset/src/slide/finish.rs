@@ -41,7 +41,7 @@ impl SlideSet {
             return Err(wrong(
                 self.path(),
                 format!(
-                    "{} of {} shards are missing, the first is {}; `papsynth slide` with the same recipe makes them",
+                    "{} of {} shards are missing, the first is {}; `papsynth slide make` with the same recipe makes them",
                     missing.len(),
                     self.all().count(),
                     name_of(first)
@@ -279,17 +279,10 @@ impl SlideSet {
         let [width, height] = self.level_px(level).unwrap_or([1; 2]);
         let grey = self.picture(level, plane, 0..height, 0..width)?;
         let shift = self.head.bits.saturating_sub(8);
-        #[expect(clippy::cast_possible_truncation, reason = "at most 8 bits are left")]
-        let bytes: Vec<u8> = grey.iter().map(|grey| (grey >> shift) as u8).collect();
-        let _ = height;
-        write::png(
-            &bytes.iter().map(|grey| u16::from(*grey)).collect::<Vec<_>>(),
-            width,
-            self.head.channels,
-            8,
-            self.head.pixel_um * f64::from(1_u32 << level),
-        )
-        .map_err(|e| wrong(self.path(), format!("thumbnail.png: {e}")))
+        let bytes: Vec<u16> = grey.iter().map(|grey| grey >> shift).collect();
+        let pixel_um = self.head.pixel_um * f64::from(1_u32 << level);
+        write::png(&bytes, width, self.head.channels, 8, pixel_um)
+            .map_err(|e| wrong(self.path(), format!("thumbnail.png: {e}")))
     }
 
     fn card(&self, objects: u64) -> String {
@@ -308,7 +301,7 @@ impl SlideSet {
              `slide.ome.zarr` is OME-Zarr 0.5: the picture, and as labels the front-most cytoplasm, nucleus and debris at each pixel \
              and the number of cytoplasms there (`layers`). `objects/` has a table and a GeoJSON file for every square of {} pixels, with \
              the complete mask of every object whose middle lies there; ids are those of the labels.\n\n\
-             The same files come again from `papsynth slide --out DIR --recipe recipe.toml --seed {} --slide {}`.\n",
+             The same files come again from `papsynth slide make recipe.toml --model model.json --out DIR --seed {} --slide {} --shard-px {}{}`.\n",
             head.width_px,
             head.height_px,
             um[0],
@@ -323,6 +316,9 @@ impl SlideSet {
             head.shard_px,
             head.identity.seed,
             head.slide,
+            head.shard_px,
+            // Only builds with Parquet know the word, and write it unless told otherwise.
+            if crate::parquet::IS_HERE && !head.objects_parquet { " --no-parquet" } else { "" },
         )
     }
 }

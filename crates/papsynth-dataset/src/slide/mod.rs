@@ -21,14 +21,13 @@ use std::io::Write;
 use std::path::Path;
 
 use papsynth::Slide;
-use papsynth::key::STREAM_VERSION;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 use papsynth_zarr::Shard;
 
 use crate::dataset::stranger;
 use crate::error::Error;
-use crate::files::{Folder, sha256};
+use crate::files::Folder;
 use crate::layout;
 use crate::record::{Check, FileRecord, Identity};
 
@@ -79,15 +78,7 @@ impl SlideSet {
     /// If the folder holds something else, or a slide of another recipe, model, seed, number, stream version or shard size, or the
     /// system refuses.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
-        let (recipe, model) = (info.recipe.to_toml(), info.model.to_json());
-        let identity = Identity {
-            seed: info.seed,
-            stream_version: STREAM_VERSION,
-            recipe_version: info.recipe.version,
-            model_version: info.model.version,
-            recipe_sha256: sha256(recipe.as_bytes()),
-            model_sha256: sha256(model.as_bytes()),
-        };
+        let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);
         if info.objects_parquet && !crate::parquet::IS_HERE {
             return Err(crate::formats::missing("the table of objects as Parquet", "parquet", path));
