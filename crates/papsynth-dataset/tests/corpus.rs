@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 mod classes;
 #[path = "parsers/coco.rs"]
 mod coco;
+#[path = "parsers/engine.rs"]
+mod engine;
 #[path = "parsers/image.rs"]
 mod image;
 #[path = "parsers/labels.rs"]
@@ -28,6 +30,12 @@ mod stack;
 
 /// Gives every input of a target to its check, each cut off at three places, and as many that are changed at random as `PAPSYNTH_FUZZ` says.
 fn replay(target: &str, check: fn(&[u8])) {
+    replay_part(target, 1, check);
+}
+
+/// [`replay`] with one in `part` of the changed inputs, for checks that take milliseconds.
+fn replay_part(target: &str, part: u64, check: fn(&[u8])) {
+    let rounds: u64 = std::env::var("PAPSYNTH_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(0) / part;
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(target);
     let Ok(entries) = fs::read_dir(&folder) else {
         eprintln!("left out: there is no {}, the corpora are part of the repository alone", folder.display());
@@ -44,7 +52,6 @@ fn replay(target: &str, check: fn(&[u8])) {
             check(&bytes[..length]);
         }
     }
-    let rounds: u64 = std::env::var("PAPSYNTH_FUZZ").ok().and_then(|n| n.parse().ok()).unwrap_or(0);
     let mut numbers = Numbers(rounds ^ 20_261_122);
     for round in 0..rounds {
         let bytes = numbers.mutant(&inputs);
@@ -121,6 +128,11 @@ impl Numbers {
 #[test]
 fn recipes() {
     replay("recipe", recipe::check);
+}
+
+#[test]
+fn engines() {
+    replay_part("recipe", 100, engine::check);
 }
 
 #[test]
