@@ -26,6 +26,8 @@ enum Role {
     /// Knows how a kind of file is laid out, and nothing of what is in it.
     Container,
     Dataset,
+    /// Data sets somewhere else than on this machine.
+    Cloud,
     Judge,
     Match,
     /// Talks with a browser on the same machine, and knows nothing of what about.
@@ -43,7 +45,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 25] = [
+const PLACES: [(&str, Role); 26] = [
     ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -58,6 +60,7 @@ const PLACES: [(&str, Role); 25] = [
     ("papsynth-zarr", Role::Container),
     ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
+    ("papsynth-cloud", Role::Cloud),
     ("papsynth-judge", Role::Judge),
     ("papsynth-loopback", Role::Loopback),
     ("papsynth-study", Role::Study),
@@ -87,6 +90,7 @@ impl Role {
             // It must run where files and threads do not.
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
+            Self::Cloud => &[Self::Dataset],
             Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
@@ -101,6 +105,7 @@ impl Role {
                 Self::Technique,
                 Self::Engine,
                 Self::Dataset,
+                Self::Cloud,
                 Self::Judge,
                 Self::Match,
                 Self::Loopback,
@@ -108,7 +113,7 @@ impl Role {
                 Self::View,
                 Self::Recipes,
             ],
-            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Recipes],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Cloud, Self::Judge, Self::Recipes],
         }
     }
 }

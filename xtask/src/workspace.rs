@@ -17,6 +17,7 @@ pub(crate) struct Heavy {
 
 /// All of them; each is missing in the `default-members` of the workspace, too.
 pub(crate) const HEAVY: &[Heavy] = &[
+    Heavy { package: "papsynth-cloud", features: &["papsynth-cli/cloud", "papsynth-python/cloud"] },
     Heavy { package: "papsynth-python", features: &[] },
     Heavy {
         package: "papsynth-parquet",

@@ -8,6 +8,7 @@ use crate::args::{Generate, LayoutArgs};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::memory::{self, Fit, Need};
+use crate::place;
 use crate::profile::Account;
 use crate::report::{self, Progress, Start};
 use crate::setup::Setup;
@@ -16,6 +17,7 @@ use crate::share;
 pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let account = args.profile.then(Account::open);
     let profile = account.as_ref().map(|account| account.profile.clone());
+    let home = place::home(&args.out)?;
     let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
@@ -41,7 +43,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let interrupt = Interrupt::watch()?;
     let map = setup.map.as_ref();
     let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
-    let dataset = Dataset::create_or_resume(&args.out, &info)?;
+    let dataset = Dataset::create_or_resume(&home, &info)?;
     let at_once = fit.at_once;
     let (threads, working) = match fit.shared {
         true => (setup.threads_of_a_frame(), setup.threads),

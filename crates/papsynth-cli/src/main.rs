@@ -14,6 +14,7 @@ mod judge;
 mod learn;
 mod match_fields;
 mod memory;
+mod place;
 mod plan;
 mod preview;
 mod profile;
@@ -49,7 +50,7 @@ fn main() -> ExitCode {
         }
     };
     let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
-    match run(cli.verb) {
+    match place::check(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             let code = failure.exit().code();

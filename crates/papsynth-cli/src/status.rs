@@ -6,6 +6,7 @@ use papsynth_dataset::{Dataset, shards_to_make};
 
 use crate::args::{Merge, Status};
 use crate::exit::{self, Complaint, Failure};
+use crate::place;
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
@@ -13,7 +14,7 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
         let (missing, all) = crate::slide::missing(&args.dir)?;
         return tell(args, &missing, all, &format!("papsynth slide finalize {}", args.dir.display()));
     }
-    let dataset = Dataset::open(&args.dir)?;
+    let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let Some(frames) = args.frames else {
         let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
         return Err(Failure::input(complaint.help("only a slide knows by itself how large it will be")));
@@ -45,7 +46,7 @@ fn tell(args: &Status, missing: &[u64], all: u64, close: &str) -> Result<(), Fai
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
-    let dataset = Dataset::open(&args.dir)?;
+    let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let missing = shards_to_make(&dataset, 0..args.frames)?;
     let dir = args.dir.display();
     if !missing.is_empty() {

@@ -4,6 +4,7 @@ use papsynth_dataset::Mend;
 
 use crate::args::{Clean, Verify};
 use crate::exit::{self, Complaint, Failure};
+use crate::place;
 
 /// Findings that are printed in full; the rest is counted.
 pub(crate) const MOST: usize = 50;
@@ -13,7 +14,7 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         return crate::slide::verify(&args.dir, args.json);
     }
-    let verdict = papsynth_dataset::verify(&args.dir, args.frames.map(|frames| 0..frames))?;
+    let verdict = papsynth_dataset::verify(&place::home(&args.dir)?, args.frames.map(|frames| 0..frames))?;
     let dir = args.dir.display();
     if args.json {
         let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
-    let cleaned = papsynth_dataset::clean(&args.dir, args.strays)?;
+    let cleaned = papsynth_dataset::clean(&place::home(&args.dir)?, args.strays)?;
     let (dir, left, strays) = (args.dir.display(), cleaned.temporary, cleaned.strays);
     exit::print(&format!("{dir}: {left} files of killed runs and {strays} others removed\n"))
 }

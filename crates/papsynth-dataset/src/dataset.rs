@@ -19,6 +19,7 @@ use crate::merge;
 use crate::read::{self, InputFile};
 use crate::record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 use crate::shard_writer::ShardWriter;
+use crate::store::Home;
 
 pub use crate::merge::Summary;
 
@@ -44,7 +45,7 @@ pub struct DatasetInfo<'a> {
 ///
 /// Shards may be written in any order, by several threads, and by several processes; each is whole when its record
 /// (`shards/N.json`) is there. Nothing outside the folder is touched.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Dataset {
     pub(crate) folder: Folder,
     pub(crate) identity: Identity,
@@ -60,24 +61,26 @@ impl Dataset {
     /// # Errors
     /// If the folder holds something else, or a data set of another recipe, model, seed or stream version (the message
     /// says which), or the system refuses.
-    pub fn create_or_resume(path: &Path, info: &DatasetInfo) -> Result<Self, Error> {
+    pub fn create_or_resume(home: impl Into<Home>, info: &DatasetInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let map = info.map.map(|file| file.name.clone());
         let kept = info.map.map(|file| (file.name.clone(), file.bytes.to_vec()));
         let given = [(layout::RECIPE, recipe.into_bytes()), (layout::MODEL, model.into_bytes())];
         let given = given.map(|(name, bytes)| (name.to_owned(), bytes)).into_iter().chain(kept).collect::<Vec<_>>();
-        Self::begin(path, identity, info.layout.clone(), categories(info.recipe), map, &given)
+        Self::begin(home, identity, info.layout.clone(), categories(info.recipe), map, &given)
     }
 
     /// The same of what is decided already; `given` is kept in the folder, the recipe first.
     pub(crate) fn begin(
-        path: &Path,
+        home: impl Into<Home>,
         identity: Identity,
         layout: Layout,
         categories: Vec<Category>,
         map: Option<String>,
         given: &[(String, Vec<u8>)],
     ) -> Result<Self, Error> {
+        let folder = Folder::new(home);
+        let path = &folder.shown();
         if layout.formats.is_empty() || layout.frames_per_shard == 0 {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });
@@ -85,28 +88,33 @@ impl Dataset {
         if let Some((feature, what)) = layout.needs() {
             return Err(formats::missing(&what, feature, path));
         }
-        let dataset = Self { folder: Folder::new(path), identity, layout, categories, map };
+        let dataset = Self { folder, identity, layout, categories, map };
+        dataset.begun(given).map_err(|error| dataset.folder.named(error))?;
+        Ok(dataset)
+    }
+
+    fn begun(&self, given: &[(String, Vec<u8>)]) -> Result<(), Error> {
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
-        match stranger(path)? {
-            None => merge::write_manifest(&dataset, &[], &[], 0).map(|_| ())?,
-            Some(_) if dataset.folder.path(layout::MANIFEST).exists() => dataset.compare_or_restore(&recipe)?,
+        match stranger(&self.folder)? {
+            None => merge::write_manifest(self, &[], &[], 0).map(|_| ())?,
+            Some(_) if self.folder.has(layout::MANIFEST)? => self.compare_or_restore(&recipe)?,
             Some(name) => {
                 return Err(Error::Folder {
-                    path: path.to_owned(),
+                    path: self.folder.root().to_owned(),
                     message: format!(
                         "the folder holds something else (`{name}`) and no data set; choose another, or a new one"
                     ),
                 });
             }
         }
-        dataset.folder.sweep()?;
+        self.folder.sweep()?;
         for (name, bytes) in given {
-            dataset.folder.keep(name, bytes)?;
+            self.folder.keep(name, bytes)?;
         }
-        Ok(dataset)
+        Ok(())
     }
 
-    /// Where it lies.
+    /// Where it lies; of one in an object store, where its files are worked on.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.root()
@@ -136,7 +144,8 @@ impl Dataset {
     /// # Errors
     /// If the system refuses to tell.
     pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
-        Ok(self.whole_or_flaw(shard, check)?.ok())
+        let whole = self.whole_or_flaw(shard, check).map_err(|error| self.folder.named(error));
+        Ok(whole?.ok())
     }
 
     /// The same, or what the shard lacks.
@@ -180,16 +189,17 @@ impl Dataset {
     /// # Errors
     /// If a file of a shard cannot be read any more, or the system refuses.
     pub fn finish(&self) -> Result<Summary, Error> {
-        merge::merge(self)
+        let listed = Self { folder: self.folder.listed()?, ..self.clone() };
+        merge::merge(&listed).map_err(|error| self.folder.named(error))
     }
 
     /// The data set that lies in a folder.
     ///
     /// # Errors
     /// If there is none, or the system refuses to read.
-    pub fn open(path: &Path) -> Result<Self, Error> {
-        let folder = Folder::new(path);
-        let manifest = Manifest::read(&folder)?;
+    pub fn open(home: impl Into<Home>) -> Result<Self, Error> {
+        let folder = Folder::new(home);
+        let manifest = Manifest::read(&folder).map_err(|error| folder.named(error))?;
         let own = [
             layout::RECIPE,
             layout::MODEL,
@@ -251,7 +261,8 @@ impl Dataset {
 
     /// Where the recipe in the folder first differs.
     fn first_difference(&self, recipe: &str) -> String {
-        let Ok(there) = fs::read_to_string(self.folder.path(layout::RECIPE)) else { return String::new() };
+        let there = self.folder.inside(layout::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
+        let Some(there) = there else { return String::new() };
         let mut section = "";
         for (there, here) in there.lines().zip(recipe.lines()) {
             if there != here {
@@ -269,7 +280,11 @@ impl Dataset {
 }
 
 /// Something in a folder, if it is there and not empty. What was never finished does not count.
-pub(crate) fn stranger(path: &Path) -> Result<Option<String>, Error> {
+pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
+    if folder.is_remote() {
+        return Ok(folder.names()?.into_iter().next());
+    }
+    let path = folder.root();
     let entries = match fs::read_dir(path) {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -344,17 +359,8 @@ pub(crate) fn whole_record(
 
 /// Numbers of all shards with a record, in order.
 pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let path = folder.inside(layout::SHARDS)?;
-    let entries = match fs::read_dir(&path) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(Error::io("read", &path)(e)),
-    };
-    let mut found = Vec::new();
-    for entry in entries {
-        let name = entry.map_err(Error::io("read", &path))?.file_name();
-        found.extend(name.to_str().and_then(layout::number_of_record));
-    }
+    let names = folder.names_in(layout::SHARDS)?;
+    let mut found: Vec<u64> = names.iter().filter_map(|name| layout::number_of_record(name)).collect();
     found.sort_unstable();
     Ok(found)
 }

@@ -1,15 +1,18 @@
 //! Whole files or none: a file gets its name only when all of it is on the disk.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Problem};
 use crate::record::{Check, FileRecord};
+use crate::store::{Home, Remote};
 
 const TEMPORARY_ENDING: &str = ".tmp";
 
@@ -26,19 +29,90 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     Folder::new(folder).write(&name, bytes).map(|_| ())
 }
 
-/// A folder into which files are written by names relative to it, with `/` between folders.
+/// A folder into which files are written by names relative to it, with `/` between folders. Of a data set in an object store it is where
+/// its files are worked on: what gets its name is put into the store, and what is read is copied from there first.
 #[derive(Debug, Clone)]
 pub(crate) struct Folder {
     root: PathBuf,
+    remote: Option<Arc<Remote>>,
+    /// Names and sizes of the files in the store at one moment.
+    listing: Option<Arc<BTreeMap<String, u64>>>,
 }
 
 impl Folder {
-    pub(crate) fn new(root: &Path) -> Self {
-        Self { root: root.to_owned() }
+    pub(crate) fn new(home: impl Into<Home>) -> Self {
+        let Home { root, remote } = home.into();
+        Self { root, remote, listing: None }
     }
 
     pub(crate) fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// Where it is, for messages.
+    pub(crate) fn shown(&self) -> PathBuf {
+        self.remote.as_ref().map_or_else(|| self.root.clone(), |remote| remote.named(&self.root))
+    }
+
+    /// The same folder, with the sizes of all files in the store asked for once instead of one by one.
+    pub(crate) fn listed(&self) -> Result<Self, Error> {
+        let listing = self.remote.as_ref().map(|remote| remote.list("")).transpose()?.map(Arc::new);
+        Ok(Self { listing, ..self.clone() })
+    }
+
+    /// An error that names files in the store, and not their copies.
+    pub(crate) fn named(&self, error: Error) -> Error {
+        let Some(remote) = &self.remote else { return error };
+        match error {
+            Error::Input { path, problem } => Error::Input { path: remote.named(&path), problem },
+            Error::Io { action, path, source } => Error::Io { action, path: remote.named(&path), source },
+            Error::Folder { path, message } => Error::Folder { path: remote.named(&path), message },
+            other => other,
+        }
+    }
+
+    /// Whether it belongs to an object store.
+    pub(crate) fn is_remote(&self) -> bool {
+        self.remote.is_some()
+    }
+
+    /// Whether there is a file.
+    pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
+        match &self.remote {
+            Some(_) => Ok(self.size(name)?.is_some()),
+            None => Ok(self.path(name).exists()),
+        }
+    }
+
+    /// Size of a file in the store.
+    fn size(&self, name: &str) -> Result<Option<u64>, Error> {
+        match (&self.listing, &self.remote) {
+            (Some(listing), _) => Ok(listing.get(name).copied()),
+            (None, Some(remote)) => remote.size(name),
+            (None, None) => Ok(None),
+        }
+    }
+
+    /// Removes a file, if there is one.
+    pub(crate) fn remove(&self, name: &str) -> Result<(), Error> {
+        if let Some(remote) = &self.remote {
+            remote.remove(name)?;
+        }
+        let path = self.path(name);
+        match fs::remove_file(&path) {
+            Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                Err(Error::io("remove", &path)(e))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The copies of these files are wanted no longer.
+    pub(crate) fn release<'n>(&self, names: impl IntoIterator<Item = &'n str>) {
+        if self.remote.is_some() {
+            // One that cannot be removed goes with the folder.
+            names.into_iter().for_each(|name| drop(fs::remove_file(self.path(name))));
+        }
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
@@ -56,6 +130,12 @@ impl Folder {
                 // What is not there leads nowhere.
                 Err(_) => break,
             }
+        }
+        if let Some(remote) = &self.remote
+            && !path.is_dir()
+            && !self.path(name).exists()
+        {
+            remote.get(name, &self.path(name))?;
         }
         Ok(self.path(name))
     }
@@ -107,11 +187,20 @@ impl Folder {
         let file = file.map_err(Error::io("write", &path))?;
         // Says that somebody is at work on it; see `sweep`. File systems without locks do without.
         let _ = file.try_lock();
-        Ok(Pending { file, temporary, path, name: name.to_owned(), committed: false })
+        let remote = self.remote.clone();
+        Ok(Pending { file, temporary, path, name: name.to_owned(), committed: false, remote })
     }
 
     /// What is wrong with a file, if anything is.
     pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
+        let missing = || Ok(Some("is missing".to_owned()));
+        if self.remote.is_some() {
+            match self.size(&record.path)? {
+                None => return missing(),
+                Some(size) if size == record.bytes && check == Check::Sizes => return Ok(None),
+                Some(_) => {}
+            }
+        }
         let path = match self.inside(&record.path) {
             Err(Error::Input { problem, .. }) => return Ok(Some(problem.to_string())),
             path => path?,
@@ -119,9 +208,7 @@ impl Folder {
         let size = match fs::metadata(&path) {
             Ok(found) if found.is_file() => found.len(),
             Ok(_) => return Ok(Some("is no file".to_owned())),
-            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-                return Ok(Some("is missing".to_owned()));
-            }
+            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return missing(),
             Err(e) => return Err(Error::io("read", &path)(e)),
         };
         Ok(if size != record.bytes {
@@ -160,6 +247,52 @@ impl Folder {
             }
         }
         Ok(found)
+    }
+
+    /// Every file, by its name, in order. Links are files: nothing of ours is one.
+    pub(crate) fn names(&self) -> Result<Vec<String>, Error> {
+        if let Some(remote) = &self.remote {
+            return Ok(remote.list("")?.into_keys().collect());
+        }
+        let mut found = Vec::new();
+        for path in self.folders()? {
+            for entry in fs::read_dir(&path).map_err(Error::io("read", &path))? {
+                let entry = entry.map_err(Error::io("read", &path))?;
+                if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
+                    continue;
+                }
+                let below = entry.path();
+                let below = below.strip_prefix(&self.root).map_err(|_| {
+                    Error::input(&path)(Problem::Differs { what: "a file lies outside the folder".to_owned() })
+                })?;
+                let parts: Vec<_> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+                found.push(parts.join("/"));
+            }
+        }
+        found.sort();
+        Ok(found)
+    }
+
+    /// Last parts of the names of the files that lie in a folder itself; none if there is no such folder.
+    pub(crate) fn names_in(&self, folder: &str) -> Result<Vec<String>, Error> {
+        if self.remote.is_some() {
+            let found = match (&self.listing, &self.remote) {
+                (None, Some(remote)) => remote.list(folder)?,
+                _ => self.listing.as_deref().cloned().unwrap_or_default(),
+            };
+            let below = format!("{folder}/");
+            let names = found.keys().filter_map(|name| name.strip_prefix(&below));
+            return Ok(names.filter(|name| !name.contains('/')).map(str::to_owned).collect());
+        }
+        let path = self.inside(folder)?;
+        let entries = match fs::read_dir(&path) {
+            Ok(entries) => entries,
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(e) => return Err(Error::io("read", &path)(e)),
+        };
+        let name =
+            |entry: io::Result<fs::DirEntry>| entry.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
     /// Removes what killed processes left behind and says how many files it was. A temporary file that somebody works on is
@@ -217,6 +350,8 @@ pub(crate) struct Pending {
     path: PathBuf,
     name: String,
     committed: bool,
+    /// The store that the file is put into.
+    remote: Option<Arc<Remote>>,
 }
 
 impl Pending {
@@ -265,7 +400,7 @@ impl Pending {
         let renamed = fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
         renamed.map_err(Error::io("write", &self.path))?;
         self.committed = true;
-        Ok(())
+        self.remote.as_ref().map_or(Ok(()), |remote| remote.put(&self.name, &self.path))
     }
 }
 

@@ -118,6 +118,7 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
 /// If the system refuses to read.
 pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<u64>, Error> {
     let each = dataset.layout.frames_per_shard;
+    let dataset = &Dataset { folder: dataset.folder.listed()?, ..dataset.clone() };
     let mut missing = Vec::new();
     for shard in frames.start / each..frames.end.div_ceil(each) {
         let room = dataset.frames_of_shard(shard);

@@ -29,6 +29,7 @@ mod shard_writer;
 #[cfg(feature = "zarr")]
 pub mod slide;
 mod splits;
+mod store;
 #[cfg(test)]
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -52,5 +53,6 @@ pub use picture::Picture;
 pub use picture::write_png;
 pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 pub use shard_writer::ShardWriter;
+pub use store::{Home, Store};
 pub use table::{Column, columns};
 pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};

@@ -179,6 +179,7 @@ fn tables(folder: &Folder, shards: &[u64], out: &mut Sink) -> Result<(), Error> 
     for (i, &index) in shards.iter().enumerate() {
         let text = read::bytes(&folder.inside(&layout::table(index))?, SHARD_FILE_BYTES)?;
         let header = text.iter().position(|&b| b == b'\n').map_or(text.len(), |end| end + 1);
+        folder.release([layout::table(index).as_str()]);
         out(if i == 0 { &text } else { &text[header..] })?;
     }
     Ok(())
@@ -220,6 +221,7 @@ fn json(folder: &Folder, value: &impl Serialize, out: &mut Sink) -> Result<(), E
 pub(crate) fn document(folder: &Folder, shard: u64) -> Result<Document, Error> {
     let path = folder.inside(&layout::coco(shard))?;
     let bytes = read::bytes(&path, SHARD_FILE_BYTES)?;
+    folder.release([layout::coco(shard).as_str()]);
     serde_json::from_slice(&bytes).map_err(|e| Error::input(&path)(broken(e)))
 }
 
@@ -242,6 +244,7 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
             let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
             sheet.add(&layout::numbered(frame.index), &image, white(frame.bits), &masks);
         }
+        folder.release(record.files.iter().map(|file| file.path.as_str()));
         left = left.saturating_sub(record.frames.len());
     }
     sheet.into_picture().to_png().map_err(Error::io("encode", &folder.path(layout::SHEET)))

@@ -1,8 +1,6 @@
 //! One shard, frame by frame, plane by plane, in every format of the data set.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, Truth};
@@ -55,11 +53,7 @@ impl<'a> ShardWriter<'a> {
         let folder = &dataset.folder;
         // From now on the shard is not whole, whatever it was before.
         folder.inside(layout::SHARDS)?;
-        let record = folder.path(&layout::record(shard));
-        match fs::remove_file(&record) {
-            Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound) => return Err(Error::io("remove", &record)(e)),
-            _ => {}
-        }
+        folder.remove(&layout::record(shard))?;
         let place = Place { folder, layout: &dataset.layout, shard };
         let sinks = dataset.layout.formats.iter().map(|format| format.sink(place)).collect::<Result<_, _>>()?;
         let truth = TruthFiles::begin(dataset, shard)?;
@@ -196,6 +190,7 @@ impl<'a> ShardWriter<'a> {
         let text = serde_json::to_vec_pretty(&record);
         let text = text.map_err(|e| Error::io("encode", &folder.path(&name))(e.into()))?;
         folder.sync_names([&folder.write(&name, &text)?])?;
+        folder.release(record.files.iter().map(|file| file.path.as_str()).chain([name.as_str()]));
         Ok(record.frames)
     }
 }

@@ -1,9 +1,7 @@
 //! Whether a data set is whole to the last bit.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::ops::Range;
-use std::path::Path;
 
 use papsynth::key::STREAM_VERSION;
 use papsynth::recipe::{self, Recipe};
@@ -11,13 +9,14 @@ use serde::Serialize;
 
 use crate::coco::categories;
 use crate::dataset::{Dataset, Flaw, read_record, recorded_shards};
-use crate::error::{Error, Problem};
+use crate::error::Error;
 use crate::files::{Folder, is_temporary, sha256};
 use crate::formats::huggingface;
 use crate::layout;
 use crate::merge;
 use crate::read;
 use crate::record::{Check, FileRecord, Manifest, WRITER};
+use crate::store::Home;
 
 /// Largest recipe that is read back.
 const GIVEN_BYTES: u64 = 1 << 28;
@@ -61,35 +60,41 @@ pub enum Mend {
 ///
 /// # Errors
 /// If there is no data set, or the system refuses to read.
-pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
-    let folder = Folder::new(path);
+pub fn verify(home: impl Into<Home>, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
+    let home = home.into();
+    let folder = Folder::new(&home).listed()?;
+    verify_in(&folder, home, expected).map_err(|error| folder.named(error))
+}
+
+fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
     let mut findings = Vec::new();
     let mut find = |path: String, message: String, mend| findings.push(Finding { path, message, mend });
-    let dataset = match Dataset::open(path) {
-        Ok(dataset) => dataset,
+    let dataset = match Dataset::open(&home) {
+        Ok(dataset) => Dataset { folder: folder.clone(), ..dataset },
         // Where there is a manifest, there is a data set: its first finding is that the manifest is broken.
-        Err(Error::Input { problem, path }) if path == folder.path(layout::MANIFEST) => {
+        Err(Error::Input { problem, path }) if path == folder.shown().join(layout::MANIFEST) => {
             find(layout::MANIFEST.to_owned(), problem.to_string(), Mend::Generate);
             return Ok(Verdict { root: None, frames: 0, files: 1, findings });
         }
         Err(error) => return Err(error),
     };
     let manifest = folder.record(layout::MANIFEST)?;
-    let Manifest { writer, files: merged, .. } = Manifest::read(&folder)?;
+    let Manifest { writer, files: merged, .. } = Manifest::read(folder)?;
     let mut listed: BTreeSet<String> = BTreeSet::from([layout::MANIFEST.to_owned()]);
     let (mut frames, mut there, mut is_damaged) = (0, Vec::new(), false);
-    for shard in recorded_shards(&folder)? {
+    for shard in recorded_shards(folder)? {
         listed.insert(layout::record(shard));
         match dataset.whole_or_flaw(shard, Check::Hashes)? {
             Ok(record) => {
                 frames += record.frames.len() as u64;
                 there.extend(record.frames.iter().map(|frame| frame.index));
+                folder.release(record.files.iter().map(|file| file.path.as_str()));
                 listed.extend(record.files.into_iter().map(|file| file.path));
             }
             Err(flaw) => {
                 // What else it has is no stray, and its frames are not missing.
                 there.extend(dataset.frames_of_shard(shard));
-                if let Ok(record) = read_record(&folder, shard) {
+                if let Ok(record) = read_record(folder, shard) {
                     listed.extend(record.files.into_iter().map(|file| file.path));
                 }
                 is_damaged = true;
@@ -131,7 +136,7 @@ pub fn verify(path: &Path, expected: Option<Range<u64>>) -> Result<Verdict, Erro
         findings.push(Finding { path: layout::MANIFEST.to_owned(), message, mend: Mend::Generate });
     }
     let files = listed.len() as u64;
-    for path in files_below(&folder)? {
+    for path in folder.names()? {
         if !listed.contains(&path) {
             let message = match is_temporary(path.rsplit('/').next().unwrap_or(&path)) {
                 true => "was left behind by a run that was killed",
@@ -230,27 +235,6 @@ fn gaps(there: &[u64], expected: &Range<u64>) -> Vec<Range<u64>> {
     gaps
 }
 
-/// Every file below a folder, by its path from there. Links are files: nothing of ours is one.
-fn files_below(folder: &Folder) -> Result<Vec<String>, Error> {
-    let mut found = Vec::new();
-    for path in folder.folders()? {
-        for entry in fs::read_dir(&path).map_err(Error::io("read", &path))? {
-            let entry = entry.map_err(Error::io("read", &path))?;
-            if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
-                continue;
-            }
-            let below = entry.path();
-            let below = below.strip_prefix(folder.root()).map_err(|_| {
-                Error::input(&path)(Problem::Differs { what: "a file lies outside the folder".to_owned() })
-            })?;
-            let parts: Vec<String> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
-            found.push(parts.join("/"));
-        }
-    }
-    found.sort();
-    Ok(found)
-}
-
 /// What [`clean`] took away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Cleaned {
@@ -264,25 +248,28 @@ pub struct Cleaned {
 ///
 /// # Errors
 /// If there is no data set, a record cannot be read (then strays cannot be told), or the system refuses.
-pub fn clean(path: &Path, strays: bool) -> Result<Cleaned, Error> {
-    let folder = Folder::new(path);
-    let manifest = Manifest::read(&folder)?;
+pub fn clean(home: impl Into<Home>, strays: bool) -> Result<Cleaned, Error> {
+    let folder = Folder::new(home);
+    clean_in(&folder, strays).map_err(|error| folder.named(error))
+}
+
+fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
+    let manifest = Manifest::read(folder)?;
     let mut cleaned = Cleaned { temporary: folder.sweep()?, strays: 0 };
     if !strays {
         return Ok(cleaned);
     }
     let mut listed: BTreeSet<String> = manifest.files.into_iter().map(|file| file.path).collect();
     listed.insert(layout::MANIFEST.to_owned());
-    for shard in recorded_shards(&folder)? {
+    for shard in recorded_shards(folder)? {
         listed.insert(layout::record(shard));
-        listed.extend(read_record(&folder, shard)?.files.into_iter().map(|file| file.path));
+        listed.extend(read_record(folder, shard)?.files.into_iter().map(|file| file.path));
     }
-    for name in files_below(&folder)? {
+    for name in folder.names()? {
         // A temporary file that is still there is somebody's work.
         let file_name = name.rsplit('/').next().unwrap_or(&name);
         if !listed.contains(&name) && !is_temporary(file_name) {
-            let path = folder.path(&name);
-            fs::remove_file(&path).map_err(Error::io("remove", &path))?;
+            folder.remove(&name)?;
             cleaned.strays += 1;
         }
     }

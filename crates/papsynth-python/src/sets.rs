@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Progress, Run, Share, shards_to_make};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Home, Layout, Progress, Run, Share, shards_to_make};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -83,7 +83,8 @@ pub(crate) fn generate<'py>(
         map: made_by.map.as_ref(),
         layout: &layout,
     };
-    let dataset = Dataset::create_or_resume(&out, &info).map_err(|error| error::dataset(&error))?;
+    let dataset =
+        home(&out).and_then(|home| Dataset::create_or_resume(&home, &info)).map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
     let share = Share { index, of };
@@ -183,20 +184,25 @@ pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Strin
         return Err(PyValueError::new_err(message));
     }
     py.detach(|| -> Result<String, papsynth_dataset::Error> {
-        Dataset::open(&out)?.finish()?;
-        root(&out, frames)
+        let home = home(&out)?;
+        Dataset::open(&home)?.finish()?;
+        Ok(papsynth_dataset::verify(&home, Some(0..frames))?.root.unwrap_or_default())
     })
     .map_err(|error| error::dataset(&error))
 }
 
-fn root(out: &Path, frames: u64) -> Result<String, papsynth_dataset::Error> {
-    Ok(papsynth_dataset::verify(out, Some(0..frames))?.root.unwrap_or_default())
+/// The data set at a path or an address.
+fn home(path: &Path) -> Result<Home, papsynth_dataset::Error> {
+    #[cfg(feature = "cloud")]
+    return papsynth_cloud::Bucket::home(path);
+    #[cfg(not(feature = "cloud"))]
+    return Ok(Home::from(path));
 }
 
 /// Numbers of the shards that are not whole, from commit records: also while others work.
 #[pyfunction]
 pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec<u64>> {
-    let found = py.detach(|| shards_to_make(&Dataset::open(&out)?, 0..frames));
+    let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames));
     found.map_err(|error| error::dataset(&error))
 }
 
@@ -209,7 +215,8 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
-    let verdict = py.detach(|| papsynth_dataset::verify(&out, frames.map(|frames| 0..frames)));
+    let verdict =
+        py.detach(|| home(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
     let verdict = verdict.map_err(|error| error::dataset(&error))?;
     let told = PyDict::new(py);
     told.set_item("root", verdict.root)?;

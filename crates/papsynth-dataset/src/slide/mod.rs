@@ -93,7 +93,7 @@ impl SlideSet {
                     format!("holds a slide of another {what}; choose another folder, or give what it was begun with"),
                 ));
             }
-        } else if let Some(name) = stranger(path)? {
+        } else if let Some(name) = stranger(&folder)? {
             return Err(wrong(
                 path,
                 format!("the folder holds something else (`{name}`) and no slide; choose another, or a new one"),

@@ -12,6 +12,12 @@ from ._render import engine
 __all__ = ["generate", "merge", "missing", "verify"]
 
 
+def place(out: str | os.PathLike[str]) -> str:
+    """A folder as every process finds it; the address of an object store as it is."""
+    out = os.fspath(out)
+    return out if "://" in out else os.path.abspath(out)
+
+
 def generate(
     recipe: Any,
     out: str | os.PathLike[str],
@@ -35,7 +41,8 @@ def generate(
     recipe : None, str, os.PathLike or dict
         As of `papsynth.render`.
     out : str or os.PathLike
-        New, empty, or a data set of the same recipe, seed and formats.
+        New, empty, or a data set of the same recipe, seed and formats: a folder, or an object store (``s3://bucket/prefix``, ``gs://``,
+        ``az://``) with keys in the environment.
     frames : int
         Frames that there will be in all, by every share.
     seed : int

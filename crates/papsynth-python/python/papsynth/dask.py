@@ -58,7 +58,7 @@ def generate(
         except ValueError:
             client = own = Client()
     try:
-        out = os.path.abspath(os.fspath(out))
+        out = _sets.place(out)
         if shares is None:
             shares = 4 * max(1, sum(client.nthreads().values()))
         shares = max(1, min(shares, frames))

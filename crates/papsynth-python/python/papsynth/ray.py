@@ -62,7 +62,7 @@ def generate(
     ray = _ray()
     if not ray.is_initialized():
         ray.init()
-    out = os.path.abspath(os.fspath(out))
+    out = _sets.place(out)
     if shares is None:
         shares = 4 * max(1, int(ray.cluster_resources().get("CPU", 1)))
     shares = max(1, min(shares, frames))

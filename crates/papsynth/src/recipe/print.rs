@@ -1,5 +1,7 @@
 //! Recipes as text: TOML whose comments are the documentation of the fields, taken from the schema.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use super::Recipe;
@@ -30,16 +32,22 @@ fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Val
     let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(_, value)| is_toml_table(value));
     for (name, value) in plain {
         comment(out, &describe(schema, name, value, fields, root));
-        out.push_str(&format!("{name} = {}\n", toml_value(value)));
+        out.push_str(&format!("{} = {}\n", key(name), toml_value(value)));
     }
     for (name, value) in tables {
-        let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+        let inner = if path.is_empty() { key(name) } else { format!("{path}.{}", key(name)) };
         out.push('\n');
         comment(out, &describe(schema, name, value, fields, root));
         out.push_str(&format!("[{inner}]\n"));
         let inner_schema = resolve(&property(schema, name, fields), root);
         table(out, &inner, value, &inner_schema, root);
     }
+}
+
+/// The name of a field as TOML wants it: as it stands, or in quotes.
+fn key(name: &str) -> String {
+    let line = toml::to_string(&BTreeMap::from([(name, 0)])).unwrap_or_default();
+    line.strip_suffix(" = 0\n").unwrap_or(name).to_owned()
 }
 
 /// Whether a value of a recipe, as JSON, is a table of its own in TOML. Distributions are tables in JSON but are written on one
@@ -55,7 +63,7 @@ pub fn is_toml_table(value: &Value) -> bool {
 pub fn toml_value(value: &Value) -> String {
     match value {
         Value::Object(map) => {
-            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{k} = {}", toml_value(v))).collect();
+            let inner: Vec<String> = map.iter().map(|(k, v)| format!("{} = {}", key(k), toml_value(v))).collect();
             format!("{{ {} }}", inner.join(", "))
         }
         Value::Array(items) => format!("[{}]", items.iter().map(toml_value).collect::<Vec<_>>().join(", ")),
@@ -133,6 +141,18 @@ fn comment(out: &mut String, text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn classes_of_any_name_are_read_back() {
+        for name in ["", "clue cell", "a.b", "say \"so\"", "line\nbreak", "#", "zellkern-größe"] {
+            let mut recipe = Recipe::default();
+            let cells = recipe.cells.values().next().unwrap().clone();
+            recipe.cells.insert(name.to_owned(), cells);
+            let again: Recipe =
+                toml::from_str(&recipe.to_commented_toml()).unwrap_or_else(|e| panic!("{name:?}: {}", e.message()));
+            assert_eq!(again.cells, recipe.cells, "{name:?}");
+        }
+    }
 
     #[test]
     fn every_field_has_its_meaning_above_it() {
