@@ -83,8 +83,8 @@ pub(crate) fn generate<'py>(
         map: made_by.map.as_ref(),
         layout: &layout,
     };
-    let dataset =
-        home(&out).and_then(|home| Dataset::create_or_resume(&home, &info)).map_err(|error| error::dataset(&error))?;
+    let dataset = py.detach(|| home(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
+    let dataset = dataset.map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
     let share = Share { index, of };
