@@ -67,6 +67,7 @@ const CHORES: &[Chore] = &[
     supply::CHORE,
     package::CHORE,
     package::CLUSTER,
+    package::RELEASES,
     ci::CHORE,
     torture::CHORE,
 ];

@@ -55,7 +55,8 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
     let summary = dataset.finish()?;
-    exit::print(&format!("{dir}: {} frames\nLook at: {dir}/contact-sheet.png\n", summary.frames))
+    let (frames, root) = (summary.frames, summary.root);
+    exit::print(&format!("{dir}: {frames} frames\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
 }
 
 /// Sorted numbers as `sbatch --array` takes them.

@@ -31,6 +31,8 @@ pub struct Summary {
     pub damaged: Vec<u64>,
     /// Pixels of masks, by group, that formats with one label a pixel do not show.
     pub lost_px: BTreeMap<String, u64>,
+    /// SHA-256 of the manifest that was written, which names every file with its own: two data sets with the same are the same.
+    pub root: String,
 }
 
 /// What was written for one shard is read whole.
@@ -52,7 +54,7 @@ pub(crate) fn merge(dataset: &Dataset) -> Result<Summary, Error> {
     folder.sync_names(&merged)?;
     let manifest = write_manifest(dataset, &merged, &whole.shards, whole.summary.frames)?;
     folder.sync_names([&manifest])?;
-    Ok(whole.summary)
+    Ok(Summary { root: manifest.sha256, ..whole.summary })
 }
 
 /// The files of no shard as they would be merged now, with the words of the program that wrote the data set; none is written.
@@ -86,7 +88,13 @@ struct Whole {
 impl Whole {
     fn find(dataset: &Dataset) -> Result<Self, Error> {
         let folder = &dataset.folder;
-        let summary = Summary { frames: 0, objects: BTreeMap::new(), damaged: Vec::new(), lost_px: BTreeMap::new() };
+        let summary = Summary {
+            frames: 0,
+            objects: BTreeMap::new(),
+            damaged: Vec::new(),
+            lost_px: BTreeMap::new(),
+            root: String::new(),
+        };
         let mut whole = Self { shards: Vec::new(), sharded: Vec::new(), splits: Vec::new(), summary };
         let mut splits = BTreeSet::new();
         for shard in recorded_shards(folder)? {

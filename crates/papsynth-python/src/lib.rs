@@ -36,6 +36,8 @@ mod _native {
     #[pymodule_export]
     use crate::sets::missing;
     #[pymodule_export]
+    use crate::sets::shards;
+    #[pymodule_export]
     use crate::sets::verify;
     #[pymodule_export]
     use crate::techniques::{camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture};

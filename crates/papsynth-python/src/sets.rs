@@ -163,6 +163,13 @@ fn format(name: &str) -> PyResult<Format> {
     })
 }
 
+/// Number of shards of a data set of so many frames.
+#[pyfunction]
+#[pyo3(signature = (frames, formats=None, frames_per_shard=None))]
+pub(crate) fn shards(frames: u64, formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<u64> {
+    Ok(frames.div_ceil(layout(formats, frames_per_shard)?.frames_per_shard))
+}
+
 /// Closes a data set: fails on any gap, writes the files about all frames.
 ///
 /// Parameters
@@ -183,12 +190,8 @@ pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Strin
         let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
         return Err(PyValueError::new_err(message));
     }
-    py.detach(|| -> Result<String, papsynth_dataset::Error> {
-        let home = home(&out)?;
-        Dataset::open(&home)?.finish()?;
-        Ok(papsynth_dataset::verify(&home, Some(0..frames))?.root.unwrap_or_default())
-    })
-    .map_err(|error| error::dataset(&error))
+    py.detach(|| -> Result<String, papsynth_dataset::Error> { Ok(Dataset::open(&home(&out)?)?.finish()?.root) })
+        .map_err(|error| error::dataset(&error))
 }
 
 /// The data set at a path or an address.

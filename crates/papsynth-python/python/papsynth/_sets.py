@@ -18,6 +18,14 @@ def place(out: str | os.PathLike[str]) -> str:
     return out if "://" in out else os.path.abspath(out)
 
 
+def tasks(recipe: Any, frames: int, workers: int, options: dict[str, Any]) -> int:
+    """Into how many tasks a cluster divides a data set: one a shard, but tasks of 64 frames at least where there are more of them than
+    four a worker. Whatever is wrong with the recipe is raised here, before a task is begun."""
+    engine(recipe, options.get("model"))
+    shards = _native.shards(frames, options.get("formats"), options.get("frames_per_shard"))
+    return min(shards, max(4 * workers, frames // 64, 1))
+
+
 def generate(
     recipe: Any,
     out: str | os.PathLike[str],

@@ -27,7 +27,7 @@ def generate(
     shares: int | None = None,
     **options: Any,
 ) -> str:
-    """Makes a data set on a folder that all workers share, and closes it.
+    """Makes a data set in a folder that all workers share, or in an object store whose keys they have, and closes it.
 
     Tasks are tried again when their worker dies or the system refuses to write; the same call goes on with what there is.
 
@@ -38,7 +38,7 @@ def generate(
     client : dask.distributed.Client, optional
         By default the one of this process, or a cluster on this machine.
     shares : int, optional
-        Number of tasks; by default four for each thread of the cluster. A task should take minutes.
+        Number of tasks; by default one a shard, but of 64 frames at least where that leaves each thread four.
     **options
         As of `papsynth.generate`: formats, frames_per_shard, threads, verify, model.
 
@@ -59,9 +59,8 @@ def generate(
             client = own = Client()
     try:
         out = _sets.place(out)
-        if shares is None:
-            shares = 4 * max(1, sum(client.nthreads().values()))
-        shares = max(1, min(shares, frames))
+        most = _sets.tasks(recipe, frames, max(1, sum(client.nthreads().values())), options)
+        shares = most if shares is None else max(1, min(shares, frames))
         # Names of their own: a task of another call is never taken for one of these.
         tasks = [
             client.submit(_share, recipe, out, frames, seed, (share, shares), options, retries=_RETRIES, pure=False)

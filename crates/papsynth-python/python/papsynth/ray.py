@@ -38,7 +38,7 @@ def generate(
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> str:
-    """Makes a data set on a folder that all nodes share, and closes it.
+    """Makes a data set in a folder that all nodes share, or in an object store whose keys they have, and closes it.
 
     Tasks are tried again when their worker dies or the system refuses to write. If this process dies, the same call goes on: what there is
     is known from commit records alone.
@@ -48,7 +48,8 @@ def generate(
     recipe, out, frames, seed
         As of `papsynth.generate`.
     shares : int, optional
-        Number of tasks; by default four for each processor of the cluster. A task should take minutes.
+        Number of tasks; by default one a shard, but of 64 frames at least where that leaves each processor four. What a task has at work
+        is lost with its worker, but for the shards that are whole.
     progress : callable, optional
         Called with the number of shares that are done and that there are.
     **options
@@ -63,9 +64,8 @@ def generate(
     if not ray.is_initialized():
         ray.init()
     out = _sets.place(out)
-    if shares is None:
-        shares = 4 * max(1, int(ray.cluster_resources().get("CPU", 1)))
-    shares = max(1, min(shares, frames))
+    most = _sets.tasks(recipe, frames, max(1, int(ray.cluster_resources().get("CPU", 1))), options)
+    shares = most if shares is None else max(1, min(shares, frames))
     task = ray.remote(max_retries=_RETRIES, retry_exceptions=[OSError], num_cpus=options.get("threads", 1))(_share)
     pending = [task.remote(recipe, out, frames, seed, (share, shares), options) for share in range(shares)]
     done = 0
