@@ -154,6 +154,7 @@ Examples:
   papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
   papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
   papsynth generate my.toml --out many --frames 100000 --shard 3/20   the fourth of twenty machines
+  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys from AWS_ACCESS_KEY_ID and the like
   papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB
   papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
   papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
@@ -161,7 +162,7 @@ Examples:
 pub(crate) struct Generate {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Folder of the data set: new, empty, or one that this command began
+    /// Folder of the data set: new, empty, or one that this command began; or s3://, gs://, az://, bucket and prefix, in builds with --features cloud
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Number of frames: those with index 0 to N − 1

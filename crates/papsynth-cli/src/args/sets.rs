@@ -79,7 +79,7 @@ Examples:
 
 Exit codes: 0 whole; 2 something is wrong; 74 input/output.")]
 pub(crate) struct Verify {
-    /// Folder of the data set
+    /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
     /// Frames that must be there: those with index 0 to N − 1 [default: up to the last that is]
@@ -97,7 +97,7 @@ Examples:
   papsynth clean fields
   papsynth clean fields --strays     also everything else that is no file of the data set")]
 pub(crate) struct Clean {
-    /// Folder of the data set
+    /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
     /// Remove every file that the data set does not name, whoever put it there
@@ -136,7 +136,7 @@ Examples:
   papsynth status fields --frames 100000 --missing              numbers of the shards that are missing
   sbatch --array=$(papsynth status fields --frames 100000 --missing --tasks 50) job.sh")]
 pub(crate) struct Status {
-    /// Folder of the data set, or of a slide
+    /// Folder or object store of the data set, or folder of a slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
     /// Frames that there will be: those with index 0 to N − 1; a slide knows its size by itself
@@ -154,7 +154,7 @@ pub(crate) struct Status {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  papsynth merge fields --frames 100000")]
 pub(crate) struct Merge {
-    /// Folder of the data set
+    /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
     /// Frames that must be there: those with index 0 to N − 1
