@@ -18,7 +18,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "[--full | --changed]",
     about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study and the viewer in a browser, wasm32, packages. With --full the crates that take long to build, every reader there is, and what other processors give; if all passes, .ci/full records what of \
+              readers, the study and the viewer in a browser, wasm32. With --full the crates that take long to build, every reader there is, packages, Python, clusters, and what other processors give; if all passes, .ci/full records what of \
               the workspace that covers. With --changed that too, but only where it differs from what .ci/full records. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
@@ -26,8 +26,8 @@ pub(crate) const CHORE: Chore = Chore {
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
-/// What takes heavy crates, the heavier readers, and other processors; at most 80 minutes with everything before.
-const FULL: [Step; 7] = [
+/// What takes heavy crates, the heavier readers, other processors, and what is done to publish; at most 80 minutes with everything before.
+const FULL: [Step; 8] = [
     ("heavy lints", |workspace| {
         run_cargo(workspace.cargo_heavy("clippy").args(["--all-targets", "--", "-D", "warnings"]))
     }),
@@ -36,13 +36,14 @@ const FULL: [Step; 7] = [
     }),
     ("heavy tests", |workspace| run_cargo(&mut workspace.cargo_heavy("test"))),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+    ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("python package", |workspace| chore(workspace, &package::CHORE)),
     ("cluster", |workspace| chore(workspace, &package::CLUSTER)),
     ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
 
 /// Cheap ones first. The golden images are part of the tests.
-const STEPS: [Step; 14] = [
+const STEPS: [Step; 13] = [
     ("format", |workspace| cargo(workspace, &["fmt", "--all", "--check"])),
     ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
     ("equations", |workspace| chore(workspace, &equations::CHORE)),
@@ -59,7 +60,6 @@ const STEPS: [Step; 14] = [
     ("external readers", |workspace| chore(workspace, &external::CHORE)),
     ("browser", |workspace| chore(workspace, &browser::CHORE)),
     ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
-    ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("licences", licences),
 ];
 

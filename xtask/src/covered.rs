@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use crate::workspace::Workspace;
 
 /// Files and folders on which its outcome depends more than that of the shorter tier.
-const COVERED: [&str; 14] = [
+const COVERED: [&str; 15] = [
     "Cargo.lock",
     "crates/papsynth-cli/tests",
     "crates/papsynth-dataset",
@@ -24,6 +24,7 @@ const COVERED: [&str; 14] = [
     "hashes",
     "xtask/src/external.rs",
     "xtask/src/hashes.rs",
+    "xtask/src/package.rs",
 ];
 
 /// Where the state that last passed is recorded.
