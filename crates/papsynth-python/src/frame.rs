@@ -1,14 +1,17 @@
 //! Images and their truth as arrays.
 
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use numpy::{Element, IntoPyArray, PyArrayMethods};
+use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods};
 use papsynth::Plane;
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
-use papsynth_dataset::{Column, columns, rle};
+use papsynth_dataset::{Column, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
+
+use crate::error;
 
 /// An image or focus stack, with everything that is known of it. Arrays are made when they are first asked for, and then kept.
 ///
@@ -224,6 +227,29 @@ impl Frame {
             }
             dict.into_py_any(py)
         })
+    }
+
+    /// Writes `image` as PNG, with the size of its pixels; a former file is replaced.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     If the system refuses; then there is no such file, or still the former one.
+    #[expect(clippy::needless_pass_by_value, reason = "Python hands it over")]
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let image = self.image.bind(py);
+        let levels: Vec<u16> = match image.cast::<PyArrayDyn<u8>>() {
+            Ok(image) => image.readonly().as_array().iter().copied().map(u16::from).collect(),
+            Err(_) => image.cast::<PyArrayDyn<u16>>()?.readonly().as_array().iter().copied().collect(),
+        };
+        let Truth { width, height, .. } = &self.truth;
+        let channels = levels.len() / (width * height).max(1);
+        let written = py.detach(|| write_png(&path, &levels, *width, channels, self.bits, self.pixel_um));
+        written.map_err(|error| error::dataset(&error))
     }
 
     fn __len__(&self) -> usize {

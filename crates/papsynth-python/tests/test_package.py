@@ -349,3 +349,16 @@ def test_targets_are_those_of_detectors(frame):
     assert set(some["labels"]) <= {1, 2} and len(some["labels"]) > 0
     with pytest.raises(ValueError, match="part"):
         papsynth.detection_target(frame, "cell")
+
+
+def test_a_frame_is_saved_as_a_picture(tmp_path):
+    from PIL import Image
+
+    for recipe in (SMALL, {**SMALL, "light": {"kind": "colour"}}, {**SMALL, "camera": {"bits": 12}}):
+        frame = papsynth.render(recipe, 3, 1)
+        frame.save(tmp_path / "field.png")
+        picture = np.asarray(Image.open(tmp_path / "field.png"))
+        # Of 12 bits the lowest stand as they are.
+        assert picture.shape == frame.image.shape and (picture == frame.image).all(), recipe
+    with pytest.raises(OSError, match="nowhere"):
+        frame.save(tmp_path / "field.png" / "nowhere.png")
