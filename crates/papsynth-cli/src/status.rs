@@ -55,6 +55,12 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
     let summary = dataset.finish()?;
+    if summary.frames != args.frames {
+        let message = format!("{dir}: --frames {}, but {} are there", args.frames, summary.frames);
+        return Err(Failure::input(
+            Complaint::new(message).help("give the number that was meant, or take away what is too much"),
+        ));
+    }
     let (frames, root) = (summary.frames, summary.root);
     exit::print(&format!("{dir}: {frames} frames\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
 }

@@ -81,6 +81,10 @@ impl Dataset {
     ) -> Result<Self, Error> {
         let folder = Folder::new(home);
         let path = &folder.shown();
+        if path.as_os_str().is_empty() {
+            let message = "the folder of the data set has no name; `.` is this one".to_owned();
+            return Err(Error::Folder { path: path.to_owned(), message });
+        }
         if layout.formats.is_empty() || layout.frames_per_shard == 0 {
             let message = "a data set wants at least one format, and one frame a shard".to_owned();
             return Err(Error::Folder { path: path.to_owned(), message });

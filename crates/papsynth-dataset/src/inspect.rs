@@ -119,11 +119,14 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
 pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<u64>, Error> {
     let each = dataset.layout.frames_per_shard;
     let dataset = &Dataset { folder: dataset.folder.listed()?, ..dataset.clone() };
+    // Most that are missing are known by that alone.
+    let recorded = recorded_shards(&dataset.folder)?;
     let mut missing = Vec::new();
     for shard in frames.start / each..frames.end.div_ceil(each) {
         let room = dataset.frames_of_shard(shard);
         let wanted = room.start.max(frames.start)..room.end.min(frames.end);
-        if !dataset.whole(shard, Check::Sizes)?.is_some_and(|record| record.covers(&wanted)) {
+        let is_whole = || dataset.whole(shard, Check::Sizes).map(|found| found.is_some_and(|r| r.covers(&wanted)));
+        if recorded.binary_search(&shard).is_err() || !is_whole()? {
             missing.push(shard);
         }
     }

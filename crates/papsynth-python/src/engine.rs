@@ -1,6 +1,7 @@
 //! Engines and what they make.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Plane, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
@@ -102,18 +103,30 @@ impl Engine {
     #[pyo3(signature = (seed=0, index=0, *, threads=1))]
     fn render(&self, py: Python<'_>, seed: u64, index: u64, threads: usize) -> PyResult<Frame> {
         let (key, engine) = (Key { seed, index }, Arc::clone(&self.engine));
-        let made = py.detach(|| match threads {
-            1 => render(&engine, key, Threads::One),
-            _ => {
-                let pool = pool::of(threads).map_err(|message| Stop::Python(PyValueError::new_err(message)))?;
-                pool.install(|| render(&engine, key, Threads::All))
-            }
+        let pool = (threads != 1).then(|| pool::of(py, threads)).transpose()?;
+        let made = py.detach(|| match pool {
+            None => render(&engine, key, Threads::One),
+            Some(pool) => pool.install(|| render(&engine, key, Threads::All)),
         });
         let frame = made.map_err(|stop| match stop {
             Stop::Engine(error) => error::engine(py, &self.source, &error),
             Stop::Python(error) => error,
         })?;
         Frame::new(py, frame)
+    }
+
+    /// SHA-256 of recipe, model and versions: two engines with the same make the same images.
+    #[getter]
+    fn identity(&self, py: Python<'_>) -> PyResult<String> {
+        let text = format!("{}\n{}\n{}", identity(), self.engine.recipe().to_toml(), self.model.to_json());
+        let hash = py.import("hashlib")?.call_method1("sha256", (text.as_bytes(),))?;
+        hash.call_method0("hexdigest")?.extract()
+    }
+
+    /// Whether the recipe names a file, such as a map of places.
+    #[getter]
+    fn names_files(&self) -> bool {
+        self.map.is_some()
     }
 
     /// The recipe with everything that was left out, as TOML.
@@ -176,11 +189,21 @@ impl Source {
         }
         let path: PathBuf = recipe.extract().map_err(|_| {
             let presets: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
-            PyValueError::new_err(format!(
-                "recipe: expected None, a dictionary, the path of a TOML file or one of {}",
+            PyTypeError::new_err(format!(
+                "recipe: {} is none; expected None, a dictionary, the path of a TOML file or one of {}",
+                recipe.get_type(),
                 presets.join(", ")
             ))
         })?;
+        if !path.exists() {
+            let presets: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
+            let message = format!(
+                "recipe: there is no file {}, nor a preset of that name: {}",
+                path.display(),
+                presets.join(", ")
+            );
+            return Err(PyFileNotFoundError::new_err(message));
+        }
         let text = read(&path, LARGEST_RECIPE)?;
         let name = path.display().to_string();
         let recipe = papsynth_recipe::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
@@ -205,12 +228,14 @@ pub(crate) fn read_model(py: Python<'_>, model: Option<&Bound<'_, PyAny>>) -> Py
 fn read(path: &Path, largest: u64) -> PyResult<String> {
     let named =
         |error: std::io::Error| PyErr::from(std::io::Error::new(error.kind(), format!("{}: {error}", path.display())));
-    let size = fs::metadata(path).map_err(named)?.len();
-    if size > largest {
-        let message = format!("{}: {size} bytes; expected at most {largest}", path.display());
+    // Not everything that can be read says how long it is.
+    let mut text = String::new();
+    let read = fs::File::open(path).and_then(|file| file.take(largest + 1).read_to_string(&mut text));
+    if read.map_err(named)? as u64 > largest {
+        let message = format!("{}: more than {largest} bytes; expected at most that", path.display());
         return Err(PyOSError::new_err(message));
     }
-    fs::read_to_string(path).map_err(named)
+    Ok(text)
 }
 
 /// The JSON schema of recipes, as text.

@@ -13,7 +13,7 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 
 use crate::error;
 
-/// An image or focus stack, with everything that is known of it. Arrays are made when they are first asked for, and then kept.
+/// An image or focus stack, with everything that is known of it. Arrays are the frame's own, whoever asks for them: copy them before you change them.
 ///
 /// Attributes
 /// ----------

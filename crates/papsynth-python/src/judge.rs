@@ -1,15 +1,12 @@
 //! How much synthetic fields are like real ones.
 
-use numpy::{AllowTypeChange, PyArrayLike2};
 use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use crate::array::{Given, nth, pixels, points};
 use crate::pool;
-
-type Image<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
-type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
 fn wrong(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
@@ -33,12 +30,12 @@ fn wrong(error: impl std::fmt::Display) -> PyErr {
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn judge(
     py: Python<'_>,
-    real: Vec<Image<'_>>,
-    synthetic: Vec<Image<'_>>,
+    real: Vec<Given<'_>>,
+    synthetic: Vec<Given<'_>>,
     pixel_um: f64,
     full_scale: f32,
-    real_nuclei: Option<Vec<Points<'_>>>,
-    synthetic_nuclei: Option<Vec<Points<'_>>>,
+    real_nuclei: Option<Vec<Given<'_>>>,
+    synthetic_nuclei: Option<Vec<Given<'_>>>,
     seed: u64,
     quick: bool,
     threads: usize,
@@ -55,7 +52,7 @@ pub(crate) fn judge(
     let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
-    let pool = pool::of(threads).map_err(wrong)?;
+    let pool = pool::of(py, threads)?;
     let report = py.detach(|| {
         pool.install(|| {
             let measured = sides.map(|pictures| {
@@ -72,39 +69,20 @@ pub(crate) fn judge(
     serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
 }
 
-fn pictures(
-    side: &str,
-    images: &[Image<'_>],
-    nuclei: Option<&[Points<'_>]>,
-    full_scale: f32,
-) -> PyResult<Vec<Picture>> {
+fn pictures(side: &str, images: &[Given<'_>], nuclei: Option<&[Given<'_>]>, full_scale: f32) -> PyResult<Vec<Picture>> {
     if images.len() < 2 {
         return Err(wrong(format!("{side}: {} fields; expected 2 or more", images.len())));
     }
     if nuclei.is_some_and(|nuclei| nuclei.len() != images.len()) {
         return Err(wrong(format!("{side}_nuclei: must be as many as {side}, {}", images.len())));
     }
-    let one = |(number, image): (usize, &Image<'_>)| {
-        let view = image.as_array();
+    let one = |(number, image): (usize, &Given<'_>)| {
+        let (grey, width) = pixels(&nth(side, number), image)?;
         let nuclei = match nuclei {
             None => Known::Nothing,
-            Some(nuclei) => {
-                let points = nuclei[number].as_array();
-                if points.ncols() != 2 {
-                    let shape = points.shape();
-                    return Err(wrong(format!("{side}_nuclei[{number}]: {shape:?}; expected rows of x and y, (n, 2)")));
-                }
-                Known::Points(points.rows().into_iter().map(|row| [row[0], row[1]]).collect())
-            }
+            Some(nuclei) => Known::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
         };
-        Ok(Picture {
-            name: format!("{side}[{number}]"),
-            group: String::new(),
-            grey: view.iter().copied().collect(),
-            width: view.ncols(),
-            full_scale,
-            nuclei,
-        })
+        Ok(Picture { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
     };
     images.iter().enumerate().map(one).collect()
 }

@@ -1,14 +1,11 @@
 //! Classes of cells, learned from images and outlines.
 
-use numpy::{AllowTypeChange, PyArrayLike2};
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::array::{Given, nth, pixels, pixels_within, points};
 use crate::engine::read_model;
-
-type Image<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
-type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
 
 /// A model with a class that is learned, as JSON.
 ///
@@ -36,9 +33,9 @@ pub(crate) fn learn(
     py: Python<'_>,
     name: &str,
     pixel_um: f64,
-    nuclei: Option<Vec<(Image<'_>, Image<'_>)>>,
-    nucleus_outlines: Option<Vec<Points<'_>>>,
-    cytoplasm_outlines: Option<Vec<Points<'_>>>,
+    nuclei: Option<Vec<(Given<'_>, Given<'_>)>>,
+    nucleus_outlines: Option<Vec<Given<'_>>>,
+    cytoplasm_outlines: Option<Vec<Given<'_>>>,
     like: Option<String>,
     bethesda: &str,
     source: &str,
@@ -54,6 +51,10 @@ pub(crate) fn learn(
         .collect::<PyResult<_>>()?;
     let nucleus_outlines = outlines("nucleus_outlines", nucleus_outlines)?;
     let cytoplasm_outlines = outlines("cytoplasm_outlines", cytoplasm_outlines)?;
+    if nuclei.is_empty() && nucleus_outlines.is_empty() && cytoplasm_outlines.is_empty() {
+        let message = "nuclei, nucleus_outlines, cytoplasm_outlines: none is given; expected some material";
+        return Err(PyValueError::new_err(message));
+    }
     let material =
         Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cytoplasm_outlines };
     let params = LearnParams {
@@ -68,29 +69,27 @@ pub(crate) fn learn(
     Ok(learned.map_err(|error| PyValueError::new_err(error.to_string()))?.to_json())
 }
 
-fn nucleus(number: usize, image: &Image<'_>, mask: &Image<'_>) -> PyResult<NucleusImage> {
-    let (image, mask) = (image.as_array(), mask.as_array());
-    if image.shape() != mask.shape() || image.is_empty() {
-        let message = format!("nuclei[{number}]: image of {:?}, mask of {:?}", image.shape(), mask.shape());
-        return Err(PyValueError::new_err(message));
+fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<NucleusImage> {
+    let name = nth("nuclei", number);
+    let (light, width) = pixels(&format!("{name}[0]"), image)?;
+    let (mask, mask_width) = pixels_within(&format!("{name}[1]"), mask, [0.0, 1.0])?;
+    if (light.len(), width) != (mask.len(), mask_width) {
+        let [image, mask] = [(&light, width), (&mask, mask_width)].map(|(values, width)| (values.len() / width, width));
+        return Err(PyValueError::new_err(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
     }
-    Ok(NucleusImage {
-        name: format!("nuclei[{number}]"),
-        light: image.iter().copied().collect(),
-        mask: mask.iter().map(|&inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect(),
-        width: image.ncols(),
-    })
+    let mask = mask.into_iter().map(|inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect();
+    Ok(NucleusImage { name, light, mask, width })
 }
 
-fn outlines(name: &str, outlines: Option<Vec<Points<'_>>>) -> PyResult<Vec<Vec<[f64; 2]>>> {
+fn outlines(name: &str, outlines: Option<Vec<Given<'_>>>) -> PyResult<Vec<Vec<[f64; 2]>>> {
     let outlines = outlines.unwrap_or_default();
-    let one = |(number, outline): (usize, &Points<'_>)| {
-        let view = outline.as_array();
-        if view.ncols() != 2 {
-            let message = format!("{name}[{number}]: {:?}; expected rows of x and y, (points, 2)", view.shape());
-            return Err(PyValueError::new_err(message));
+    let one = |(number, outline): (usize, &Given<'_>)| {
+        let name = nth(name, number);
+        let outline = points(&name, outline)?;
+        match outline.len() {
+            0..3 => Err(PyValueError::new_err(format!("{name}: {} points; expected 3 or more", outline.len()))),
+            _ => Ok(outline),
         }
-        Ok(view.rows().into_iter().map(|row| [row[0], row[1]]).collect())
     };
     outlines.iter().enumerate().map(one).collect()
 }

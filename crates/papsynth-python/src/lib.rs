@@ -1,6 +1,7 @@
 //! The engine on NumPy arrays: what `papsynth._native` holds, over which `python/papsynth` lies.
 #![forbid(unsafe_code)]
 
+mod array;
 mod convert;
 mod engine;
 mod error;
@@ -13,6 +14,15 @@ mod techniques;
 
 #[pyo3::pymodule]
 mod _native {
+    use pyo3::prelude::*;
+
+    /// Finds NumPy's C interface now, and not where a signal may come in between.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        numpy::PyArray1::<u8>::zeros(module.py(), 0, false);
+        Ok(())
+    }
+
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]

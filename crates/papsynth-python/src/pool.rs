@@ -3,8 +3,12 @@
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pyo3::pyfunction;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Most threads of a pool.
+const MOST: usize = 1024;
 
 /// The pool of the process of that number, with so many threads.
 struct Own {
@@ -13,22 +17,26 @@ struct Own {
     pool: Arc<ThreadPool>,
 }
 
+/// Held only by who is attached to the interpreter, as is whoever forks: in the child of a fork nobody holds it.
 static POOL: Mutex<Option<Own>> = Mutex::new(None);
 
 /// The pool of this process with as many threads as are asked for, 0 for as many as there are processors.
-pub(crate) fn of(threads: usize) -> Result<Arc<ThreadPool>, String> {
-    let mut own = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(Own { process, threads: found, pool }) = own.as_ref()
+pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+    if threads > MOST {
+        return Err(PyValueError::new_err(format!("threads: {threads}; expected 0 to {MOST}")));
+    }
+    if let Some(Own { process, threads: found, pool }) = POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
         && *process == process::id()
         && *found == threads
     {
         return Ok(Arc::clone(pool));
     }
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())?;
-    let pool = Arc::new(pool);
+    let built = py.detach(|| ThreadPoolBuilder::new().num_threads(threads).build());
+    let pool = Arc::new(built.map_err(|error| PyValueError::new_err(format!("threads: {threads}: {error}")))?);
+    let own = Own { process: process::id(), threads, pool: Arc::clone(&pool) };
+    let before = POOL.lock().unwrap_or_else(PoisonError::into_inner).replace(own);
     // What a parent has left is not dropped: its threads are not there to be waited for.
-    if let Some(Own { process, pool, .. }) =
-        own.replace(Own { process: process::id(), threads, pool: Arc::clone(&pool) })
+    if let Some(Own { process, pool, .. }) = before
         && process != process::id()
     {
         std::mem::forget(pool);

@@ -17,6 +17,9 @@ use crate::error;
 /// How often it is looked whether Python wants to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// Most frames whose shards are listed.
+const MOST_FRAMES: u64 = 1_000_000_000;
+
 /// Makes the frames of a data set that are not whole there, or one share of them.
 ///
 /// Parameters
@@ -72,8 +75,10 @@ pub(crate) fn generate<'py>(
     if of == 0 || index >= of {
         return Err(PyValueError::new_err(format!("share: ({index}, {of}) is none; expected (i, n) with i below n")));
     }
-    if frames == 0 || threads == 0 {
-        return Err(PyValueError::new_err("frames, threads: 0; expected 1 or more"));
+    for (name, number) in [("frames", frames), ("threads", threads as u64)] {
+        if number == 0 {
+            return Err(PyValueError::new_err(format!("{name}: 0; expected 1 or more")));
+        }
     }
     let layout = layout(formats, frames_per_shard)?;
     let info = DatasetInfo {
@@ -190,8 +195,12 @@ pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Strin
         let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
         return Err(PyValueError::new_err(message));
     }
-    py.detach(|| -> Result<String, papsynth_dataset::Error> { Ok(Dataset::open(&home(&out)?)?.finish()?.root) })
-        .map_err(|error| error::dataset(&error))
+    let summary = py.detach(|| Dataset::open(&home(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
+    if summary.frames != frames {
+        let message = format!("frames: {frames}; expected {}, which are there", summary.frames);
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(summary.root)
 }
 
 /// The data set at a path or an address.
@@ -205,6 +214,9 @@ fn home(path: &Path) -> Result<Home, papsynth_dataset::Error> {
 /// Numbers of the shards that are not whole, from commit records: also while others work.
 #[pyfunction]
 pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec<u64>> {
+    if frames == 0 || frames > MOST_FRAMES {
+        return Err(PyValueError::new_err(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
+    }
     let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames));
     found.map_err(|error| error::dataset(&error))
 }

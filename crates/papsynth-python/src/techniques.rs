@@ -2,21 +2,25 @@
 
 use std::fmt::Display;
 
-use numpy::ndarray::ArrayView2;
-use numpy::{AllowTypeChange, IntoPyArray, PyArrayLike2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-/// Anything that NumPy can make an array of two dimensions of.
-type Image<'py> = PyArrayLike2<'py, f32, AllowTypeChange>;
-
-/// Points as rows of x and y.
-type Points<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+use crate::array::{Given, nth, pixels, pixels_within, points};
 
 /// Most pixels of an image that is made here.
 const MOST_PIXELS: usize = 1 << 30;
+
+/// Most points of an outline.
+const MOST_POINTS: usize = 1 << 20;
+
+/// Most points of an outline that a cell is made of.
+const MOST_OUTLINE: usize = 1 << 16;
+
+/// Absorbance and light have no other end.
+const NOT_NEGATIVE: [f32; 2] = [0.0, f32::MAX];
 
 fn wrong(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
@@ -26,29 +30,20 @@ fn random(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// The pixels of an image row by row, and its width.
-fn pixels(name: &str, image: &Image<'_>) -> PyResult<(Vec<f32>, usize)> {
-    let view: ArrayView2<'_, f32> = image.as_array();
-    let width = view.ncols();
-    if view.is_empty() {
-        return Err(PyValueError::new_err(format!("{name}: {:?} has no pixel", view.shape())));
-    }
-    Ok((view.iter().copied().collect(), width))
-}
-
-fn points(name: &str, points: &Points<'_>) -> PyResult<Vec<[f64; 2]>> {
-    let view = points.as_array();
-    if view.ncols() != 2 {
-        return Err(PyValueError::new_err(format!("{name}: {:?}; expected rows of x and y, (n, 2)", view.shape())));
-    }
-    Ok(view.rows().into_iter().map(|row| [row[0], row[1]]).collect())
-}
-
 /// Zeros of a shape, as rows and columns.
 fn blank((rows, columns): (usize, usize)) -> PyResult<Vec<f32>> {
     match rows.checked_mul(columns) {
         Some(pixels @ 1..=MOST_PIXELS) => Ok(vec![0.0; pixels]),
         _ => Err(PyValueError::new_err(format!("shape: ({rows}, {columns}); expected 1 to {MOST_PIXELS} pixels"))),
+    }
+}
+
+/// An outline of as many points as can be worked with.
+fn outline_of(given: &Given<'_>) -> PyResult<Vec<[f64; 2]>> {
+    let outline = points("outline", given)?;
+    match outline.len() {
+        3..=MOST_OUTLINE => Ok(outline),
+        found => Err(PyValueError::new_err(format!("outline: {found} points; expected 3 to {MOST_OUTLINE}"))),
     }
 }
 
@@ -84,8 +79,8 @@ pub(crate) mod fsd {
 ///     (points, 2), float64: x and y in pixels, 0 at the middle of the first pixel.
 #[pyfunction]
 #[pyo3(signature = (mask, level=0.5))]
-fn trace<'py>(py: Python<'py>, mask: Image<'py>, level: f32) -> PyResult<Bound<'py, PyAny>> {
-    let (mask, width) = pixels("mask", &mask)?;
+fn trace<'py>(py: Python<'py>, mask: Given<'py>, level: f32) -> PyResult<Bound<'py, PyAny>> {
+    let (mask, width) = pixels_within("mask", &mask, [0.0, 1.0])?;
     outline(py, fsd_shape::trace(&mask, width, level).map_err(wrong)?)
 }
 
@@ -94,7 +89,7 @@ fn trace<'py>(py: Python<'py>, mask: Image<'py>, level: f32) -> PyResult<Bound<'
 /// Parameters
 /// ----------
 /// outlines : list of array_like
-///     Each (points, 2).
+///     Three or more, each (points, 2).
 /// harmonics : int
 ///     Highest number of a descriptor that is kept.
 #[pyclass(frozen, module = "papsynth.fsd")]
@@ -104,9 +99,12 @@ struct ShapeModel(fsd_shape::ShapeModel);
 impl ShapeModel {
     #[new]
     #[pyo3(signature = (outlines, harmonics=40))]
-    fn new(py: Python<'_>, outlines: Vec<Points<'_>>, harmonics: usize) -> PyResult<Self> {
-        let outlines: Vec<Vec<[f64; 2]>> =
-            outlines.iter().map(|outline| points("outlines", outline)).collect::<PyResult<_>>()?;
+    fn new(py: Python<'_>, outlines: Vec<Given<'_>>, harmonics: usize) -> PyResult<Self> {
+        let outlines: Vec<Vec<[f64; 2]>> = outlines
+            .iter()
+            .enumerate()
+            .map(|(i, outline)| points(&nth("outlines", i), outline))
+            .collect::<PyResult<_>>()?;
         let params = fsd_shape::ShapeModelParams { harmonics, ..Default::default() };
         py.detach(|| fsd_shape::ShapeModel::fit(&outlines, &params)).map(Self).map_err(wrong)
     }
@@ -119,6 +117,7 @@ impl ShapeModel {
     ///     Size of its first descriptor; by default as those that were learned.
     /// seed : int
     /// points : int
+    ///     3 to 1048576.
     ///
     /// Returns
     /// -------
@@ -132,8 +131,8 @@ impl ShapeModel {
         seed: u64,
         points: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if points > MOST_PIXELS {
-            return Err(PyValueError::new_err(format!("points: {points}; expected at most {MOST_PIXELS}")));
+        if !(3..=MOST_POINTS).contains(&points) {
+            return Err(PyValueError::new_err(format!("points: {points}; expected 3 to {MOST_POINTS}")));
         }
         let mut random = random(seed);
         let radius_px = radius_px.unwrap_or_else(|| self.0.draw_radius(&mut random));
@@ -170,13 +169,13 @@ pub(crate) mod cloth {
 #[pyo3(signature = (outline, shape, seed=0, *, vertices=1200, excess=1.15))]
 fn crumple<'py>(
     py: Python<'py>,
-    outline: Points<'py>,
+    outline: Given<'py>,
     shape: (usize, usize),
     seed: u64,
     vertices: usize,
     excess: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let outline = points("outline", &outline)?;
+    let outline = outline_of(&outline)?;
     let mut out = blank(shape)?;
     let params = cloth_verlet::ClothParams { vertices, excess, ..Default::default() };
     py.detach(|| {
@@ -218,13 +217,13 @@ pub(crate) mod cytoskeleton {
 #[pyo3(signature = (outline, shape, seed=0, *, rivers=15, width_px=1.7))]
 fn grow<'py>(
     py: Python<'py>,
-    outline: Points<'py>,
+    outline: Given<'py>,
     shape: (usize, usize),
     seed: u64,
     rivers: usize,
     width_px: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let outline = points("outline", &outline)?;
+    let outline = outline_of(&outline)?;
     let mut out = blank(shape)?;
     py.detach(|| {
         let params = voronoi_cytoskeleton::SkeletonParams { rivers, ..Default::default() };
@@ -346,18 +345,21 @@ pub(crate) mod texture {
 #[pyo3(signature = (source, mask, target, seed=0, *, patch_px=9, overlap_px=3))]
 fn quilt<'py>(
     py: Python<'py>,
-    source: Image<'py>,
-    mask: Image<'py>,
-    target: Image<'py>,
+    source: Given<'py>,
+    mask: Given<'py>,
+    target: Given<'py>,
     seed: u64,
     patch_px: usize,
     overlap_px: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (texture, width) = pixels("source", &source)?;
-    let (mask, mask_width) = pixels("mask", &mask)?;
-    let (target, target_width) = pixels("target", &target)?;
+    let (mask, mask_width) = pixels_within("mask", &mask, [0.0, 1.0])?;
+    let (target, target_width) = pixels_within("target", &target, [0.0, 1.0])?;
     if (mask.len(), mask_width) != (texture.len(), width) {
-        return Err(PyValueError::new_err("mask: has another shape than source"));
+        let [found, wanted] = [(&mask, mask_width), (&texture, width)].map(|(v, w)| (v.len() / w, w));
+        return Err(PyValueError::new_err(format!(
+            "mask: has the shape {found:?}; expected that of source, {wanted:?}"
+        )));
     }
     let made = py.detach(|| {
         let source = quilt_texture::Source::new(&texture, &mask, width)?;
@@ -390,7 +392,7 @@ pub(crate) mod optics {
 /// ndarray
 ///     As `image`, float32.
 #[pyfunction]
-fn gaussian<'py>(py: Python<'py>, image: Image<'py>, sigma_px: f64) -> PyResult<Bound<'py, PyAny>> {
+fn gaussian<'py>(py: Python<'py>, image: Given<'py>, sigma_px: f64) -> PyResult<Bound<'py, PyAny>> {
     let (values, width) = pixels("image", &image)?;
     let gaussian = optics_psf::Gaussian::new(sigma_px).map_err(wrong)?;
     let blurred = py.detach(|| gaussian.blur(&values, width, optics_psf::Border::Reflect));
@@ -416,12 +418,15 @@ fn gaussian<'py>(py: Python<'py>, image: Image<'py>, sigma_px: f64) -> PyResult<
 #[pyo3(signature = (absorbance, defocus_um=0.0, *, na=0.95, condenser_na=0.41))]
 fn bright_field<'py>(
     py: Python<'py>,
-    absorbance: Image<'py>,
+    absorbance: Given<'py>,
     defocus_um: f64,
     na: f64,
     condenser_na: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (values, width) = pixels("absorbance", &absorbance)?;
+    let (values, width) = pixels_within("absorbance", &absorbance, NOT_NEGATIVE)?;
+    if !defocus_um.is_finite() {
+        return Err(PyValueError::new_err(format!("defocus_um: {defocus_um}; expected a finite number")));
+    }
     let height = values.len() / width;
     let made = py.detach(|| {
         let params = optics_psf::MicroscopeParams { na, condenser_na, ..Default::default() };
@@ -494,8 +499,8 @@ pub(crate) mod camera {
 ///     As `electrons`, uint16 grey levels.
 #[pyfunction]
 #[pyo3(signature = (electrons, seed=0, *, camera="orca-05g"))]
-fn expose<'py>(py: Python<'py>, electrons: Image<'py>, seed: u64, camera: &str) -> PyResult<Bound<'py, PyAny>> {
-    let (electrons, width) = pixels("electrons", &electrons)?;
+fn expose<'py>(py: Python<'py>, electrons: Given<'py>, seed: u64, camera: &str) -> PyResult<Bound<'py, PyAny>> {
+    let (electrons, width) = pixels_within("electrons", &electrons, NOT_NEGATIVE)?;
     let params = match camera {
         "paper" => ccd_noise::CameraParams::paper(),
         "orca-05g" => ccd_noise::CameraParams::orca_05g(),
@@ -533,10 +538,10 @@ pub(crate) mod dyes {
 #[pyo3(signature = (*, haematein=None, eosin_y=None, light_green=None, orange_g=None))]
 fn transmittance<'py>(
     py: Python<'py>,
-    haematein: Option<Image<'py>>,
-    eosin_y: Option<Image<'py>>,
-    light_green: Option<Image<'py>>,
-    orange_g: Option<Image<'py>>,
+    haematein: Option<Given<'py>>,
+    eosin_y: Option<Given<'py>>,
+    light_green: Option<Given<'py>>,
+    orange_g: Option<Given<'py>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     use dye_spectra::{Colour, ColourParams, DYES, Dye};
     let given = [
@@ -549,7 +554,7 @@ fn transmittance<'py>(
     let mut shape: Option<[usize; 2]> = None;
     for (dye, name, plane) in given {
         let Some(plane) = plane else { continue };
-        let (values, width) = pixels(name, &plane)?;
+        let (values, width) = pixels_within(name, &plane, NOT_NEGATIVE)?;
         let own = [values.len() / width, width];
         if shape.is_some_and(|shape| shape != own) {
             return Err(PyValueError::new_err(format!("{name}: {own:?} is another shape than that of the others")));

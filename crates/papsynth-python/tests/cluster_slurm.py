@@ -155,7 +155,7 @@ def main(program, folder, root):
             for state in states:
                 if "held" in state:
                     slurm.run("scontrol", "release", state.split()[0], check=False)
-            if "down" in slurm.run("sinfo", "-h", "-o", "%t").stdout:
+            if any(word in slurm.run("sinfo", "-h", "-o", "%t").stdout for word in ("down", "drain")):
                 slurm.run("scontrol", "update", f"NodeName={slurm.host}", "State=RESUME", check=False)
             time.sleep(0.3)
         check(requeued >= 6 and killed == 1, f"Slurm: job {job}, {requeued} tasks requeued, the daemon killed {killed} times")

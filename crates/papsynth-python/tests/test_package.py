@@ -362,3 +362,99 @@ def test_a_frame_is_saved_as_a_picture(tmp_path):
         assert picture.shape == frame.image.shape and (picture == frame.image).all(), recipe
     with pytest.raises(OSError, match="nowhere"):
         frame.save(tmp_path / "field.png" / "nowhere.png")
+
+
+def test_a_data_set_is_its_own_wherever_it_is_unpickled(tmp_path, monkeypatch):
+    recipe = {"field": {"width_px": 320, "height_px": 240}}
+    samples = papsynth.Dataset(recipe, 1, 3)
+    recipe["field"]["width_px"] = 64
+    assert pickle.loads(pickle.dumps(samples))[1].image.shape == samples[1].image.shape == (240, 320)
+    path = tmp_path / "mine.toml"
+    path.write_text("[field]\nwidth_px = 320\nheight_px = 240\n")
+    monkeypatch.chdir(tmp_path)
+    pickled = pickle.dumps(papsynth.Dataset("mine.toml", 1, 3))
+    monkeypatch.chdir("/")
+    assert pickle.loads(pickled)[0].image.shape == (240, 320)
+    path.write_text("[field]\nwidth_px = 300\nheight_px = 240\n")
+    with pytest.raises(ValueError, match="others now"):
+        pickle.loads(pickled)
+    for words in ({"start": 2**64 - 1}, {"length": 2**63}, {"transform": 5}):
+        with pytest.raises((ValueError, TypeError), match=next(iter(words))):
+            papsynth.Dataset(SMALL, **{"seed": 1, "length": 3, **words})
+
+
+def test_a_file_that_a_recipe_names_is_read_again(tmp_path):
+    from PIL import Image
+
+    recipe = {**SMALL, "layout": {"kind": "map", "path": str(tmp_path / "map.png")}}
+    seen = []
+    for half in (slice(0, 32), slice(32, 64)):
+        grey = np.zeros((64, 64), np.uint8)
+        grey[:, half] = 255
+        Image.fromarray(grey).save(tmp_path / "map.png")
+        seen.append(papsynth.render(recipe, 1).image)
+    assert (seen[0] != seen[1]).any()
+
+
+def test_a_fork_while_threads_are_begun_does_not_hang():
+    script = f"""
+import os, sys, threading, time
+import papsynth
+papsynth.render({SMALL!r})
+for delay in (0.0005, 0.002, 0.005):
+    thread = threading.Thread(target=papsynth.render, args=({SMALL!r},), kwargs={{"threads": 300}})
+    thread.start()
+    time.sleep(delay)
+    child = os.fork()
+    if child == 0:
+        papsynth.render({SMALL!r}, 1, threads=2)
+        os._exit(0)
+    thread.join()
+    assert os.waitpid(child, 0)[1] == 0
+"""
+    subprocess.run([sys.executable, "-W", "ignore", "-c", script], check=True, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda a: papsynth.camera.expose(a * np.nan), "electrons[0, 0]: NaN"),
+        (lambda a: papsynth.camera.expose(-a), "electrons[0, 0]: -1"),
+        (lambda a: papsynth.camera.expose(a + 1j), "electrons: is of type complex128"),
+        (lambda a: papsynth.camera.expose(a.astype("U")), "electrons: is of type"),
+        (lambda a: papsynth.optics.bright_field(a, np.nan), "defocus_um"),
+        (lambda a: papsynth.optics.gaussian(a * 1e300, 2), "image[0, 0]: inf"),
+        (lambda a: papsynth.optics.gaussian(a[0], 2), "image: has the shape [12]"),
+        (lambda a: papsynth.dyes.transmittance(haematein=-a), "haematein[0, 0]: -1"),
+        (lambda a: papsynth.texture.quilt(a, a[1:], a), "mask: has the shape (11, 12)"),
+        (lambda a: papsynth.fsd.trace(a * 255), "mask[0, 0]: 255; expected 0 to 1"),
+        (lambda a: papsynth.fsd.ShapeModel([a, a, None]), "outlines[0]: has the shape [12, 12]"),
+        (lambda a: papsynth.cloth.crumple(np.ones((70000, 2)), (48, 64)), "70000 points"),
+        (lambda a: papsynth.render("nonexist"), "nor a preset"),
+        (lambda a: papsynth.render(5), "recipe: <class 'int'>"),
+        (lambda a: papsynth.render(SMALL, threads=2000), "threads: 2000"),
+        (lambda a: papsynth.learn("lsil", 0.25, cytoplasm_outlines=[]), "none is given"),
+        (lambda a: papsynth.learn("lsil", 0.25, cytoplasm_outlines=[a[:2, :2]]), "cytoplasm_outlines[0]: 2 points"),
+        (lambda a: papsynth.generate(SMALL, "", 3), "has no name"),
+        (lambda a: papsynth.generate(SMALL, "x", 0), "frames: 0"),
+        (lambda a: papsynth.missing("x", 2**64 - 1), "frames: 18446744073709551615"),
+    ],
+)
+def test_what_cannot_be_used_is_named(call, named, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises((ValueError, TypeError, OSError)) as caught:
+        call(np.ones((12, 12)))
+    assert named in str(caught.value) and not list(tmp_path.iterdir())
+
+
+def test_more_frames_than_were_asked_for_are_told(tmp_path):
+    papsynth.generate(SMALL, tmp_path / "set", 3)
+    with pytest.raises(ValueError, match="frames: 2; expected 3"):
+        papsynth.merge(tmp_path / "set", 2)
+    assert papsynth.merge(tmp_path / "set", 3) == papsynth.verify(tmp_path / "set")["root"]
+
+
+def test_classes_of_a_target_are_a_list_of_names():
+    for classes in ("intermediate", ["a", "a"]):
+        with pytest.raises(ValueError, match="classes"):
+            papsynth.detection_target(papsynth.render(SMALL), classes=classes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -9,6 +11,15 @@ from . import _native
 from ._render import engine
 
 __all__ = ["Dataset", "IterableDataset"]
+
+
+def _own(given: Any) -> Any:
+    """A recipe or model that nobody else changes, wherever it is read next."""
+    if hasattr(given, "to_dict"):
+        given = given.to_dict()
+    if isinstance(given, (str, os.PathLike)):
+        return os.path.abspath(given) if os.path.exists(given) else given
+    return copy.deepcopy(given)
 
 
 class Dataset:
@@ -20,7 +31,7 @@ class Dataset:
     Parameters
     ----------
     recipe : None, str, os.PathLike or dict
-        As of `papsynth.render`. A file is read once, here.
+        As of `papsynth.render`. A file is read here, and again where the data set is unpickled, which fails if it is another then.
     seed : int
         The data set.
     length : int
@@ -29,8 +40,8 @@ class Dataset:
         Index of the first.
     transform : callable, optional
         What each `Frame` becomes; by default it stays one.
-    model : None, str or os.PathLike
-        A model or a class file.
+    model : None, dict, str or os.PathLike
+        As of `papsynth.render`.
     """
 
     def __init__(
@@ -49,8 +60,12 @@ class Dataset:
             if not least <= value.__index__() < 2**64:
                 raise ValueError(f"{name}: {value} is out of range; expected {least} to 2**64 - 1")
         self.seed, self.length, self.start = seed.__index__(), length.__index__(), start.__index__()
+        if self.length >= 2**63 or self.start + self.length > 2**64:
+            raise ValueError(f"start, length: {start}, {length}; expected a length below 2**63, and indices below 2**64")
+        if transform is not None and not callable(transform):
+            raise TypeError(f"transform: {transform!r} cannot be called")
         self.transform = transform
-        self._recipe, self._model = recipe, model
+        self._recipe, self._model = _own(recipe), _own(model)
         self._engine = engine(recipe, model)
 
     def __len__(self) -> int:
@@ -70,7 +85,7 @@ class Dataset:
 
     def __getstate__(self) -> dict:
         state = {name: value for name, value in vars(self).items() if name != "_engine"}
-        return {**state, "_made_by": _native.identity()}
+        return {**state, "_made_by": _native.identity(), "_identity": self._engine.identity}
 
     def __setstate__(self, state: dict) -> None:
         made_by = state.pop("_made_by", None)
@@ -78,8 +93,11 @@ class Dataset:
             raise ValueError(
                 f"this data set was pickled by papsynth {made_by}, whose images are others than those of {_native.identity()}"
             )
+        identity = state.pop("_identity", None)
         vars(self).update(state)
         self._engine = engine(self._recipe, self._model)
+        if self._engine.identity != identity:
+            raise ValueError("the files of this data set's recipe or model are others now than when it was made")
 
     def __repr__(self) -> str:
         return f"<papsynth.Dataset of {self.length} images, seed {self.seed}>"
@@ -94,6 +112,8 @@ class IterableDataset:
     """
 
     def __init__(self, dataset: Dataset) -> None:
+        if not isinstance(dataset, Dataset):
+            raise TypeError(f"dataset: {dataset!r} is no papsynth.Dataset")
         self.dataset = dataset
 
     def __len__(self) -> int:

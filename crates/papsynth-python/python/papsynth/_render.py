@@ -45,7 +45,7 @@ def _key(recipe, model):
         if isinstance(recipe, str) and not os.path.exists(recipe):
             return ("preset", recipe), model
         return of_file(recipe), model
-    except (TypeError, ValueError, OSError):
+    except (TypeError, ValueError, OSError, RecursionError):
         return None
 
 
@@ -59,6 +59,9 @@ def engine(recipe=None, model=None) -> _native.Engine:
             _engines.move_to_end(key)
             return _engines[key]
     made = _native.Engine(recipe, model)
+    if made.names_files:
+        # They may be others next time.
+        return made
     with _lock:
         _engines[key] = made
         while len(_engines) > _MOST:

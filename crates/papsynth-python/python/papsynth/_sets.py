@@ -18,11 +18,17 @@ def place(out: str | os.PathLike[str]) -> str:
     return out if "://" in out else os.path.abspath(out)
 
 
+def _list(formats: str | Sequence[str] | None) -> list[str] | None:
+    return [formats] if isinstance(formats, str) else None if formats is None else list(formats)
+
+
 def tasks(recipe: Any, frames: int, workers: int, options: dict[str, Any]) -> int:
     """Into how many tasks a cluster divides a data set: one a shard, but tasks of 64 frames at least where there are more of them than
     four a worker. Whatever is wrong with the recipe is raised here, before a task is begun."""
+    if unknown := set(options) - {"formats", "frames_per_shard", "threads", "verify", "model"}:
+        raise TypeError(f"{', '.join(sorted(unknown))}: not known; expected formats, frames_per_shard, threads, verify or model")
     engine(recipe, options.get("model"))
-    shards = _native.shards(frames, options.get("formats"), options.get("frames_per_shard"))
+    shards = _native.shards(frames, _list(options.get("formats")), options.get("frames_per_shard"))
     return min(shards, max(4 * workers, frames // 64, 1))
 
 
@@ -33,7 +39,7 @@ def generate(
     seed: int = 0,
     *,
     share: tuple[int, int] = (0, 1),
-    formats: Sequence[str] | None = None,
+    formats: str | Sequence[str] | None = None,
     frames_per_shard: int | None = None,
     threads: int = 1,
     verify: bool = False,
@@ -56,7 +62,7 @@ def generate(
     seed : int
     share : tuple of int
         (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
-    formats : list of str
+    formats : str or list of str
         Such as ``"folder"`` (the default) or ``"webdataset"``.
     frames_per_shard : int, optional
         Frames that are written and made again together.
@@ -64,7 +70,8 @@ def generate(
         Frames that are made side by side.
     verify : bool
         Whether files that are there are read, rather than their sizes compared.
-    model : None, str or os.PathLike
+    model : None, dict, str or os.PathLike
+        As of `papsynth.render`.
     progress : callable, optional
         Called with the index of each frame that is done.
 
@@ -89,7 +96,7 @@ def generate(
         frames,
         seed,
         share=tuple(share),
-        formats=None if formats is None else list(formats),
+        formats=_list(formats),
         frames_per_shard=frames_per_shard,
         threads=threads,
         verify=verify,

@@ -36,6 +36,8 @@ def detection_target(frame: Any, part: str = "nucleus", classes: Sequence[str] |
     parts = ("nucleus", "cytoplasm", "whole")
     if part not in parts:
         raise ValueError(f"part: {part!r}; expected one of {', '.join(parts)}")
+    if isinstance(classes, str) or (classes is not None and len(set(classes)) < len(list(classes))):
+        raise ValueError(f"classes: {classes!r}; expected a list of different names")
     table = frame.table
     chosen = (table["part"] == part) & (table["area_px"] > 0)
     labels = np.ones(len(chosen), dtype=np.int64)
@@ -49,5 +51,5 @@ def detection_target(frame: Any, part: str = "nucleus", classes: Sequence[str] |
         "masks": frame.masks[chosen].astype(np.uint8),
         "area": table["area_px"][chosen].astype(np.float32),
         "iscrowd": np.zeros(int(chosen.sum()), dtype=np.int64),
-        "image_id": np.array([frame.index], dtype=np.int64),
+        "image_id": np.array([frame.index], dtype=np.uint64).astype(np.int64),
     }

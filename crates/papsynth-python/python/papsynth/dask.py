@@ -51,6 +51,8 @@ def generate(
         from dask.distributed import Client, get_client, wait
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError("papsynth.dask needs Dask: pip install 'papsynth[dask]'", name="dask") from error
+    # What is wrong is said before a cluster is begun.
+    _sets.tasks(recipe, frames, 1, options)
     own = None
     if client is None:
         try:

@@ -61,6 +61,8 @@ def generate(
         The root hash.
     """
     ray = _ray()
+    # What is wrong is said before a cluster is begun.
+    _sets.tasks(recipe, frames, 1, options)
     if not ray.is_initialized():
         ray.init()
     out = _sets.place(out)
@@ -101,9 +103,13 @@ def dataset(
     sample
     """
     ray = _ray()
+    samples = Dataset(recipe, seed, length, transform=transform or _arrays, **options)
+    return _stream(ray, samples, ahead)
+
+
+def _stream(ray: Any, samples: Dataset, ahead: int | None) -> Iterator[Any]:
     if not ray.is_initialized():
         ray.init()
-    samples = Dataset(recipe, seed, length, transform=transform or _arrays, **options)
     held = ray.put(samples)
     task = ray.remote(max_retries=_RETRIES, num_cpus=1)(_sample)
     if ahead is None:
