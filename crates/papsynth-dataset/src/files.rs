@@ -275,13 +275,17 @@ impl Folder {
 
     /// Last parts of the names of the files that lie in a folder itself; none if there is no such folder.
     pub(crate) fn names_in(&self, folder: &str) -> Result<Vec<String>, Error> {
-        if self.remote.is_some() {
-            let found = match (&self.listing, &self.remote) {
-                (None, Some(remote)) => remote.list(folder)?,
-                _ => self.listing.as_deref().cloned().unwrap_or_default(),
+        if let Some(remote) = &self.remote {
+            let asked;
+            let found = match &self.listing {
+                Some(listing) => &**listing,
+                None => {
+                    asked = remote.list(folder)?;
+                    &asked
+                }
             };
             let below = format!("{folder}/");
-            let names = found.keys().filter_map(|name| name.strip_prefix(&below));
+            let names = found.range(below.clone()..).map_while(|(name, _)| name.strip_prefix(&below));
             return Ok(names.filter(|name| !name.contains('/')).map(str::to_owned).collect());
         }
         let path = self.inside(folder)?;
