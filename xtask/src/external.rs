@@ -67,7 +67,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let pages = workspace.root.join("docs/formats");
     let mut written = Vec::new();
     let (features, formats) = match full {
-        true => (workspace::heavy_features(), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
+        true => (workspace::heavy_features_of("papsynth-cli"), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
         false => (String::new(), LIGHT_FORMATS.to_owned()),
     };
     let formats = ["--format", formats.as_str()];
@@ -182,7 +182,7 @@ fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     let _ = std::fs::remove_dir_all(out);
     let mut cargo = workspace.cargo();
     cargo.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features"]);
-    cargo.args([workspace::heavy_features().as_str(), "--"]);
+    cargo.args([workspace::heavy_features_of("papsynth-cli").as_str(), "--"]);
     cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
     for place in ["x_um=200", "y_um=150", "radius_um=400"] {
         cargo.args(["--set", &format!("scan.deposit.{place}")]);

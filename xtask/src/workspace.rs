@@ -27,8 +27,15 @@ pub(crate) const HEAVY: &[Heavy] = &[
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.
-pub(crate) fn heavy_features() -> String {
+fn heavy_features() -> String {
     HEAVY.iter().flat_map(|heavy| heavy.features).copied().collect::<Vec<_>>().join(",")
+}
+
+/// Those of one crate.
+pub(crate) fn heavy_features_of(package: &str) -> String {
+    let all = HEAVY.iter().flat_map(|heavy| heavy.features).copied();
+    let own = all.filter(|feature| feature.split_once('/').is_some_and(|(name, _)| name == package));
+    own.collect::<Vec<_>>().join(",")
 }
 
 /// The workspace.
