@@ -212,11 +212,11 @@ mod tests {
             package("papsynth", &["papsynth-dataset"]),
             package("papsynth-dataset", &["papsynth-cli"]),
             package("xtask", &["papsynth"]),
-            package("papsynth-python", &[]),
+            package("papsynth-stranger", &[]),
         ];
         let faults = faults(&packages);
         assert_eq!(faults.len(), 5, "{faults:?}");
         assert!(faults[0].contains("`ccd-noise` (Technique) must not depend on `optics-psf`"));
-        assert!(faults[4].contains("`papsynth-python` has no place"));
+        assert!(faults[4].contains("`papsynth-stranger` has no place"));
     }
 }
