@@ -149,7 +149,12 @@ fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<Result<Pa
     if out.exists() {
         fs::remove_dir_all(&out).with_context(|| format!("cannot empty {}", out.display()))?;
     }
-    let mut command = Command::new(python);
+    let mut command = Command::new(&python);
+    // It looks for zig where programs are looked for.
+    let own = python.parent().map(Path::to_owned).into_iter();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(own.chain(std::env::split_paths(&others)))?;
+    command.env("PATH", path);
     command.args(["-m", "maturin", "build", "--release", "--quiet"]).args(more).arg("--out").arg(&out);
     shell::run(command.env("CARGO_TARGET_DIR", &workspace.target).current_dir(workspace.root.join(PACKAGE)))?;
     let mut wheels = fs::read_dir(&out).with_context(|| format!("cannot read {}", out.display()))?;
