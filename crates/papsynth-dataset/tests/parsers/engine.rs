@@ -3,21 +3,15 @@
 use std::sync::LazyLock;
 
 use papsynth::model::Model;
-use papsynth::recipe::Recipe;
 use papsynth::{Engine, Inputs};
+
+#[path = "sound.rs"]
+mod sound;
 
 /// A sound recipe makes an engine or says why not. It takes milliseconds, a hundred times as long as to read it.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return;
-    };
-    let Ok(recipe) = toml::from_str::<Recipe>(text) else {
-        return;
-    };
-    if !recipe.problems().is_empty() {
-        return;
-    }
+    let Some(recipe) = sound::recipe(bytes) else { return };
     if let Err(error) = Engine::new(&recipe, &MODEL, &Inputs::default()) {
         assert!(!error.to_string().is_empty());
     }
