@@ -25,6 +25,8 @@ mod record;
 mod rle;
 #[path = "parsers/shard.rs"]
 mod shard;
+#[path = "parsers/sound.rs"]
+mod sound;
 #[path = "parsers/stack.rs"]
 mod stack;
 

@@ -5,8 +5,7 @@ use std::sync::LazyLock;
 use papsynth::model::Model;
 use papsynth::{Engine, Inputs};
 
-#[path = "sound.rs"]
-mod sound;
+use super::sound;
 
 /// A sound recipe makes an engine or says why not. It takes milliseconds, a hundred times as long as to read it.
 pub(crate) fn check(bytes: &[u8]) {

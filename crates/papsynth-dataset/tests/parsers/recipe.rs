@@ -2,8 +2,7 @@
 
 use papsynth::recipe::Recipe;
 
-#[path = "sound.rs"]
-mod sound;
+use super::sound;
 
 /// A recipe that is read and found sound reads back as written.
 pub(crate) fn check(bytes: &[u8]) {
