@@ -10,7 +10,7 @@ use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell};
+use crate::{Chore, dataset, shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "browser",
@@ -68,18 +68,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
 /// The name of a Chromium that answers, installed if need be and possible.
 fn chromium() -> Option<&'static str> {
     let find = || NAMES.into_iter().find(|name| shell::answers(Command::new(name).arg("--version")));
-    find().or_else(|| {
-        let is_root = shell::output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0");
-        if !is_root || !shell::answers(Command::new("apt-get").arg("--version")) {
-            return None;
-        }
-        let apt = |words: &[&str]| {
-            shell::run(Command::new("apt-get").args(words).env("DEBIAN_FRONTEND", "noninteractive")).ok()
-        };
-        apt(&["update", "--quiet"])?;
-        apt(&["install", "--quiet", "--yes", "--no-install-recommends", "chromium"])?;
-        find()
-    })
+    find().or_else(|| system::install(&["chromium"]).then(find).flatten())
 }
 
 /// Copies the pictures of a folder into one that is empty before.

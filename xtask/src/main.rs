@@ -25,6 +25,7 @@ mod python;
 mod realism;
 mod shell;
 mod supply;
+mod system;
 mod test;
 mod torture;
 mod wasm;

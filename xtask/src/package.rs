@@ -10,7 +10,7 @@ use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, shell};
+use crate::{Chore, shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "python",
@@ -185,15 +185,8 @@ fn program(workspace: &Workspace) -> Result<PathBuf> {
 /// Whether there is a Slurm, installed if need be and possible.
 fn slurm() -> bool {
     let is_here = || ["slurmctld", "slurmd", "munged"].iter().all(|name| shell::answers(Command::new(name).arg("-V")));
-    let is_root = shell::output(Command::new("id").arg("-u")).is_ok_and(|id| id.trim() == "0");
-    if !is_root || is_here() {
-        return is_root && is_here();
+    if !system::is_root() || is_here() {
+        return system::is_root() && is_here();
     }
-    let apt = |words: &[&str]| {
-        shell::run(Command::new("apt-get").args(words).env("DEBIAN_FRONTEND", "noninteractive")).is_ok()
-    };
-    shell::answers(Command::new("apt-get").arg("--version"))
-        && apt(&["update", "--quiet"])
-        && apt(&["install", "--quiet", "--yes", "--no-install-recommends", "slurm-wlm", "munge"])
-        && is_here()
+    system::install(&["slurm-wlm", "munge"]) && is_here()
 }

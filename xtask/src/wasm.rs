@@ -1,6 +1,5 @@
 //! The pure crates without threads and without a source of entropy, and what they give.
 
-use std::path::Path;
 use std::process::Command;
 
 use anyhow::Result;
@@ -8,7 +7,7 @@ use anyhow::Result;
 use crate::arguments::Arguments;
 use crate::outcome::Outcome;
 use crate::workspace::Workspace;
-use crate::{Chore, deps, hashes, shell};
+use crate::{Chore, deps, hashes, shell, system};
 
 /// Without a system, and with one that programs can print to.
 const TARGETS: [&str; 2] = ["wasm32-unknown-unknown", "wasm32-wasip1"];
@@ -25,10 +24,7 @@ pub(crate) const CHORE: Chore = Chore {
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     for target in TARGETS {
-        // A toolchain that came without rustup, or a machine without a network, cannot have it: everything else is still worth the while.
-        let can_be_had = is_installed(target)?
-            || shell::answers(Command::new("rustup").args(["target", "add", target])) && is_installed(target)?;
-        if !can_be_had {
+        if !system::has_target(target)? {
             return Ok(Outcome::Skipped(format!("the target {target} is not installed, and rustup cannot add it")));
         }
     }
@@ -46,10 +42,4 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let found = shell::output(Command::new("node").arg(workspace.root.join("xtask/src/wasi.mjs")).arg(program))?;
     hashes::compare(workspace, &found, "wasm32")?;
     Ok(Outcome::Done)
-}
-
-fn is_installed(target: &str) -> Result<bool> {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let libraries = shell::output(Command::new(rustc).args(["--print", "target-libdir", "--target", target]))?;
-    Ok(Path::new(libraries.trim()).is_dir())
 }

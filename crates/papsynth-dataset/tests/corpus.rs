@@ -9,6 +9,8 @@ mod classes;
 mod coco;
 #[path = "parsers/engine.rs"]
 mod engine;
+#[path = "parsers/geojson.rs"]
+mod geojson;
 #[path = "parsers/image.rs"]
 mod image;
 #[path = "parsers/labels.rs"]
@@ -180,6 +182,11 @@ fn coco_documents() {
 #[test]
 fn stacks() {
     replay("stack", stack::check);
+}
+
+#[test]
+fn outlines_as_geojson() {
+    replay("geojson", geojson::check);
 }
 
 #[test]

@@ -93,7 +93,9 @@ fn runner(workspace: &Workspace) -> Result<Result<OsString, String>> {
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{RUNNER} {RUNNER_VERSION} ")) {
         let mut command = workspace.cargo();
-        command.args(["install", RUNNER, "--version", &format!("={RUNNER_VERSION}"), "--locked", "--root"]).arg(&root);
+        let version = format!("={RUNNER_VERSION}");
+        // Optimised it would take three times as long to compile, and all it does is to read what valgrind wrote.
+        command.args(["install", RUNNER, "--version", &version, "--locked", "--debug", "--root"]).arg(&root);
         if let Err(error) = shell::run(&mut command) {
             return Ok(Err(format!("{RUNNER} {RUNNER_VERSION} cannot be installed: {error}")));
         }

@@ -17,18 +17,19 @@ use support::{SEED, Scratch, frame, recipe};
 const RECORD: &str = "shards/000000.json";
 const COCO: &str = "shards/000000.coco.json";
 
-/// A shard in every format of this build, of a stack and an image.
-struct Shard {
+/// A shard whose files are put in others' places.
+pub(super) struct Shard {
     scratch: Scratch,
     dataset: Dataset,
     record: ShardRecord,
     /// Its files, by path.
-    files: Vec<(String, Vec<u8>)>,
+    pub(super) files: Vec<(String, Vec<u8>)>,
 }
 
-fn begin() -> Shard {
-    let scratch = Scratch::new("fuzz-shard");
-    let layout = Layout { frames_per_shard: 2, ..Layout::new(Format::built()) };
+/// A shard of a stack and an image.
+pub(super) fn begin(name: &str, formats: impl IntoIterator<Item = Format>) -> Shard {
+    let scratch = Scratch::new(name);
+    let layout = Layout { frames_per_shard: 2, ..Layout::new(formats) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).expect("a folder for it");
     let mut writer = dataset.shard_writer(0).expect("a shard");
@@ -65,13 +66,29 @@ fn changes(mut bytes: Vec<u8>, list: &[u8]) -> Vec<u8> {
     bytes
 }
 
+impl Shard {
+    /// Whether the shard is found whole with another content in the place of one of its files, whose hash is right.
+    pub(super) fn is_whole_with(&self, number: usize, content: &[u8]) -> bool {
+        let Self { scratch, dataset, record, files } = self;
+        let (path, good) = &files[number];
+        let mut record = record.clone();
+        (record.files[number].bytes, record.files[number].sha256) = (content.len() as u64, sha256(content));
+        record.sha256 = String::new();
+        record.sha256 = sha256(&serde_json::to_vec(&record).expect("a record is JSON"));
+        fs::write(scratch.join(path), content).expect("a file");
+        fs::write(scratch.join(RECORD), serde_json::to_vec(&record).expect("a record is JSON")).expect("a record");
+        let found = dataset.whole(0, Check::Hashes).expect("no failure of the system");
+        fs::write(scratch.join(path), good).expect("a file");
+        found.is_some()
+    }
+}
+
 /// A file that is not what was written is found to contradict the others although its hash is right, unless it says the same.
 pub(crate) fn check(bytes: &[u8]) {
-    static SHARD: LazyLock<Shard> = LazyLock::new(begin);
-    let Shard { scratch, dataset, record, files } = &*SHARD;
+    static SHARD: LazyLock<Shard> = LazyLock::new(|| begin("fuzz-shard", Format::built()));
     let [which, rest @ ..] = bytes else { return };
-    let number = usize::from(*which) % files.len();
-    let (path, good) = &files[number];
+    let number = usize::from(*which) % SHARD.files.len();
+    let (path, good) = &SHARD.files[number];
     let changed;
     let content = match which {
         128.. => rest,
@@ -80,22 +97,17 @@ pub(crate) fn check(bytes: &[u8]) {
             &changed
         }
     };
-    let mut record = record.clone();
-    (record.files[number].bytes, record.files[number].sha256) = (content.len() as u64, sha256(content));
-    record.sha256 = String::new();
-    record.sha256 = sha256(&serde_json::to_vec(&record).expect("a record is JSON"));
-    fs::write(scratch.join(path), content).expect("a file");
-    fs::write(scratch.join(RECORD), serde_json::to_vec(&record).expect("a record is JSON")).expect("a record");
-    let found = dataset.whole(0, Check::Hashes).expect("no failure of the system");
-    if found.is_some() && path == COCO {
+    if !SHARD.is_whole_with(number, content) {
+        return;
+    }
+    if path == COCO {
         assert_eq!(
             truths(content).expect("what is found whole is read"),
             truths(good).expect("and so is what was written")
         );
     }
     // What readers take for text or a table says exactly what it said.
-    if found.is_some() && [".csv", ".txt"].iter().any(|ending| path.ends_with(ending)) {
+    if [".csv", ".txt"].iter().any(|ending| path.ends_with(ending)) {
         assert_eq!(content, good.as_slice());
     }
-    fs::write(scratch.join(path), good).expect("a file");
 }

@@ -1,0 +1,9 @@
+#![no_main]
+
+#[path = "../../crates/papsynth-dataset/tests/parsers/geojson.rs"]
+mod geojson;
+#[path = "../../crates/papsynth-dataset/tests/parsers/shard.rs"]
+#[allow(dead_code, reason = "the check of its own target")]
+mod shard;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| geojson::check(bytes));
