@@ -2,12 +2,13 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
+use papsynth_dataset::memory::{Fit, Need, shown};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Progress as Step, Run, Share};
 
 use crate::args::{Generate, LayoutArgs};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
-use crate::memory::{self, Fit, Need};
+use crate::memory;
 use crate::place;
 use crate::profile::Account;
 use crate::report::{self, Progress, Start};
@@ -87,11 +88,11 @@ fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> R
     let (shared, at_once) = (few.is_some() && setup.threads > 1, few.map_or(setup.threads, |_| 1));
     let budget = memory::budget(args.max_memory);
     let Some(fit) = need.fit(at_once, shared, budget) else {
-        return Err(need.refuse(&setup.recipe.recipe, budget.unwrap_or_default(), args.max_memory.is_some()));
+        return Err(memory::refuse(&need, &setup.recipe.recipe, budget.unwrap_or_default(), args.max_memory.is_some()));
     };
     if (fit.at_once, fit.shared) != (at_once, shared) {
         let all = setup.threads;
-        let may = memory::shown(budget.unwrap_or_default() as f64);
+        let may = shown(budget.unwrap_or_default() as f64);
         exit::note(&format!("{} of {all} threads make frames, so that they fit into {may}", fit.at_once));
     }
     Ok(fit)

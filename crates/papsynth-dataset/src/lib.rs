@@ -17,6 +17,7 @@ mod image_of;
 mod inspect;
 mod layers;
 mod layout;
+pub mod memory;
 mod merge;
 #[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
 mod parquet;

@@ -9,8 +9,10 @@ use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe};
 use papsynth::{Plane, Threads};
+use papsynth_dataset::Layout;
+use papsynth_dataset::memory::{Need, available};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
-use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
@@ -40,6 +42,8 @@ const LARGEST_MODEL: u64 = 1 << 28;
 ///     If a file cannot be read.
 /// ValueError
 ///     If the model cannot be used.
+/// MemoryError
+///     If the largest frame of the recipe needs more memory than there is, where the system tells.
 #[pyclass(frozen, module = "papsynth")]
 pub(crate) struct Engine {
     pub(crate) engine: Arc<papsynth::Engine>,
@@ -74,6 +78,10 @@ impl Engine {
         }
         let (inputs, map) =
             read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
+        let need = Need::of(&recipe, &Layout::default());
+        if let Some(bytes) = available().filter(|bytes| need.of_one_frame() > *bytes as f64) {
+            return Err(PyMemoryError::new_err(need.too_large(&recipe, bytes)));
+        }
         let made = py.detach(|| papsynth::Engine::new(&recipe, &model, &inputs));
         let engine = made.map_err(|error| error::engine(py, &name, &error))?;
         Ok(Self { engine: Arc::new(engine), model, map, source: name })

@@ -3,6 +3,7 @@
 PAPSYNTH names the program to compare with.
 """
 
+import copy
 import json
 import multiprocessing
 import os
@@ -309,6 +310,23 @@ def test_recipes_are_objects_too_which_know_every_field():
     tool = Path(__file__).parent.parent / "tools/write_recipes.py"
     checked = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True)
     assert checked.returncode == 0, checked.stderr
+
+
+def test_a_field_that_a_recipe_does_not_have_is_refused_and_recipes_are_copied():
+    from papsynth.recipes import Field, Recipe
+
+    recipe = Recipe(field=Field(width_px=64))
+    with pytest.raises(AttributeError, match="widht_px"):
+        recipe.field.widht_px = 128
+    for copied in (copy.deepcopy(recipe), pickle.loads(pickle.dumps(recipe))):
+        copied.field.width_px = 128
+        assert recipe.to_dict() == {"field": {"width_px": 64}} and copied.to_dict() == {"field": {"width_px": 128}}
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/meminfo"), reason="the system does not tell what memory there is")
+def test_what_does_not_fit_into_memory_is_refused():
+    with pytest.raises(MemoryError, match=r"field.width_px.* GiB"):
+        papsynth.Dataset({"field": {"width_px": 32768, "height_px": 32768}, "focus": {"planes": 21}, "light": {"kind": "colour"}})
 
 
 def test_a_class_is_learned_and_rendered():

@@ -67,6 +67,8 @@ def _plain(value: Any) -> Any:
 class Section:
     """A section of a recipe."""
 
+    __slots__ = ()
+
     def to_dict(self) -> dict[str, Any]:
         """As a dictionary, without what was left out."""
         values = ((field.name, getattr(self, field.name)) for field in fields(self))
@@ -116,7 +118,7 @@ class Writer:
 
     def section(self, name, schema, description):
         self.written.append(name)
-        lines = ["", "@dataclass(kw_only=True)", f"class {name}(Section):"]
+        lines = ["", "@dataclass(kw_only=True, slots=True)", f"class {name}(Section):"]
         lines += self.described(description) or ['    """A section of a recipe."""']
         properties = schema.get("properties", {})
         for field, inner in sorted(properties.items(), key=lambda item: item[0] != "kind"):

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use papsynth::Threads;
+use papsynth_dataset::memory::{Need, shown};
 use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
 use papsynth_dataset::{Check, Error, Share};
 
@@ -10,7 +11,7 @@ use super::open;
 use crate::args::{SlideFinalize, SlideMake};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
-use crate::memory::{self, Need};
+use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
 use crate::share;
@@ -70,10 +71,10 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Fail
     let need = Need::of_slide(recipe, shard_px);
     let budget = memory::budget(args.max_memory);
     let Some(fit) = need.fit(setup.threads, false, budget) else {
-        return Err(need.refuse_slide(recipe, shard_px, budget.unwrap_or_default()));
+        return Err(memory::refuse_slide(&need, recipe, shard_px, budget.unwrap_or_default()));
     };
     if fit.at_once < setup.threads {
-        let may = memory::shown(budget.unwrap_or_default() as f64);
+        let may = shown(budget.unwrap_or_default() as f64);
         exit::note(&format!("{} of {} threads make frames, so that they fit into {may}", fit.at_once, setup.threads));
     }
     Ok(fit.at_once)

@@ -96,6 +96,8 @@ def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: i
         If a field of the recipe cannot be what it is; ``field`` names it.
     OSError
         If a file cannot be read.
+    MemoryError
+        If a frame of the recipe may need more memory than there is, where the system tells.
     ValueError
         If the scene cannot be drawn, or the model cannot be used.
     OverflowError, TypeError

@@ -54,13 +54,15 @@ def _plain(value: Any) -> Any:
 class Section:
     """A section of a recipe."""
 
+    __slots__ = ()
+
     def to_dict(self) -> dict[str, Any]:
         """As a dictionary, without what was left out."""
         values = ((field.name, getattr(self, field.name)) for field in fields(self))
         return {name: _plain(value) for name, value in values if value is not None}
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Bacilli(Section):
     """Rod-shaped bacteria ("Bacilli"), such as lactobacilli."""
 
@@ -95,7 +97,7 @@ class Bacilli(Section):
     """Width of a bacillus, µm, 0.1 to 5."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Background(Section):
     """The empty slide, as the lamp shows it (Eqs. 8–10)."""
 
@@ -112,7 +114,7 @@ class Background(Section):
     """Size of the cells of that noise, µm, 1 to 10000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class BareNuclei(Section):
     """Bare nuclei: what bacteria leave of intermediate cells."""
 
@@ -138,7 +140,7 @@ class BareNuclei(Section):
     """Contrast of its chromatin relative to the absorbance, 0 to 2."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Bubbles(Section):
     """Air bubbles in the mountant."""
 
@@ -161,7 +163,7 @@ class Bubbles(Section):
     """Width of the dark rim relative to the radius, 0.01 to 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Camera(Section):
     """The camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Numbers are those of one pixel of the sensor."""
 
@@ -236,7 +238,7 @@ class Camera(Section):
     """Temperature of the sensor, °C, -200 to 150."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Candidas(Section):
     """*Candida*: colonies of pseudohyphae and budding yeasts."""
 
@@ -283,7 +285,7 @@ class Candidas(Section):
     """Yeasts of a colony, most of them budding, 0 to 10000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class CellMix(Section):
     """How many cells of a class there are, and how they differ from the model's."""
 
@@ -306,7 +308,7 @@ class CellMix(Section):
     """How likely its cytoplasm is to take each tint."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class ClueCells(Section):
     """Clue cells: cells covered with coccobacilli, and cells with patches of them."""
 
@@ -329,7 +331,7 @@ class ClueCells(Section):
     """Width of a coccobacillus, µm, 0.1 to 5."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Cocci(Section):
     """Cocci and coccobacilli, colony by colony."""
 
@@ -361,7 +363,7 @@ class Cocci(Section):
     """How late light comes through a coccus, radians of phase, -3 to 3; seen by bright-field optics alone."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Crystals(Section):
     """Precipitated dye: dark, angular, refracting grains."""
 
@@ -384,7 +386,7 @@ class Crystals(Section):
     """How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Cytoplasm(Section):
     """The cytoplasm of every cell."""
 
@@ -462,7 +464,7 @@ class Cytoplasm(Section):
     """Wrinkles of a cell, 0 to 100: narrow creases in which the sheet lies doubled."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Debris(Section):
     """Everything that is no epithelial cell."""
 
@@ -521,7 +523,7 @@ class Debris(Section):
     """Trichomonads, pale pear-shaped flagellates."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Deposit(Section):
     """The round deposit of a liquid-based preparation."""
 
@@ -547,7 +549,7 @@ class Deposit(Section):
     """Its middle, µm from the upper border of the picture, -1000000 to 1000000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Dirt(Section):
     """Faint flecks of background dirt, in drifts that the fluid has laid down side by side. Each fleck lies at a depth of its own,
     but nobody counts them: the truth has one row and one mask for all of them.
@@ -581,7 +583,7 @@ class Dirt(Section):
     """Width of a fleck, µm, 0.1 to 10."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Dust(Section):
     """Dust on the cover glass or within the mountant."""
 
@@ -598,7 +600,7 @@ class Dust(Section):
     """How far above the cells it lies, µm, -1000 to 1000: 170 is the outside of a cover glass, less lies within the mountant."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class DyeAmounts(Section):
     """Amounts of dyes in what is stained with strength 1, each as the absorbance at the dye's own peak. The strength of the stain is
     what the model and the factors of this section say: the absorbance at 0.57 µm where the amounts are such that their
@@ -621,7 +623,7 @@ class DyeAmounts(Section):
     """Orange G, orange, peak near 0.48 µm, 0 to 100."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Fibres(Section):
     """Fibres of cotton and cloth, in the mountant or on the glass."""
 
@@ -647,7 +649,7 @@ class Fibres(Section):
     """Width, µm, 0.5 to 50."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Field(Section):
     """The image: its size and the size of its pixels. Counts of cells and debris are those of a whole field, whatever its size."""
 
@@ -666,7 +668,7 @@ class Field(Section):
     """Width in pixels, 16 to 32768; drawn once a field."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Focus(Section):
     """Focal planes. A plane is where the stage stands; what is in focus there lies deeper or higher by the ratio of the two indices
     of refraction, if the optics know them.
@@ -698,7 +700,7 @@ class Focus(Section):
     """Travel of the stage between planes, µm, 0.001 to 100."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Folds(Section):
     """Parts of a cell that lie doubled back on it."""
 
@@ -718,7 +720,7 @@ class Folds(Section):
     """Probability that a rim is rolled up, 0 to 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Group(Section):
     """How cells of a class lie together."""
 
@@ -732,7 +734,7 @@ class Group(Section):
     """Cells of a group, 1 to 1000; drawn for each group."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class IlluminationBorder(Section):
     """The paper's: distance to the image's border to the power of an exponent (Eq. 8)."""
 
@@ -742,7 +744,7 @@ class IlluminationBorder(Section):
     """The exponent n, 0 (even) to 2; the released value is 0.02."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class IlluminationBowl(Section):
     """A smooth bowl, 1 − x2·x² − y2·y² over −1..1, as measured on real fields."""
 
@@ -758,14 +760,14 @@ class IlluminationBowl(Section):
     """Fall towards the upper and lower border, as a fraction of the centre, 0 to 0.45."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LayoutUniform(Section):
     """Anywhere, all places equally likely (Eq. 5)."""
 
     kind: Literal['uniform'] = 'uniform'
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LayoutClusters(Section):
     """Round clusters at random places, and some cells outside them."""
 
@@ -781,7 +783,7 @@ class LayoutClusters(Section):
     """Radius (standard deviation) of a cluster, µm, 1 to 10000; drawn for each cluster."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LayoutSwath(Section):
     """A band of material across the image."""
 
@@ -794,7 +796,7 @@ class LayoutSwath(Section):
     """Width (standard deviation) of the band, µm, 1 to 10000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LayoutMap(Section):
     """A grey image that is stretched over the field: white is likely, black never happens."""
 
@@ -804,7 +806,7 @@ class LayoutMap(Section):
     """File of the image, relative to the recipe."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LayoutLabels(Section):
     """The layout of a given label image: as likely as the place is covered by a label there."""
 
@@ -817,7 +819,7 @@ class LayoutLabels(Section):
     """Standard deviation of the smoothing of its coverage, µm, 0 to 1000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Leukocytes(Section):
     """White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9)."""
 
@@ -864,7 +866,7 @@ class Leukocytes(Section):
     """Share of a cluster's lobed leukocytes that touch another one, 0 to 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LightMonochrome(Section):
     """A grey image in the light of one interference filter."""
 
@@ -877,7 +879,7 @@ class LightMonochrome(Section):
     """Wavelength, µm, 0.4 to 0.7 (the paper's: 0.57, where nuclei stand out most)."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class LightColour(Section):
     """A colour image: halogen lamp, colour camera, white balance on the empty slide."""
 
@@ -898,7 +900,7 @@ class LightColour(Section):
     """How the camera's colours are written."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Mucus(Section):
     """Strands of mucus, bundles of faint fibres."""
 
@@ -930,7 +932,7 @@ class Mucus(Section):
     """Width of a strand, µm, 1 to 100."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Nucleus(Section):
     """The nucleus of every cell."""
 
@@ -990,7 +992,7 @@ class Nucleus(Section):
     """Probability that a nucleus is wrinkled or angular, 0 to 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class OpticsBrightField(Section):
     """Partially coherent bright field: what every slab transmits, filtered by the weak-object transfer function."""
 
@@ -1043,7 +1045,7 @@ class OpticsBrightField(Section):
     """Share of an empty field's light that lies evenly over the picture, 0 to 0.5: glare."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class OpticsGaussian(Section):
     """The paper's: Gaussians on the absorbance (Eqs. 13, 14, Fig. 10)."""
 
@@ -1058,7 +1060,7 @@ class OpticsGaussian(Section):
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class OutOfFocus(Section):
     """Objects far outside the depth of the slide ("Out of focus objects")."""
 
@@ -1081,7 +1083,7 @@ class OutOfFocus(Section):
     """Radius, µm, 0.3 to 500 (s of Eq. 7)."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class RedCells(Section):
     """Red blood cells, in clusters."""
 
@@ -1116,7 +1118,7 @@ class RedCells(Section):
     """How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Scan(Section):
     """A whole slide, as a scanner sees it frame by frame (`papsynth slide`); fields do not look at it. Counts of cells and debris
     are those of a field, whose size then says how dense they lie where the deposit is full.
@@ -1141,7 +1143,7 @@ class Scan(Section):
     """Width of the slide's picture in pixels, 64 to 1000000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Scratches(Section):
     """Scratches in the slide or in the cover glass."""
 
@@ -1166,7 +1168,7 @@ class Scratches(Section):
     """Width, µm, 0.1 to 20."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Slide(Section):
     """How deep the cells lie ("Final Image Formation": depth from a median-filtered Perlin image)."""
 
@@ -1191,7 +1193,7 @@ class Slide(Section):
     """Standard deviation of a cell's own depth about the relief, µm, 0 to 100: cells that lie on each other."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Smudges(Section):
     """Amorphous debris: granular clumps of what was left of cells, mucus and bacteria."""
 
@@ -1226,7 +1228,7 @@ class Smudges(Section):
     """How ragged its outline is, 0 to 2: 0 is an ellipse."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Speckles(Section):
     """Specks of dust and stain ("Speckles")."""
 
@@ -1248,7 +1250,7 @@ class Speckles(Section):
     """
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Stain(Section):
     """How evenly the stain was taken up."""
 
@@ -1295,7 +1297,7 @@ class Stain(Section):
     """Dyes of specks."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class TintMix(Section):
     """How likely each tint of cytoplasm is, relative to the others."""
 
@@ -1309,7 +1311,7 @@ class TintMix(Section):
     """Orange, as in keratinised cells, 0 to 1000."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Trichomonads(Section):
     """Trichomonads, pale pear-shaped flagellates."""
 
@@ -1341,7 +1343,7 @@ class Trichomonads(Section):
     """Width relative to the length, 0.2 to 1."""
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, slots=True)
 class Recipe(Section):
     """A recipe: everything that decides an image except the model, the seed and the index."""
 
