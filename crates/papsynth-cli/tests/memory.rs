@@ -68,9 +68,10 @@ fn resident(process: u32) -> f64 {
     line.trim().strip_suffix("kB").unwrap().trim().parse().unwrap()
 }
 
-/// As many as `PAPSYNTH_TINY` says, else 100000: memory does not grow by a twentieth from a tenth of them on.
+/// As many as `PAPSYNTH_TINY` says, else 100000: memory does not grow by a twentieth between their second tenth and their last. It goes up and
+/// down with how full the shards at work are, so means are compared.
 #[test]
-#[ignore = "takes an hour of a core"]
+#[ignore = "takes a quarter of an hour"]
 fn a_hundred_thousand_tiny_images_need_no_more_memory_than_ten_thousand() {
     let bench = Bench::new("tiny");
     let count: u64 = std::env::var("PAPSYNTH_TINY").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
@@ -79,22 +80,23 @@ fn a_hundred_thousand_tiny_images_need_no_more_memory_than_ten_thousand() {
          --set field.width_px=32 --set field.height_px=32 --set cells={{}} --set cells.intermediate.count=1 \
          --set debris.bacilli.clusters=0 --set debris.leukocytes.clusters=0 --set debris.speckles.count=0"
     ));
-    let (mut early, mut late) = (0.0, 0.0);
+    let (mut early, mut late) = (Vec::new(), Vec::new());
     for line in BufReader::new(child.stdout.take().unwrap()).lines() {
         let event: Value = serde_json::from_str(&line.unwrap()).unwrap();
         match event["done"].as_u64() {
-            Some(done) if done == count / 10 => early = resident(child.id()),
-            Some(done) if done == count - count / 1000 - 1 => late = resident(child.id()),
+            // The last ones may end while nothing runs any more that could be asked.
+            Some(done) if done % 20 != 0 || done + 100 > count => {}
+            Some(done) if done * 10 / count == 1 => early.push(resident(child.id())),
+            Some(done) if done * 10 / count == 9 => late.push(resident(child.id())),
             _ => {}
         }
     }
     assert!(child.wait().unwrap().success());
-    eprintln!(
-        "{count} images: {early} kB at the {}th, {late} kB at the end, {:+.1} %",
-        count / 10,
-        100.0 * (late / early - 1.0)
-    );
-    assert!(early > 0.0 && late < 1.05 * early, "{early} kB, then {late} kB");
+    let mean = |samples: &[f64]| samples.iter().sum::<f64>() / samples.len() as f64;
+    let (early, late) = (mean(&early), mean(&late));
+    let growth = 100.0 * (late / early - 1.0);
+    eprintln!("{count} images: {early:.0} kB in the second tenth, {late:.0} kB in the last, {growth:+.1} %");
+    assert!(growth < 5.0, "{early:.0} kB, then {late:.0} kB");
 }
 
 #[test]

@@ -50,5 +50,5 @@ mod _native {
     #[pymodule_export]
     use crate::sets::verify;
     #[pymodule_export]
-    use crate::techniques::{camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture};
+    use crate::techniques::{cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture};
 }

@@ -476,9 +476,9 @@ fn gibson_lanni(
     image(py, made.map_err(wrong)?, r_um.len())
 }
 
-/// What a camera makes of light.
+/// Noise of a camera: what it makes of light.
 #[pymodule]
-pub(crate) mod camera {
+pub(crate) mod noise {
     #[pymodule_export]
     use super::expose;
 }

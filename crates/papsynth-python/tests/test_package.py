@@ -270,8 +270,8 @@ def test_techniques_work_alone_and_say_what_is_wrong():
     assert light.shape == (48, 64) and abs(light[24, 32] - 10**-0.3) < 0.01
     psf = papsynth.optics.gibson_lanni([0.0, 0.5], [-1.0, 0.0, 1.0])
     assert psf.shape == (3, 2) and psf[1, 0] >= psf[1, 1]
-    counts = papsynth.camera.expose(np.full((40, 50), 9000.0), seed=4)
-    assert counts.dtype == np.uint16 and counts.std() > 1 and np.array_equal(counts, papsynth.camera.expose(np.full((40, 50), 9000), seed=4))
+    counts = papsynth.noise.expose(np.full((40, 50), 9000.0), seed=4)
+    assert counts.dtype == np.uint16 and counts.std() > 1 and np.array_equal(counts, papsynth.noise.expose(np.full((40, 50), 9000), seed=4))
     colour = papsynth.dyes.transmittance(eosin_y=np.full((4, 5), 0.5))
     assert colour.shape == (4, 5, 3) and colour[0, 0, 0] > colour[0, 0, 1]
     for call in (
@@ -289,7 +289,7 @@ def test_techniques_work_alone_and_say_what_is_wrong():
         lambda: papsynth.texture.quilt(field, np.ones((3, 3)), np.ones((4, 4))),
         lambda: papsynth.optics.gaussian(mask, -1),
         lambda: papsynth.optics.bright_field(mask, na=9),
-        lambda: papsynth.camera.expose(mask, camera="eye"),
+        lambda: papsynth.noise.expose(mask, camera="eye"),
         lambda: papsynth.dyes.transmittance(),
         lambda: papsynth.dyes.transmittance(eosin_y=np.ones((2, 2)), orange_g=np.ones((2, 3))),
     ):
@@ -436,10 +436,10 @@ for delay in (0.0005, 0.002, 0.005):
 @pytest.mark.parametrize(
     ("call", "named"),
     [
-        (lambda a: papsynth.camera.expose(a * np.nan), "electrons[0, 0]: NaN"),
-        (lambda a: papsynth.camera.expose(-a), "electrons[0, 0]: -1"),
-        (lambda a: papsynth.camera.expose(a + 1j), "electrons: is of type complex128"),
-        (lambda a: papsynth.camera.expose(a.astype("U")), "electrons: is of type"),
+        (lambda a: papsynth.noise.expose(a * np.nan), "electrons[0, 0]: NaN"),
+        (lambda a: papsynth.noise.expose(-a), "electrons[0, 0]: -1"),
+        (lambda a: papsynth.noise.expose(a + 1j), "electrons: is of type complex128"),
+        (lambda a: papsynth.noise.expose(a.astype("U")), "electrons: is of type"),
         (lambda a: papsynth.optics.bright_field(a, np.nan), "defocus_um"),
         (lambda a: papsynth.optics.gaussian(a * 1e300, 2), "image[0, 0]: inf"),
         (lambda a: papsynth.optics.gaussian(a[0], 2), "image: has the shape [12]"),

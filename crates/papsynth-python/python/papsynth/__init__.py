@@ -11,7 +11,7 @@ The same recipe, model, seed and index give the same bytes as the command line, 
 from __future__ import annotations
 
 
-from . import camera, cloth, cytoskeleton, dyes, fields, fsd, optics, texture
+from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
 from ._dataset import Dataset, IterableDataset
 from ._errors import Fault, RecipeError
 from ._learn import judge, learn
@@ -29,7 +29,6 @@ __all__ = [
     "Frame",
     "IterableDataset",
     "RecipeError",
-    "camera",
     "cloth",
     "cytoskeleton",
     "detection_target",
@@ -41,6 +40,7 @@ __all__ = [
     "learn",
     "merge",
     "missing",
+    "noise",
     "optics",
     "recipe",
     "render",
