@@ -1,7 +1,7 @@
 //! COCO: a document for each frame, and one for all.
 
 use papsynth::recipe::Recipe;
-use papsynth::scene::Kind;
+use papsynth::scene::{Kind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -228,7 +228,6 @@ impl Annotation {
             message: format!("annotation {}: there is no {what} `{}`", self.id, found.escape_default()),
         };
         let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
-        let tint = ["", "cyanophilic", "eosinophilic", "orangeophilic"].into_iter().find(|tint| *tint == self.tint);
         Ok(ObjectTruth {
             id: self.object_id,
             part: self.part,
@@ -240,7 +239,7 @@ impl Annotation {
             centre_um: self.centre_um,
             depth_um: self.depth_um,
             stain: self.stain,
-            tint: tint.ok_or_else(|| unknown("tint", &self.tint))?,
+            tint: Tint::name_of(&self.tint).ok_or_else(|| unknown("tint", &self.tint))?,
             rotation_deg: self.rotation_deg,
             area_um2: self.area_um2,
             truncated: self.truncated,

@@ -8,10 +8,11 @@ use papsynth::Plane;
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
 use papsynth_dataset::{Column, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::error;
+use crate::{error, pickled};
 
 /// An image or focus stack, with everything that is known of it. Arrays are the frame's own, whoever asks for them: copy them before you change them.
 ///
@@ -252,6 +253,15 @@ impl Frame {
         written.map_err(|error| error::dataset(&error))
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+        let Truth { width, height, .. } = self.truth;
+        let arrays = [&self.image, &self.stack, &self.noise_free].map(|array| array.clone_ref(py));
+        let key = (self.seed, self.index, self.slide);
+        let scale = (self.pixel_um, self.planes_um.clone(), self.bits, [width, height]);
+        let state = (pickled::VERSION, key, scale, arrays, py.detach(|| pickled::objects(&self.truth)));
+        Ok((py.import("papsynth._native")?.getattr("_restored")?, state))
+    }
+
     fn __len__(&self) -> usize {
         self.truth.objects.len()
     }
@@ -267,6 +277,41 @@ impl Frame {
             objects.len()
         )
     }
+}
+
+/// Version; seed, index, slide; µm of a pixel, planes, bits, width and height; image, stack and light without noise; objects.
+type Pickled = (u32, (u64, u64, u64), (f64, Vec<f64>, u32, [usize; 2]), [Py<PyAny>; 3], Vec<pickled::Object>);
+
+/// A frame that was pickled.
+#[pyfunction]
+#[pyo3(name = "_restored")]
+pub(crate) fn restored(
+    py: Python<'_>,
+    version: u32,
+    key: (u64, u64, u64),
+    scale: (f64, Vec<f64>, u32, [usize; 2]),
+    arrays: [Py<PyAny>; 3],
+    objects: Vec<pickled::Object>,
+) -> PyResult<Frame> {
+    if version != pickled::VERSION {
+        let message = format!(
+            "this frame was pickled in version {version} of its form; this papsynth reads {}",
+            pickled::VERSION
+        );
+        return Err(PyValueError::new_err(message));
+    }
+    let ((seed, index, slide), (pixel_um, planes_um, bits, [width, height])) = (key, scale);
+    let [image, stack, noise_free] = arrays;
+    // What `save` and others take for granted.
+    let [of_image, of_stack] = [&image, &stack].map(|array| array.bind(py).getattr("shape")?.extract::<Vec<usize>>());
+    let (of_image, of_stack) = (of_image?, of_stack?);
+    if of_image.get(..2) != Some(&[height, width][..])
+        || of_stack.split_first() != Some((&planes_um.len(), &of_image[..]))
+    {
+        return Err(pickled::damaged("its arrays are not as large as it says"));
+    }
+    let truth = pickled::truth([width, height], planes_um.len(), objects)?;
+    Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, kept: Kept::default() })
 }
 
 /// What was made before, or is made now.

@@ -8,6 +8,7 @@ mod error;
 mod frame;
 mod judge;
 mod learn;
+mod pickled;
 mod pool;
 mod sets;
 mod techniques;
@@ -33,6 +34,8 @@ mod _native {
     use crate::engine::resolve;
     #[pymodule_export]
     use crate::frame::Frame;
+    #[pymodule_export]
+    use crate::frame::restored;
     #[pymodule_export]
     use crate::judge::judge;
     #[pymodule_export]

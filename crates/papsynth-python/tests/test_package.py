@@ -213,6 +213,29 @@ def _third(samples):
     return samples[3]
 
 
+def _whole(index):
+    return papsynth.render(SMALL, seed=7, index=index)
+
+
+def test_frames_come_whole_from_other_processes(frame):
+    colour = papsynth.render({**SMALL, "light": {"kind": "colour"}, "focus": {"planes": 2}})
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        others = [(frame, pool.apply_async(_whole, (3,)).get(timeout=120)), (colour, pickle.loads(pickle.dumps(colour)))]
+    for one, other in others:
+        assert repr(one) == repr(other) and one.planes_um == other.planes_um and one.rle == other.rle and one.visible_rle == other.visible_rle
+        for name in ("image", "stack", "noise_free", "layers", "boxes", "defocus_um", "detectability"):
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+        assert all(np.array_equal(one.table[name], other.table[name]) for name in one.table) and list(one.table) == list(other.table)
+    restore, state = frame.__reduce__()
+    for place, wrong in ((0, 2), (3, [frame.image[1:], frame.stack, frame.noise_free]), (2, (0.25, [0.0, 1.0], 8, [320, 240]))):
+        with pytest.raises(ValueError, match="pickled"):
+            restore(*(wrong if at == place else value for at, value in enumerate(state)))
+    ids, numbers, (amodal, front), seen = state[4][0]
+    for damaged in ((ids, numbers, (amodal + "1", front), seen), ((1, "cell", *ids[2:]), numbers, (amodal, front), seen)):
+        with pytest.raises(ValueError, match="object 1"):
+            restore(*state[:4], [damaged])
+
+
 def test_a_pickle_of_another_version_is_refused():
     state = papsynth.Dataset(SMALL).__getstate__() | {"_made_by": "0.0.1 (streams of version 0)"}
     with pytest.raises(ValueError, match=r"0\.0\.1"):

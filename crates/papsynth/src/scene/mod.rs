@@ -351,6 +351,15 @@ pub enum Tint {
 }
 
 impl Tint {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Cyanophilic, Self::Eosinophilic, Self::Orangeophilic];
+
+    /// What an object says that is tinted so, or nothing where it is not tinted, if there is such a tint.
+    #[must_use]
+    pub fn name_of(text: &str) -> Option<&'static str> {
+        Self::ALL.into_iter().map(Self::name).chain([""]).find(|name| *name == text)
+    }
+
     /// Its name.
     #[must_use]
     pub fn name(self) -> &'static str {
