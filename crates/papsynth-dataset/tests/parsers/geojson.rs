@@ -10,7 +10,7 @@ use super::shard::{Shard, begin};
 /// What is taken for the features of a frame says what was written, in whatever order and with whatever spaces.
 pub(crate) fn check(bytes: &[u8]) {
     static SHARD: LazyLock<(Shard, usize)> = LazyLock::new(|| {
-        let shard = begin("fuzz-geojson", [Format::Qupath]);
+        let shard = begin("fuzz-geojson", [Format::Qupath], &[1]);
         let first = shard.files.iter().position(|(path, _)| path.ends_with(".geojson")).expect("a file of outlines");
         (shard, first)
     });

@@ -26,14 +26,15 @@ pub(super) struct Shard {
     pub(super) files: Vec<(String, Vec<u8>)>,
 }
 
-/// A shard of a stack and an image.
-pub(super) fn begin(name: &str, formats: impl IntoIterator<Item = Format>) -> Shard {
+/// A shard of frames that have so many planes.
+pub(super) fn begin(name: &str, formats: impl IntoIterator<Item = Format>, planes: &[usize]) -> Shard {
     let scratch = Scratch::new(name);
-    let layout = Layout { frames_per_shard: 2, ..Layout::new(formats) };
+    let layout = Layout { frames_per_shard: planes.len() as u64, ..Layout::new(formats) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
     let dataset = Dataset::create_or_resume(scratch.path(), &info).expect("a folder for it");
     let mut writer = dataset.shard_writer(0).expect("a shard");
-    for frame in [frame(0, 2, 8, 1), frame(1, 1, 8, 1)] {
+    for (index, planes) in (0..).zip(planes) {
+        let frame = frame(index, *planes, 8, 1);
         writer.begin(&frame.finished.scene).expect("a frame");
         frame.planes.iter().for_each(|plane| writer.write_plane(plane).expect("a plane"));
         writer.end(&frame.finished).expect("its truth");
@@ -85,7 +86,7 @@ impl Shard {
 
 /// A file that is not what was written is found to contradict the others although its hash is right, unless it says the same.
 pub(crate) fn check(bytes: &[u8]) {
-    static SHARD: LazyLock<Shard> = LazyLock::new(|| begin("fuzz-shard", Format::built()));
+    static SHARD: LazyLock<Shard> = LazyLock::new(|| begin("fuzz-shard", Format::built(), &[2, 1]));
     let [which, rest @ ..] = bytes else { return };
     let number = usize::from(*which) % SHARD.files.len();
     let (path, good) = &SHARD.files[number];
