@@ -24,6 +24,9 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let frames = args.indices();
     let count = frames.end - frames.start;
     let (layout, chosen) = args.layout.layout(frames.end);
+    if let Some(message) = layout.refusal_of(&frames) {
+        return Err(Failure::input(Complaint::new(message)));
+    }
     let share = match args.share.shard {
         Some(shards) => share::of(shards)?,
         None => Share::ALL,
@@ -35,7 +38,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     // A slide that cannot be drawn is found out before anything is written.
     setup.engine.scene(Key { seed, index: frames.start }).map_err(|error| setup.recipe.refuse(&error))?;
 
-    if chosen {
+    if chosen && !args.quiet {
         let most = LayoutArgs::MOST_IN_FOLDERS;
         exit::note(&format!(
             "more than {most} frames are written as webdataset, in tar files; --format folder forces single files"

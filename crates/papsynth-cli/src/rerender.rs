@@ -1,5 +1,6 @@
 //! `papsynth rerender`: the same scenes under another microscope.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::Threads;
@@ -35,6 +36,8 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     }
     let (layout, _) = args.layout.layout(0);
     let interrupt = Interrupt::watch()?;
+    let frames: Vec<Range<u64>> =
+        frames.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
     let outcome = render(&after, seed, &frames, &layout, &args.out, interrupt.flag())?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
         let complaint = Complaint::new(format!("the truth is another: {difference}"));
@@ -88,7 +91,7 @@ fn changed_sections(before: &Recipe, after: &Recipe) -> Vec<String> {
 pub(crate) fn render(
     setup: &Setup,
     seed: u64,
-    frames: &[u64],
+    frames: &[Range<u64>],
     layout: &Layout,
     out: &std::path::Path,
     stop: &AtomicBool,
@@ -97,9 +100,9 @@ pub(crate) fn render(
     let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout };
     let dataset = Dataset::create_or_resume(out, &info)?;
     let mut sum = Outcome { kept: 0, made: 0, stopped: false };
-    for run in frames.chunk_by(|a, b| a + 1 == *b) {
+    for frames in frames {
         let run = Run {
-            frames: run[0]..run[run.len() - 1] + 1,
+            frames: frames.clone(),
             share: Share::ALL,
             at_once: setup.threads,
             threads: Threads::One,

@@ -6,6 +6,7 @@ use papsynth_dataset::write_png;
 use crate::args::{SlideTile, SlideVerb};
 use crate::exit::{self, Complaint, Failure};
 use crate::setup::Setup;
+use crate::text_file;
 
 #[cfg(feature = "zarr")]
 mod set;
@@ -36,6 +37,7 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
         let message = format!("--size {},{}: more than {MOST_PIXELS} pixels at once", args.size[0], args.size[1]);
         return Err(Failure::input(Complaint::new(message).help("`papsynth slide make` makes pictures of any size")));
     }
+    text_file::may_replace(&args.out, b"\x89PNG", "an older picture")?;
     let setup = Setup::load(&args.engine, None)?;
     let slide = open(&setup, args.engine.seed, args.slide)?;
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.refuse(&e))?;

@@ -1,5 +1,6 @@
 //! `papsynth status` and `papsynth merge`: how much is there, and the end of the work of several.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use papsynth_dataset::{Dataset, shards_to_make};
@@ -12,6 +13,8 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         let (missing, all) = crate::slide::missing(&args.dir)?;
+        let missing: Vec<Range<u64>> =
+            missing.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
         return tell(args, &missing, all, &format!("papsynth slide finalize {}", args.dir.display()));
     }
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
@@ -25,18 +28,15 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
 }
 
 /// What of so many shards is missing, and how to go on if nothing is.
-fn tell(args: &Status, missing: &[u64], all: u64, close: &str) -> Result<(), Failure> {
+fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: &str) -> Result<(), Failure> {
     if args.missing {
-        let mut numbers: Vec<u64> = match args.tasks {
-            Some(tasks) => missing.iter().map(|shard| shard % tasks).collect(),
-            None => missing.to_vec(),
+        let text = match args.tasks {
+            Some(tasks) => listed(&of_tasks(missing, tasks)),
+            None => listed(missing),
         };
-        numbers.sort_unstable();
-        numbers.dedup();
-        let text = listed(&numbers);
         return exit::print(&if text.is_empty() { text } else { format!("{text}\n") });
     }
-    let whole = all - missing.len() as u64;
+    let whole = all - count(missing);
     let percent = 100.0 * whole as f64 / all as f64;
     exit::print(&format!("{}: {whole} of {all} shards are whole ({percent:.1} %)\n", args.dir.display()))?;
     match missing.is_empty() {
@@ -50,7 +50,7 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
     let missing = shards_to_make(&dataset, 0..args.frames)?;
     let dir = args.dir.display();
     if !missing.is_empty() {
-        let message = format!("{dir}: {} shards are missing or damaged: {}", missing.len(), listed(&missing));
+        let message = format!("{dir}: {} shards are missing or damaged: {}", count(&missing), listed(&missing));
         let help = "the command that makes the data set makes them, in any share; then merge again";
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
@@ -65,15 +65,27 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
     exit::print(&format!("{dir}: {frames} frames\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
 }
 
-/// Sorted numbers as `sbatch --array` takes them.
-fn listed(numbers: &[u64]) -> String {
+fn count(ranges: &[Range<u64>]) -> u64 {
+    ranges.iter().map(|range| range.end - range.start).sum()
+}
+
+/// The tasks, of so many, that make these shards.
+fn of_tasks(shards: &[Range<u64>], tasks: u64) -> Vec<Range<u64>> {
+    let of_range =
+        |range: &Range<u64>| (range.start..range.end.min(range.start.saturating_add(tasks))).map(|n| n % tasks);
+    let numbers: BTreeSet<u64> = shards.iter().flat_map(of_range).collect();
     let mut ranges: Vec<Range<u64>> = Vec::new();
-    for &number in numbers {
+    for number in numbers {
         match ranges.last_mut() {
             Some(last) if last.end == number => last.end += 1,
             _ => ranges.push(number..number + 1),
         }
     }
+    ranges
+}
+
+/// Numbers as `sbatch --array` takes them.
+fn listed(ranges: &[Range<u64>]) -> String {
     let text = ranges
         .iter()
         .map(|r| if r.end - r.start == 1 { r.start.to_string() } else { format!("{}-{}", r.start, r.end - 1) });
@@ -86,7 +98,10 @@ mod tests {
 
     #[test]
     fn numbers_are_listed_as_schedulers_take_them() {
-        assert_eq!(listed(&[0, 2, 3, 4, 9]), "0,2-4,9");
+        assert_eq!(listed(&[0..1, 2..5, 9..10]), "0,2-4,9");
         assert_eq!(listed(&[]), "");
+        assert_eq!(listed(&of_tasks(&[0..1, 12..15, 19..20], 10)), "0,2-4,9");
+        assert_eq!(listed(&of_tasks(&[1..2, 7..u64::MAX], 3)), "0-2");
+        assert_eq!(count(&[0..1, 2..5]), 4);
     }
 }

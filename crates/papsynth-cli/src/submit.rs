@@ -59,6 +59,8 @@ fn kubernetes(args: &Submit) -> String {
     let image = serde_json::Value::from(args.image.as_deref().unwrap_or_default());
     let own = ["--threads".to_owned(), threads.to_string(), "--shard".to_owned(), format!("auto/{tasks}")];
     let words = std::iter::once(&"generate".to_owned()).chain(&args.arguments).chain(&own).cloned().collect::<Vec<_>>();
+    // `$(NAME)` would be replaced by a variable of the environment.
+    let words: Vec<String> = words.iter().map(|word| word.replace("$(", "$$(")).collect();
     let words = serde_json::Value::from(words);
     format!(
         "apiVersion: batch/v1\n\

@@ -1,6 +1,9 @@
 //! `papsynth sweep`: the same fields under every combination of some settings.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
 
 use papsynth_dataset::{Dataset, images_of, write_file};
 
@@ -9,9 +12,16 @@ use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::rerender::render;
 use crate::setup::Setup;
+use crate::text_file;
 
 /// Most combinations of a sweep.
 const MOST: usize = 10_000;
+
+/// The name of the table.
+const TABLE: &str = "sweep.csv";
+
+/// Its first columns.
+const COLUMNS: [&str; 4] = ["set", "image", "slide", "file"];
 
 /// A field and the values that it takes.
 struct Axis {
@@ -21,6 +31,12 @@ struct Axis {
 
 pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     let axes = args.vary.iter().map(|text| axis(text)).collect::<Result<Vec<_>, _>>()?;
+    for (number, axis) in axes.iter().enumerate() {
+        if axes[..number].iter().any(|before| before.field == axis.field) {
+            let complaint = Complaint::new(format!("--vary {}: it is varied already", axis.field));
+            return Err(Failure::input(complaint.help("give all its values at once: --vary FIELD=A,B,…")));
+        }
+    }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
     let Some(count) = count.filter(|count| *count <= MOST) else {
         return Err(Failure::input(Complaint::new(format!("more than {MOST} combinations; vary fewer at once"))));
@@ -29,14 +45,14 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     // What one combination cannot be made of is told before any is made.
     let combinations: Vec<Vec<&str>> = (0..count).map(|number| combination(&axes, number)).collect();
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
+    is_own(&args.out, count)?;
+    let frames = 0..args.frames;
     let interrupt = Interrupt::watch()?;
-    let frames: Vec<u64> = (0..args.frames).collect();
-    let mut table =
-        csv_line(["set", "image", "slide", "file"].into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
+    let mut table = csv_line(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
     for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
         let name = format!("{number:04}");
         let out = args.out.join(&name);
-        render(setup, args.engine.seed, &frames, &layout, &out, interrupt.flag())?;
+        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
         for image in rows(&out)? {
             let fixed = [name.as_str(), &image.index, &image.slide, &image.file];
             table.push_str(&csv_line(fixed.into_iter().chain(values.iter().copied())));
@@ -47,9 +63,38 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
             exit::print(&format!("{name} of {count}: {}\n", set.join(" ")))?;
         }
     }
-    let path = args.out.join("sweep.csv");
+    let path = args.out.join(TABLE);
     write_file(&path, table.as_bytes())?;
     if args.quiet { Ok(()) } else { exit::print(&format!("Look at: {}\n", path.display())) }
+}
+
+/// Makes sure that a folder holds nothing but what a sweep of so many data sets writes there.
+fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
+    let refuse = |name: &str| {
+        let message = format!("{}: the folder holds something else (`{name}`) and no sweep", out.display());
+        Err(Failure::input(Complaint::new(message).help("choose another, or a new one")))
+    };
+    let entries = match fs::read_dir(out) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(error) if error.kind() == ErrorKind::NotADirectory => {
+            return Err(Failure::input(Complaint::new(format!("{}: is a file; a folder is wanted", out.display()))));
+        }
+        Err(error) => return Err(Failure::file("read", out, &error)),
+    };
+    for entry in entries {
+        let entry = entry.map_err(|error| Failure::file("read", out, &error))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        // Not followed: a link leads out of the folder.
+        let kind = entry.file_type().map_err(|error| Failure::file("read", &entry.path(), &error))?;
+        let is_set = kind.is_dir() && (0..count).any(|number| name == format!("{number:04}"));
+        if name == TABLE && kind.is_file() {
+            text_file::may_replace(&entry.path(), COLUMNS.join(",").as_bytes(), "the table of an older sweep")?;
+        } else if !is_set && !name.starts_with('.') {
+            return refuse(&name);
+        }
+    }
+    Ok(())
 }
 
 fn axis(text: &str) -> Result<Axis, Failure> {
@@ -93,7 +138,7 @@ struct Row {
     file: String,
 }
 
-fn rows(out: &std::path::Path) -> Result<Vec<Row>, Failure> {
+fn rows(out: &Path) -> Result<Vec<Row>, Failure> {
     let dataset = Dataset::open(out)?;
     let images: BTreeMap<u64, (u64, String)> = images_of(&dataset)?;
     Ok(images

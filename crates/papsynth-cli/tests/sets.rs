@@ -4,6 +4,7 @@
 mod support;
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 
 use support::{Bench, TINY};
 
@@ -235,6 +236,57 @@ fn scenes_are_imaged_again_and_their_truth_stays() {
     assert!(run.code == 2 && run.err.contains("`cells` says what lies in a scene"), "{}", run.err);
     let run = bench.run("rerender out --out finer --set optics.oversampling=3");
     assert!(run.code == 0 || run.err.contains("the truth is another"), "{}", run.err);
+}
+
+#[test]
+fn nothing_of_anybody_else_is_replaced() {
+    let bench = Bench::new("others");
+    fs::write(bench.path("recipe.toml"), "mine").unwrap();
+    let tile = format!("slide tile --at 0,0 --size 64,64 --out recipe.toml {TINY}");
+    let run = bench.run(&tile);
+    assert!(run.code == 2 && run.err.contains("recipe.toml"), "{}", run.err);
+    let sweep = "sweep --frames 1 --vary focus.centre_um=1,2 --out";
+    for (folder, file) in [("full", "notes.txt"), ("table", "sweep.csv"), ("more", "0002")] {
+        fs::create_dir(bench.path(folder)).unwrap();
+        fs::write(bench.path(folder).join(file), "mine").unwrap();
+        let before = bench.files(folder);
+        let run = bench.run(&format!("{sweep} {folder} {TINY}"));
+        assert!(run.code == 2 && run.err.contains(file), "{folder}: {}", run.err);
+        assert_eq!(bench.files(folder), before);
+    }
+    #[cfg(unix)]
+    {
+        fs::create_dir_all(bench.path("links")).unwrap();
+        fs::create_dir(bench.path("elsewhere")).unwrap();
+        std::os::unix::fs::symlink(bench.path("elsewhere"), bench.path("links/0000")).unwrap();
+        let run = bench.run(&format!("{sweep} links {TINY}"));
+        assert!(run.code == 2 && run.err.contains("0000"), "{}", run.err);
+        assert!(bench.files("elsewhere").is_empty());
+    }
+    let run = bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));
+    assert!(run.code == 2 && run.err.contains("varied already") && !bench.path("twice").exists(), "{}", run.err);
+    let run = bench.run(&format!("generate --out range --range 1..3 --frames-per-shard 2 {TINY}"));
+    assert!(run.code == 2 && run.err.contains("multiple of 2") && !bench.path("range").exists(), "{}", run.err);
+}
+
+#[test]
+fn numbers_of_frames_take_no_memory() {
+    let bench = Bench::new("vast");
+    bench.good(&format!("generate --out out --frames 1 {TINY}"));
+    let most = u64::MAX;
+    let run = bench.run_within(500_000, &format!("status out --frames {most} --missing"));
+    assert_eq!((run.code, run.out.trim()), (0, format!("1-{}", most - 1).as_str()), "{}", run.err);
+    let run = bench.run_within(500_000, &format!("status out --frames {most} --missing --tasks 3"));
+    assert_eq!((run.code, run.out.trim()), (0, "0-2"), "{}", run.err);
+    let run = bench.run_within(500_000, &format!("merge out --frames {most}"));
+    assert!(run.code == 2 && run.err.contains("shards are missing"), "{}", run.err);
+    // It begins, and makes frame after frame until it is stopped.
+    let words = format!("generate --json --threads 1 --out many --format folder --frames {most} {TINY}");
+    let mut child = bench.spawn_heard(&words);
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert!(lines.nth(2).unwrap().unwrap().contains("\"done\":2"));
+    child.kill().unwrap();
+    child.wait().unwrap();
 }
 
 #[test]

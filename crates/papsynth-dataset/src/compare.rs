@@ -13,7 +13,7 @@ use crate::merge::document;
 /// Indices of all recorded frames, in order.
 ///
 /// # Errors
-/// If a record cannot be read.
+/// If a record cannot be read, or is missing of a shard that was merged.
 pub fn frames_of(dataset: &Dataset) -> Result<Vec<u64>, Error> {
     Ok(images_of(dataset)?.into_keys().collect())
 }
@@ -21,10 +21,10 @@ pub fn frames_of(dataset: &Dataset) -> Result<Vec<u64>, Error> {
 /// Of every recorded frame, by index, the slide and where its image lies.
 ///
 /// # Errors
-/// If a record cannot be read.
+/// If a record cannot be read, or is missing of a shard that was merged.
 pub fn images_of(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Error> {
     let mut images = BTreeMap::new();
-    for shard in recorded_shards(&dataset.folder)? {
+    for shard in dataset.shards()? {
         for frame in read_record(&dataset.folder, shard)?.frames {
             let [image, _] = dataset.images_of(&frame, shard);
             images.insert(frame.index, (frame.slide, image.unwrap_or_default()));

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use papsynth::Plane;
 
 use crate::coco::{Document, Image};
-use crate::dataset::{Dataset, recorded_shards};
+use crate::dataset::Dataset;
 use crate::error::{Error, Problem};
 use crate::files::sha256;
 use crate::formats::Format;
@@ -128,7 +128,7 @@ impl Source {
     /// Every frame with its shard, by index.
     fn frames(&self) -> Result<Vec<(u64, u64)>, Error> {
         let mut frames = Vec::new();
-        for shard in recorded_shards(&self.dataset.folder)? {
+        for shard in self.dataset.shards()? {
             frames.extend(self.record(shard)?.frames.iter().map(|frame| (frame.index, shard)));
         }
         if frames.is_empty() {
@@ -145,7 +145,13 @@ impl Source {
     }
 
     fn shard(&self, shard: u64) -> Result<Open, Error> {
-        Ok(Open { record: self.record(shard)?, document: document(&self.dataset.folder, shard)? })
+        let record = self.record(shard)?;
+        for file in &record.files {
+            if let Some(message) = self.dataset.folder.flaw(file, Check::Hashes)? {
+                return self.refuse(format!("{} {message}; `papsynth verify` says what is wrong", file.path));
+            }
+        }
+        Ok(Open { record, document: document(&self.dataset.folder, shard)? })
     }
 
     /// Hands over the planes of a frame.

@@ -1,5 +1,6 @@
 //! The folder of a data set: begun, resumed, completed.
 
+use std::collections::BTreeSet;
 use std::fmt::{self, Formatter};
 use std::fs;
 use std::io;
@@ -100,8 +101,11 @@ impl Dataset {
     fn begun(&self, given: &[(String, Vec<u8>)]) -> Result<(), Error> {
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
         match stranger(&self.folder)? {
-            None => merge::write_manifest(self, &[], &[], 0).map(|_| ())?,
+            // Of several that begin at once one is the first.
+            None if merge::begin_manifest(self)? => {}
+            None => self.compare_or_restore(&recipe)?,
             Some(_) if self.folder.has(layout::MANIFEST)? => self.compare_or_restore(&recipe)?,
+            Some(_) if self.restore()? => {}
             Some(name) => {
                 return Err(Error::Folder {
                     path: self.folder.root().to_owned(),
@@ -224,16 +228,40 @@ impl Dataset {
     fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
         match self.compare(recipe) {
             Err(damaged @ Error::Input { .. }) => {
-                for shard in recorded_shards(&self.folder)? {
-                    let Ok(record) = read_record(&self.folder, shard) else { continue };
-                    if record.identity == self.identity && record.layout == self.layout {
-                        return merge::write_manifest(self, &[], &[], 0).map(|_| ());
-                    }
+                if self.restore()? {
+                    Ok(())
+                } else {
+                    Err(damaged)
                 }
-                Err(damaged)
             }
             compared => compared,
         }
+    }
+
+    /// Writes the manifest anew if the shards that are recorded are of this data set.
+    fn restore(&self) -> Result<bool, Error> {
+        for shard in recorded_shards(&self.folder)? {
+            let Ok(record) = read_record(&self.folder, shard) else { continue };
+            if record.identity == self.identity && record.layout == self.layout {
+                merge::write_manifest(self, &[], &[], 0)?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Numbers of all recorded shards, in order.
+    ///
+    /// # Errors
+    /// If there are fewer than were merged, or the system refuses to read.
+    pub(crate) fn shards(&self) -> Result<Vec<u64>, Error> {
+        let (merged, shards) = (Manifest::read(&self.folder)?.shards, recorded_shards(&self.folder)?);
+        if (shards.len() as u64) < merged {
+            let lost = merged - shards.len() as u64;
+            let message = format!("{lost} of {merged} shards have lost their records; `papsynth verify` says which");
+            return Err(Error::Folder { path: self.path().to_owned(), message });
+        }
+        Ok(shards)
     }
 
     /// The data set that lies in the folder must be this one.
@@ -266,21 +294,27 @@ impl Dataset {
     /// Where the recipe in the folder first differs.
     fn first_difference(&self, recipe: &str) -> String {
         let there = self.folder.inside(layout::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
-        let Some(there) = there else { return String::new() };
-        let mut section = "";
-        for (there, here) in there.lines().zip(recipe.lines()) {
-            if there != here {
-                return format!(
-                    " ({section}{}`{there}` there, `{here}` here)",
-                    if section.is_empty() { "" } else { ": " }
-                );
-            }
-            if here.starts_with('[') {
-                section = here;
+        let read = |text: &str| toml::from_str::<toml::Table>(text).ok();
+        let both = there.and_then(|there| read(&there)).zip(read(recipe));
+        let difference = both.and_then(|(there, here)| difference("", &there, &here));
+        difference.map_or_else(String::new, |difference| format!(" ({difference})"))
+    }
+}
+
+/// The first field in which two recipes differ, and its values.
+fn difference(section: &str, there: &toml::Table, here: &toml::Table) -> Option<String> {
+    let names: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
+    names.into_iter().find_map(|name| {
+        let field = if section.is_empty() { name.clone() } else { format!("{section}.{name}") };
+        match (there.get(name), here.get(name)) {
+            (Some(toml::Value::Table(there)), Some(toml::Value::Table(here))) => difference(&field, there, here),
+            (there, here) if there == here => None,
+            (there, here) => {
+                let shown = |value: Option<&toml::Value>| value.map_or("nothing".to_owned(), toml::Value::to_string);
+                Some(format!("`{field}` is {} there, {} here", shown(there), shown(here)))
             }
         }
-        String::new()
-    }
+    })
 }
 
 /// Something in a folder, if it is there and not empty. What was never finished does not count.

@@ -164,6 +164,17 @@ impl Folder {
         output.into_pending()?.commit_if_new(self)
     }
 
+    /// Writes a file unless there is one of that name. Says whether it did; of two that try at once one does, but in an object store.
+    pub(crate) fn write_unless_there(
+        &self,
+        name: &str,
+        fill: impl FnOnce(&mut Output) -> Result<(), Error>,
+    ) -> Result<bool, Error> {
+        let mut output = Output::new(self.pending(name)?)?;
+        fill(&mut output)?;
+        output.into_pending()?.commit_unless_there()
+    }
+
     /// Opens a file that will have this name once it is committed.
     pub(crate) fn pending(&self, name: &str) -> Result<Pending, Error> {
         // A link that has the name itself is replaced, and not followed.
@@ -390,6 +401,21 @@ impl Pending {
             self.rename()?;
         }
         Ok(record)
+    }
+
+    /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.
+    fn commit_unless_there(mut self) -> Result<bool, Error> {
+        self.seal().map_err(Error::io("write", &self.path))?;
+        if self.remote.is_none() {
+            match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
+                // The temporary name goes with this.
+                Ok(()) => return Ok(true),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(false),
+                // Not every file system has a second name for a file.
+                Err(_) => {}
+            }
+        }
+        self.rename().map(|()| true)
     }
 
     fn seal(&mut self) -> io::Result<FileRecord> {

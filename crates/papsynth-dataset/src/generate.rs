@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
@@ -66,6 +66,24 @@ pub struct Outcome {
     pub stopped: bool,
 }
 
+/// Shards with the same number of others between them: there may be more of them than numbers fit into memory.
+#[derive(Debug, Clone, Copy)]
+struct Shards {
+    first: u64,
+    step: u64,
+    count: u64,
+}
+
+impl Shards {
+    fn get(&self, place: u64) -> Option<u64> {
+        (place < self.count).then(|| self.first + place * self.step)
+    }
+
+    fn last(&self) -> Option<u64> {
+        self.get(self.count.checked_sub(1)?)
+    }
+}
+
 impl Dataset {
     /// Makes the shards of a range of frames that are not whole, and reports each frame as it is done, in any order.
     ///
@@ -80,13 +98,15 @@ impl Dataset {
             return Err(Error::Folder { path: self.path().to_owned(), message });
         }
         let shards = self.shards_of(run)?;
-        let wanted = shards.iter().map(|shard| range_len(&self.frames_of(*shard, run))).sum::<u64>();
-        let (next, kept, made) = (AtomicUsize::new(0), AtomicU64::new(0), AtomicU64::new(0));
+        let wanted = shards.last().map_or(0, |last| {
+            (shards.count - 1) * self.layout.frames_per_shard + range_len(&self.frames_of(last, run))
+        });
+        let (next, kept, made) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
         let failure = Mutex::new(None);
         let failed = AtomicBool::new(false);
         let work = || {
             while !run.stop.load(Ordering::Relaxed) && !failed.load(Ordering::Relaxed) {
-                let Some(&shard) = shards.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+                let Some(shard) = shards.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
                 match self.make(engine, shard, run, report) {
                     Ok(Made::Now(frames)) => made.fetch_add(frames, Ordering::Relaxed),
                     Ok(Made::Before(frames)) => kept.fetch_add(frames, Ordering::Relaxed),
@@ -99,7 +119,7 @@ impl Dataset {
                 };
             }
         };
-        let workers = run.at_once.min(shards.len());
+        let workers = run.at_once.min(usize::try_from(shards.count).unwrap_or(usize::MAX));
         if workers <= 1 {
             work();
         } else {
@@ -112,21 +132,16 @@ impl Dataset {
         Ok(Outcome { kept, made, stopped: kept + made < wanted })
     }
 
-    /// Numbers of the shards that a run makes.
-    ///
-    /// # Errors
-    /// If the run begins within a shard.
-    pub fn shards_of(&self, run: &Run) -> Result<Vec<u64>, Error> {
+    /// The shards that a run makes.
+    fn shards_of(&self, run: &Run) -> Result<Shards, Error> {
         let (frames, each, Share { index, of }) = (&run.frames, self.layout.frames_per_shard, run.share);
-        if frames.start % each != 0 && !frames.is_empty() {
-            let message = format!(
-                "frames {}..{} begin within a shard; with {each} frames a shard a range begins at a multiple of {each}",
-                frames.start, frames.end
-            );
+        if let Some(message) = self.layout.refusal_of(frames) {
             return Err(Error::Folder { path: self.path().to_owned(), message });
         }
-        let shards = frames.start / each..frames.end.div_ceil(each).max(frames.start / each);
-        Ok(shards.filter(|shard| shard % of.max(1) == index).collect())
+        let (start, end, step) = (frames.start / each, frames.end.div_ceil(each), of.max(1));
+        // The first from the start on that leaves `index` when divided by the number of shares.
+        let first = start.saturating_add((index % step + step - start % step) % step);
+        Ok(Shards { first, step, count: end.saturating_sub(first).div_ceil(step) })
     }
 
     /// The frames of a shard that a run makes.

@@ -111,24 +111,25 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     Ok(overview)
 }
 
-/// Numbers of the shards that lack a frame of a range, or that are not whole by the sizes of their files: from their records alone, so that it can be asked
+/// The shards that lack a frame of a range, or that are not whole by the sizes of their files: from their records alone, so that it can be asked
 /// while others write.
 ///
 /// # Errors
 /// If the system refuses to read.
-pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<u64>, Error> {
+pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<Range<u64>>, Error> {
     let each = dataset.layout.frames_per_shard;
     let dataset = &Dataset { folder: dataset.folder.listed()?, ..dataset.clone() };
+    let all = frames.start / each..frames.end.div_ceil(each);
+    let (mut missing, mut next) = (Vec::new(), all.start);
     // Most that are missing are known by that alone.
-    let recorded = recorded_shards(&dataset.folder)?;
-    let mut missing = Vec::new();
-    for shard in frames.start / each..frames.end.div_ceil(each) {
+    for shard in recorded_shards(&dataset.folder)?.into_iter().filter(|shard| all.contains(shard)) {
         let room = dataset.frames_of_shard(shard);
         let wanted = room.start.max(frames.start)..room.end.min(frames.end);
-        let is_whole = || dataset.whole(shard, Check::Sizes).map(|found| found.is_some_and(|r| r.covers(&wanted)));
-        if recorded.binary_search(&shard).is_err() || !is_whole()? {
-            missing.push(shard);
+        if dataset.whole(shard, Check::Sizes)?.is_some_and(|record| record.covers(&wanted)) {
+            missing.extend((next < shard).then_some(next..shard));
+            next = shard + 1;
         }
     }
+    missing.extend((next < all.end).then_some(next..all.end));
     Ok(missing)
 }

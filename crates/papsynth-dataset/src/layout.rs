@@ -1,6 +1,7 @@
 //! How a data set lies in files, and which file lies where.
 
 use std::fmt::{self, Formatter};
+use std::ops::Range;
 
 use papsynth::truth::Group;
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,18 @@ impl Layout {
         let many = formats.iter().any(|format| format.is_sharded());
         let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
         Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: crate::parquet::IS_HERE }
+    }
+
+    /// Why a range of frames cannot be made, if it cannot: it begins within a shard.
+    #[must_use]
+    pub fn refusal_of(&self, frames: &Range<u64>) -> Option<String> {
+        let each = self.frames_per_shard;
+        (!frames.is_empty() && !frames.start.is_multiple_of(each)).then(|| {
+            format!(
+                "frames {}..{} begin within a shard; with {each} frames a shard a range begins at a multiple of {each}",
+                frames.start, frames.end
+            )
+        })
     }
 
     /// A layout that was read is one that can be written.

@@ -270,6 +270,13 @@ pub(crate) fn write_manifest(
         .write_if_new(layout::MANIFEST, |out| manifest(dataset, WRITER, merged, shards, frames, &mut |b| out.bytes(b)))
 }
 
+/// The manifest of a data set without a frame, unless there is any manifest by now. Says whether it was written.
+pub(crate) fn begin_manifest(dataset: &Dataset) -> Result<bool, Error> {
+    dataset
+        .folder
+        .write_unless_there(layout::MANIFEST, |out| manifest(dataset, WRITER, &[], &[], 0, &mut |b| out.bytes(b)))
+}
+
 /// The SHA-256 of the manifest of all shards that are recorded.
 pub(crate) fn manifest_sha256(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<String, Error> {
     let shards = recorded_shards(&dataset.folder)?;

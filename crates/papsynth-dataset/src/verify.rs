@@ -116,6 +116,9 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
             find(file.path.clone(), message, Mend::Generate);
         }
     }
+    if merged.is_empty() {
+        listed.extend(merge::given(&dataset).map(str::to_owned).chain(named_map(folder)));
+    }
     let given = given_flaws(&dataset, &merged)?;
     let is_known = given.is_empty();
     for Flaw { path, message } in given {
@@ -159,7 +162,11 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
     let identity = &dataset.identity;
     for (name, sha256) in [(layout::RECIPE, &identity.recipe_sha256), (layout::MODEL, &identity.model_sha256)] {
         // A data set that was only begun lists none; of one that is merged, none is left out.
-        if !merged.is_empty() && record(name).is_none_or(|file| file.sha256 != *sha256) {
+        let is_it = match merged.is_empty() {
+            true => folder.has(name)? && folder.record(name)?.sha256 == *sha256,
+            false => record(name).is_some_and(|file| file.sha256 == *sha256),
+        };
+        if !is_it {
             flaws.push(flaw(name, "is not what the manifest says the data set is made from"));
         }
     }
@@ -181,10 +188,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
     if dataset.categories != categories(&recipe) {
         flaws.push(flaw(layout::MANIFEST, "names other categories than the recipe gives"));
     }
-    let named = match &recipe.layout {
-        recipe::Layout::Map { path } | recipe::Layout::Labels { path, .. } => Some(path),
-        _ => None,
-    };
+    let named = map_of(&recipe);
     match (named, &dataset.map) {
         (Some(named), None) => flaws.push(flaw(named, "is missing from the list of files")),
         (_, Some(kept)) if named != Some(kept) => flaws.push(flaw(kept, "follows neither from recipe nor from shards")),
@@ -197,6 +201,20 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
         _ => {}
     }
     Ok(flaws)
+}
+
+/// The map that a recipe names.
+fn map_of(recipe: &Recipe) -> Option<&String> {
+    match &recipe.layout {
+        recipe::Layout::Map { path } | recipe::Layout::Labels { path, .. } => Some(path),
+        _ => None,
+    }
+}
+
+/// The map that the recipe in a folder names, if there is a recipe that this program reads.
+fn named_map(folder: &Folder) -> Option<String> {
+    let text = read::bytes(&folder.inside(layout::RECIPE).ok()?, GIVEN_BYTES).ok()?;
+    map_of(&toml::from_str(&String::from_utf8_lossy(&text)).ok()?).cloned()
 }
 
 /// Merged files that are not as the shards make them.
@@ -247,7 +265,8 @@ pub struct Cleaned {
 /// Removes from a data set what killed runs left behind and, if wanted, everything else that is none of its files.
 ///
 /// # Errors
-/// If there is no data set, a record cannot be read (then strays cannot be told), or the system refuses.
+/// If there is no data set, strays cannot be told (a record cannot be read, or not all shards are merged yet, so that others may be at work),
+/// or the system refuses.
 pub fn clean(home: impl Into<Home>, strays: bool) -> Result<Cleaned, Error> {
     let folder = Folder::new(home);
     clean_in(&folder, strays).map_err(|error| folder.named(error))
@@ -259,9 +278,15 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
     if !strays {
         return Ok(cleaned);
     }
+    let shards = recorded_shards(folder)?;
+    if shards.is_empty() || manifest.shards != shards.len() as u64 {
+        let message =
+            "what others are writing cannot be told from strays before `papsynth merge` has closed the data set";
+        return Err(Error::Folder { path: folder.root().to_owned(), message: message.to_owned() });
+    }
     let mut listed: BTreeSet<String> = manifest.files.into_iter().map(|file| file.path).collect();
     listed.insert(layout::MANIFEST.to_owned());
-    for shard in recorded_shards(folder)? {
+    for shard in shards {
         listed.insert(layout::record(shard));
         listed.extend(read_record(folder, shard)?.files.into_iter().map(|file| file.path));
     }

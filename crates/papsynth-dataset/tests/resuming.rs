@@ -45,11 +45,29 @@ fn another_data_set_in_the_folder_is_refused_by_what_differs() {
     refused(open_with(scratch.path(), &recipe, &model, 12), "seed 11, not 12");
     let mut other = recipe.clone();
     other.focus.planes = 7.0.into();
-    refused(open_with(scratch.path(), &other, &model, SEED), "[focus]: `planes = 1");
+    refused(open_with(scratch.path(), &other, &model, SEED), "`focus.planes` is 1");
     let mut other = model.clone();
     other.provenance.clear();
     refused(open_with(scratch.path(), &recipe, &other, SEED), "another model");
     assert!(open(scratch.path()).is_ok());
+}
+
+#[test]
+fn of_several_that_begin_at_once_one_is_the_first() {
+    for round in 0..30 {
+        let scratch = Scratch::new(&format!("at-once-{round}"));
+        let (recipe, model) = (recipe(), Model::builtin());
+        let begun: Vec<u64> = std::thread::scope(|scope| {
+            let begin = |seed: u64| {
+                let (recipe, model, path) = (&recipe, &model, scratch.path());
+                scope.spawn(move || open_with(path, recipe, model, seed).ok().map(|_| seed))
+            };
+            let all: Vec<_> = (0..4).map(begin).collect();
+            all.into_iter().filter_map(|begun| begun.join().unwrap()).collect()
+        });
+        assert_eq!(begun.len(), 1, "{begun:?}");
+        assert_eq!(Dataset::open(scratch.path()).unwrap().identity().seed, begun[0]);
+    }
 }
 
 #[test]

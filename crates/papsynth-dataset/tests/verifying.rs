@@ -110,6 +110,8 @@ fn every_file_that_is_gone_or_too_many_is_found() {
         fs::remove_file(&path).unwrap();
         if name == "manifest.json" {
             assert!(verify(scratch.path(), None).is_err());
+            fill(scratch.path(), 2);
+            assert_eq!(fs::read(&path).unwrap(), bytes);
         } else {
             let verdict = look(scratch.path());
             // Without its record a shard is not there: its frames are missing, its files too many.
@@ -128,6 +130,57 @@ fn every_file_that_is_gone_or_too_many_is_found() {
     assert_eq!(clean(scratch.path(), true).unwrap().strays, 1);
     assert!(look(scratch.path()).root.is_some());
     assert!(verify(scratch.path(), Some(0..9)).unwrap().findings[0].message.contains("frame"));
+}
+
+#[test]
+fn before_it_is_merged_nothing_is_taken_for_a_stray() {
+    let scratch = Scratch::new("unmerged");
+    let recipe =
+        papsynth::recipe::Recipe { layout: papsynth::recipe::Layout::Map { path: "map.png".to_owned() }, ..recipe() };
+    let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
+    let map = papsynth_dataset::read::InputFile { name: "map.png".to_owned(), bytes: b"a map".to_vec() };
+    let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: Some(&map), layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let one = frame(0, 1, 8, 1);
+    let mut writer = dataset.shard_writer(0).unwrap();
+    writer.begin(&one.finished.scene).unwrap();
+    writer.write_plane(&one.planes[0]).unwrap();
+    writer.end(&one.finished).unwrap();
+    writer.commit().unwrap();
+    // Somebody is writing the second frame.
+    fs::write(scratch.join("images/000001.png"), "half of it").unwrap();
+    let before = contents(scratch.path());
+    let found = verify(scratch.path(), None).unwrap().findings;
+    // That it is not merged is one finding.
+    let paths: Vec<&str> = found.iter().map(|finding| finding.path.as_str()).collect();
+    assert_eq!(paths, ["images/000001.png", "manifest.json"]);
+    let refused = clean(scratch.path(), true).unwrap_err();
+    assert!(!refused.is_io() && refused.to_string().contains("merge"), "{refused}");
+    assert_eq!(contents(scratch.path()), before);
+    fs::write(scratch.join("model.json"), "{}").unwrap();
+    assert!(is_found(&verify(scratch.path(), None).unwrap(), "model.json"));
+    fs::remove_file(scratch.join("recipe.toml")).unwrap();
+    assert!(is_found(&verify(scratch.path(), None).unwrap(), "recipe.toml"));
+}
+
+#[test]
+fn what_is_damaged_is_not_converted() {
+    let scratch = make("convert-damaged");
+    let to = Scratch::new("convert-to");
+    let layout = Layout::new([Format::Cellpose]);
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let convert = || papsynth_dataset::convert(scratch.path(), to.path(), &layout, &stop, &|_| ());
+    for (name, lost) in [("noise-free/000001.tif", false), ("images/000001.png", false), ("shards/000001.json", true)] {
+        let path = scratch.join(name);
+        let good = fs::read(&path).unwrap();
+        let mut bytes = good.clone();
+        *bytes.last_mut().unwrap() ^= 1;
+        if lost { fs::remove_file(&path) } else { fs::write(&path, bytes) }.unwrap();
+        let error = convert().unwrap_err();
+        assert!(!error.is_io() && error.to_string().contains(if lost { "shards" } else { name }), "{error}");
+        fs::write(path, good).unwrap();
+    }
+    assert_eq!(convert().unwrap().made, 3);
 }
 
 #[test]

@@ -218,7 +218,7 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
         return Err(PyValueError::new_err(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
     }
     let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames));
-    found.map_err(|error| error::dataset(&error))
+    Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 
 /// Reads every file of a data set.

@@ -61,7 +61,8 @@ pub(crate) enum Shards {
 #[derive(Debug, Args)]
 pub(crate) struct ShareArgs {
     /// Make every N-th shard from the I-th on (0/4 to 3/4 make all); `auto` asks the environment of a Slurm array, `auto/N`
-    /// that of a Kubernetes job of N completions. Close the data set with `papsynth merge` afterwards
+    /// that of a Kubernetes job of N completions. Close the data set with `papsynth merge`, a slide with
+    /// `papsynth slide finalize` afterwards
     #[arg(long, value_name = "I/N", value_parser = parse_share)]
     pub(crate) shard: Option<Shards>,
 }
