@@ -263,7 +263,8 @@ fn nothing_of_anybody_else_is_replaced() {
         assert!(run.code == 2 && run.err.contains("0000"), "{}", run.err);
         assert!(bench.files("elsewhere").is_empty());
     }
-    let run = bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));
+    let run =
+        bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));
     assert!(run.code == 2 && run.err.contains("varied already") && !bench.path("twice").exists(), "{}", run.err);
     let run = bench.run(&format!("generate --out range --range 1..3 --frames-per-shard 2 {TINY}"));
     assert!(run.code == 2 && run.err.contains("multiple of 2") && !bench.path("range").exists(), "{}", run.err);
