@@ -101,7 +101,7 @@ pub(crate) struct Clean {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Remove every file that the data set does not name, whoever put it there
+    /// Remove every file that the data set does not name, whoever put it there; once it is merged, since before others may be writing
     #[arg(long)]
     pub(crate) strays: bool,
 }
