@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     let interrupt = Interrupt::watch()?;
     let mut table = csv_line(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
     for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
-        let name = format!("{number:04}");
+        let name = set_name(number);
         let out = args.out.join(&name);
         render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
         for image in rows(&out)? {
@@ -87,7 +87,8 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
         let name = entry.file_name().to_string_lossy().into_owned();
         // Not followed: a link leads out of the folder.
         let kind = entry.file_type().map_err(|error| Failure::file("read", &entry.path(), &error))?;
-        let is_set = kind.is_dir() && (0..count).any(|number| name == format!("{number:04}"));
+        let number = name.parse().ok().filter(|number| *number < count && name == set_name(*number));
+        let is_set = kind.is_dir() && number.is_some();
         if name == TABLE && kind.is_file() {
             text_file::may_replace(&entry.path(), COLUMNS.join(",").as_bytes(), "the table of an older sweep")?;
         } else if !is_set && !name.starts_with('.') {
@@ -95,6 +96,11 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// The name of a data set of a sweep.
+fn set_name(number: usize) -> String {
+    format!("{number:04}")
 }
 
 fn axis(text: &str) -> Result<Axis, Failure> {

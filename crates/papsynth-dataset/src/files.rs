@@ -159,9 +159,7 @@ impl Folder {
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<FileRecord, Error> {
-        let mut output = Output::new(self.pending(name)?)?;
-        fill(&mut output)?;
-        output.into_pending()?.commit_if_new(self)
+        self.filled(name, fill)?.commit_if_new(self)
     }
 
     /// Writes a file unless there is one of that name. Says whether it did; of two that try at once one does, but in an object store.
@@ -170,9 +168,13 @@ impl Folder {
         name: &str,
         fill: impl FnOnce(&mut Output) -> Result<(), Error>,
     ) -> Result<bool, Error> {
+        self.filled(name, fill)?.commit_unless_there()
+    }
+
+    fn filled(&self, name: &str, fill: impl FnOnce(&mut Output) -> Result<(), Error>) -> Result<Pending, Error> {
         let mut output = Output::new(self.pending(name)?)?;
         fill(&mut output)?;
-        output.into_pending()?.commit_unless_there()
+        output.into_pending()
     }
 
     /// Opens a file that will have this name once it is committed.

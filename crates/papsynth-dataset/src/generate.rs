@@ -75,6 +75,16 @@ struct Shards {
 }
 
 impl Shards {
+    /// A share of these numbers.
+    fn of(numbers: Range<u64>, Share { index, of }: Share) -> Self {
+        let step = of.max(1);
+        // No number leaves more than it is divided by.
+        let end = if index < step { numbers.end } else { numbers.start };
+        // The first from the start on that leaves `index`.
+        let first = numbers.start.saturating_add((index % step + step - numbers.start % step) % step);
+        Self { first, step, count: end.saturating_sub(first).div_ceil(step) }
+    }
+
     fn get(&self, place: u64) -> Option<u64> {
         (place < self.count).then(|| self.first + place * self.step)
     }
@@ -134,14 +144,11 @@ impl Dataset {
 
     /// The shards that a run makes.
     fn shards_of(&self, run: &Run) -> Result<Shards, Error> {
-        let (frames, each, Share { index, of }) = (&run.frames, self.layout.frames_per_shard, run.share);
+        let (frames, each) = (&run.frames, self.layout.frames_per_shard);
         if let Some(message) = self.layout.refusal_of(frames) {
             return Err(Error::Folder { path: self.path().to_owned(), message });
         }
-        let (start, end, step) = (frames.start / each, frames.end.div_ceil(each), of.max(1));
-        // The first from the start on that leaves `index` when divided by the number of shares.
-        let first = start.saturating_add((index % step + step - start % step) % step);
-        Ok(Shards { first, step, count: end.saturating_sub(first).div_ceil(step) })
+        Ok(Shards::of(frames.start / each..frames.end.div_ceil(each), run.share))
     }
 
     /// The frames of a shard that a run makes.
@@ -192,4 +199,24 @@ enum Made {
     Before(u64),
     Now(u64),
     Stopped,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_what_leaves_its_number_when_divided() {
+        for (start, end) in [(0, 0), (0, 1), (0, 17), (5, 17), (6, 6), (9, 4)] {
+            for (index, of) in [(0, 1), (0, 4), (1, 4), (3, 4), (4, 4), (7, 4), (16, 40), (30, 40)] {
+                let shards = Shards::of(start..end, Share { index, of });
+                let found: Vec<u64> = (0..).map_while(|place| shards.get(place)).collect();
+                let slow: Vec<u64> = (start..end).filter(|number| number % of == index).collect();
+                assert_eq!(found, slow, "{index}/{of} of {start}..{end}");
+                assert_eq!(shards.last(), slow.last().copied());
+            }
+        }
+        let all = Shards::of(0..u64::MAX, Share::ALL);
+        assert_eq!((all.get(7), all.last()), (Some(7), Some(u64::MAX - 1)));
+    }
 }
