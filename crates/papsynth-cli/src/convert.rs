@@ -3,15 +3,11 @@
 use papsynth_dataset::Progress;
 
 use crate::args::Convert;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Complaint, Failure, counted};
 use crate::interrupt::Interrupt;
 
 pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
-    if args.layout.format.is_empty() {
-        let complaint = Complaint::new("into which formats?").help("name them: --format cellpose,yolo-seg");
-        return Err(Failure::input(complaint));
-    }
-    let (layout, _) = args.layout.layout(0);
+    let layout = args.files.layout(args.format.clone());
     let interrupt = Interrupt::watch()?;
     let report = |_: Progress| ();
     let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, interrupt.flag(), &report)?;
@@ -24,5 +20,5 @@ pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
         return Ok(());
     }
     let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
-    exit::print(&format!("{out}: {} frames written{there}\n", outcome.made))
+    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.made, "frame", "frames")))
 }

@@ -153,6 +153,7 @@ impl Failure {
             | io::ErrorKind::IsADirectory
             | io::ErrorKind::NotADirectory
             | io::ErrorKind::AlreadyExists
+            | io::ErrorKind::InvalidFilename
             | io::ErrorKind::InvalidInput => Exit::Input,
             _ => Exit::Io,
         };
@@ -209,6 +210,11 @@ pub(crate) fn install_reports() {
 pub(crate) fn note(text: &str) {
     // Whoever has closed it does not want to know.
     let _ = writeln!(io::stderr().lock(), "note: {text}");
+}
+
+/// A number and what is counted.
+pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 /// Writes to standard output. Whoever closed the pipe has seen enough: that is no failure.

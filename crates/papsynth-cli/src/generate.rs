@@ -3,9 +3,9 @@
 use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth_dataset::memory::{Fit, Need, shown};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Layout, Progress as Step, Run, Share};
+use papsynth_dataset::{Dataset, DatasetInfo, Error, Layout, Progress as Step, Run, Share};
 
-use crate::args::{Generate, LayoutArgs};
+use crate::args::{Generate, LayoutArgs, check_of};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::memory;
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     };
     let start = Start { dir: args.out.clone(), seed, frames: count, threads: working, memory: fit.bytes };
     let progress = Progress::start(args, start)?;
-    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let check = check_of(args.verify);
     let run = Run { frames, share, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
     let step = |step: Step| {
         account.iter().for_each(|account| account.step(step));

@@ -3,13 +3,13 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Overview, inspect};
+use papsynth_dataset::{Overview, inspect};
 
-use crate::args::Inspect;
+use crate::args::{Inspect, check_of};
 use crate::exit::{self, Complaint, Failure};
 
 pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
-    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let check = check_of(args.verify);
     let overview = inspect(&args.dir, check)?;
     if args.json {
         let text = serde_json::to_string_pretty(&overview).unwrap_or_default();

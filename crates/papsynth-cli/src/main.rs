@@ -40,6 +40,7 @@ use args::{Cli, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
+    memory::settle();
     exit::install_reports();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

@@ -25,8 +25,14 @@ pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
     }
 }
 
-/// An address where only folders are known would become a folder of that name.
+/// An address where only folders are known would become a folder of that name, and so would one that is mistyped.
 pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsString>) -> Result<(), Failure> {
+    let words: Vec<_> = words.into_iter().collect();
+    if let Some((word, address)) = words.iter().find_map(|word| Some((word, mistyped(word.to_str()?)?))) {
+        let message = format!("{}: begins as an address of an object store and is none", word.display());
+        let help = format!("write {address} for an object store, ./{} for a folder", word.display());
+        return Err(Failure::input(Complaint::new(message).help(help)));
+    }
     if matches!(
         verb,
         Verb::Generate(_) | Verb::Status(_) | Verb::Merge(_) | Verb::Verify(_) | Verb::Clean(_) | Verb::Submit(_)
@@ -41,4 +47,11 @@ pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsStr
         }
         None => Ok(()),
     }
+}
+
+/// The address of an object store that was meant by one with too few strokes.
+fn mistyped(word: &str) -> Option<String> {
+    let (scheme, rest) = word.split_once(":/")?;
+    let is_store = matches!(scheme, "s3" | "gs" | "az") && !rest.starts_with('/');
+    is_store.then(|| format!("{scheme}://{rest}"))
 }

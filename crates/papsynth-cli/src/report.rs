@@ -9,7 +9,7 @@ use papsynth_dataset::{Outcome, Progress as Step, Share};
 use serde_json::json;
 
 use crate::args::Generate;
-use crate::exit::{self, Failure};
+use crate::exit::{self, Failure, counted};
 use crate::memory;
 
 /// Lines that a run prints at most, however many frames it makes.
@@ -119,7 +119,7 @@ impl Progress {
             })),
             Style::Quiet => Ok(()),
             Style::Bar | Style::Lines => {
-                let (dir, frames) = (dir.display(), if *made == 1 { "frame" } else { "frames" });
+                let (dir, frames) = (dir.display(), counted(*made, "frame", "frames"));
                 let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
                 let next = match share {
                     Share::ALL => format!("Look at: {dir}/contact-sheet.png"),
@@ -127,7 +127,7 @@ impl Progress {
                         format!("That was share {index} of {of}; when all are done: papsynth merge {dir} --frames …")
                     }
                 };
-                exit::print(&format!("{dir}: {made} {frames} made{there}\n{next}\n"))
+                exit::print(&format!("{dir}: {frames} made{there}\n{next}\n"))
             }
         }
     }

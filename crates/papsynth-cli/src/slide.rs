@@ -11,7 +11,7 @@ use crate::text_file;
 #[cfg(feature = "zarr")]
 mod set;
 #[cfg(feature = "zarr")]
-pub(crate) use set::{missing, verify};
+pub(crate) use set::{there, verify};
 
 /// Most pixels of a part that is made as one picture.
 const MOST_PIXELS: u64 = 1 << 28;

@@ -3,32 +3,34 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Dataset, shards_to_make};
+use papsynth_dataset::{Check, Dataset, shards_to_make};
 
-use crate::args::{Merge, Status};
-use crate::exit::{self, Complaint, Failure};
+use crate::args::{Merge, Status, check_of};
+use crate::exit::{self, Complaint, Failure, counted};
 use crate::place;
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
-        let (missing, all) = crate::slide::missing(&args.dir)?;
+        let there = crate::slide::there(&args.dir)?;
         let missing: Vec<Range<u64>> =
-            missing.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
-        return tell(args, &missing, all, &format!("papsynth slide finalize {}", args.dir.display()));
+            there.missing.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
+        let close = (!there.is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
+        return tell(args, &missing, there.shards, close.as_deref());
     }
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let Some(frames) = args.frames else {
         let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
         return Err(Failure::input(complaint.help("only a slide knows by itself how large it will be")));
     };
-    let missing = shards_to_make(&dataset, 0..frames)?;
+    let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
-    tell(args, &missing, all, &format!("papsynth merge {} --frames {frames}", args.dir.display()))
+    let close = format!("papsynth merge {} --frames {frames}", args.dir.display());
+    tell(args, &missing, all, (!dataset.is_finished()?).then_some(&close))
 }
 
-/// What of so many shards is missing, and how to go on if nothing is.
-fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: &str) -> Result<(), Failure> {
+/// What of so many shards is missing, and how to go on if nothing is, unless that was done.
+fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) -> Result<(), Failure> {
     if args.missing {
         let text = match args.tasks {
             Some(tasks) => listed(&of_tasks(missing, tasks)),
@@ -39,18 +41,20 @@ fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: &str) -> Result<
     let whole = all - count(missing);
     let percent = 100.0 * whole as f64 / all as f64;
     exit::print(&format!("{}: {whole} of {all} shards are whole ({percent:.1} %)\n", args.dir.display()))?;
-    match missing.is_empty() {
-        true => exit::print(&format!("Close it with: {close}\n")),
-        false => exit::print(&format!("missing: {}\n", listed(missing))),
+    match close {
+        _ if !missing.is_empty() => exit::print(&format!("missing: {}\n", listed(missing))),
+        Some(close) => exit::print(&format!("Close it with: {close}\n")),
+        None => exit::print("it is closed\n"),
     }
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
-    let missing = shards_to_make(&dataset, 0..args.frames)?;
+    let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {
-        let message = format!("{dir}: {} shards are missing or damaged: {}", count(&missing), listed(&missing));
+        let shards = counted(count(&missing), "shard is", "shards are");
+        let message = format!("{dir}: {shards} missing or damaged: {}", listed(&missing));
         let help = "the command that makes the data set makes them, in any share; then merge again";
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
@@ -61,8 +65,8 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
             Complaint::new(message).help("give the number that was meant, or take away what is too much"),
         ));
     }
-    let (frames, root) = (summary.frames, summary.root);
-    exit::print(&format!("{dir}: {frames} frames\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
+    let (frames, root) = (counted(summary.frames, "frame", "frames"), summary.root);
+    exit::print(&format!("{dir}: {frames}\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
 }
 
 fn count(ranges: &[Range<u64>]) -> u64 {

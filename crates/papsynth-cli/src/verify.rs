@@ -1,13 +1,15 @@
 //! `papsynth verify` and `papsynth clean`: whether a data set is whole, and what does not belong there.
 
-use papsynth_dataset::Mend;
+use std::path::Path;
+
+use papsynth_dataset::{Finding, Mend};
 
 use crate::args::{Clean, Verify};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Complaint, Failure, counted};
 use crate::place;
 
 /// Findings that are printed in full; the rest is counted.
-pub(crate) const MOST: usize = 50;
+const MOST: usize = 50;
 
 pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
@@ -20,36 +22,52 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
         exit::print(&format!("{text}\n"))?;
     } else if let Some(root) = &verdict.root {
-        exit::print(&format!("{dir}: whole, {} frames in {} files\nroot {root}\n", verdict.frames, verdict.files))?;
+        let (frames, files) = (counted(verdict.frames, "frame", "frames"), counted(verdict.files, "file", "files"));
+        exit::print(&format!("{dir}: whole, {frames} in {files}\nroot {root}\n"))?;
     } else {
-        let mut text = String::new();
-        for finding in verdict.findings.iter().take(MOST) {
-            text.push_str(&format!("{}: {}\n", finding.path, finding.message));
-        }
-        if verdict.findings.len() > MOST {
-            text.push_str(&format!("and {} more\n", verdict.findings.len() - MOST));
-        }
-        exit::print(&text)?;
+        print(&verdict.findings)?;
     }
-    let count = verdict.findings.len();
-    if count == 0 {
+    judge(&args.dir, &verdict.findings)
+}
+
+/// Prints what was found, up to a number.
+pub(crate) fn print(findings: &[Finding]) -> Result<(), Failure> {
+    let mut text = String::new();
+    for finding in findings.iter().take(MOST) {
+        text.push_str(&format!("{}: {}\n", finding.path, finding.message));
+    }
+    if findings.len() > MOST {
+        text.push_str(&format!("and {} more\n", findings.len() - MOST));
+    }
+    exit::print(&text)
+}
+
+/// Nothing found is good; else there is something to do.
+pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
+    if findings.is_empty() {
         return Ok(());
     }
-    let things = if count == 1 { "1 thing is".to_owned() } else { format!("{count} things are") };
-    let wants = |mend: Mend| verdict.findings.iter().any(|finding| finding.mend == mend);
+    let things = counted(findings.len() as u64, "thing is", "things are");
+    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
     let mends: Vec<&str> = [
-        (Mend::Generate, "the command that made the data set, with --verify, makes again what is wrong"),
+        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
         (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
     ]
     .into_iter()
     .filter(|(mend, _)| wants(*mend))
     .map(|(_, words)| words)
     .collect();
-    Err(Failure::input(Complaint::new(format!("{dir}: {things} wrong")).help(mends.join("; "))))
+    Err(Failure::input(Complaint::new(format!("{}: {things} wrong", dir.display())).help(mends.join("; "))))
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
     let cleaned = papsynth_dataset::clean(&place::home(&args.dir)?, args.strays)?;
-    let (dir, left, strays) = (args.dir.display(), cleaned.temporary, cleaned.strays);
-    exit::print(&format!("{dir}: {left} files of killed runs and {strays} others removed\n"))
+    let (dir, strays) = (args.dir.display(), counted(cleaned.strays, "other", "others"));
+    let left = counted(cleaned.temporary, "file", "files");
+    exit::print(&format!("{dir}: {left} of killed runs and {strays} removed\n"))?;
+    if cleaned.stayed > 0 {
+        let stay = counted(cleaned.stayed, "file stays", "files stay");
+        exit::note(&format!("{stay}: at work, another user's, or of a name that is no UTF-8"));
+    }
+    Ok(())
 }

@@ -25,14 +25,24 @@ fn shares_make_what_one_run_makes_and_merging_fails_on_any_gap() {
         assert!(run.out.contains("papsynth merge parts"), "{}", run.out);
     }
     let run = bench.run("merge parts --frames 7");
-    assert!(run.code == 2 && run.err.contains("1 shards are missing or damaged: 1"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("1 shard is missing or damaged: 1"), "{}", run.err);
     assert_eq!(bench.good("status parts --frames 7 --missing").out, "1\n");
     assert_eq!(bench.good("status parts --frames 7 --missing --tasks 4").out, "1\n");
     assert!(bench.good("status parts --frames 7").out.contains("3 of 4 shards are whole (75.0 %)"));
     let run =
         bench.run_with(&format!("generate --out parts {frames} --shard auto/4"), &[("JOB_COMPLETION_INDEX", "1")]);
     assert_eq!(run.code, 0, "{}", run.err);
-    bench.good("merge parts --frames 7");
+    // A change that keeps the size is found by reading alone.
+    let path = bench.path("parts/webdataset/000000.tar");
+    let good = fs::read(&path).unwrap();
+    let mut bytes = good.clone();
+    bytes[700] ^= 1;
+    fs::write(&path, &bytes).unwrap();
+    let run = bench.run("merge parts --frames 7 --verify");
+    assert!(run.code == 2 && run.err.contains("1 shard is missing or damaged: 0"), "{}", run.err);
+    fs::write(&path, &good).unwrap();
+    bench.good("merge parts --frames 7 --verify");
+    assert!(bench.good("status parts --frames 7").out.ends_with("it is closed\n"));
     assert_eq!(root(&bench, "parts", 7), whole);
     assert_eq!(bench.files("one"), bench.files("parts"));
     let run = bench.run(&format!("generate --out parts {frames} --shard auto"));
@@ -245,6 +255,15 @@ fn nothing_of_anybody_else_is_replaced() {
     let tile = format!("slide tile --at 0,0 --size 64,64 --out recipe.toml {TINY}");
     let run = bench.run(&tile);
     assert!(run.code == 2 && run.err.contains("recipe.toml"), "{}", run.err);
+    for (out, why) in [
+        ("s3:/bucket/set", "write s3://bucket/set"),
+        ("recipe.toml", "is a file"),
+        ("recipe.toml/set", "lies below a file"),
+    ] {
+        let run = bench.run(&format!("generate --out {out} --frames 1 {TINY}"));
+        assert!(run.code == 2 && run.err.contains(why), "{out}: {}", run.err);
+    }
+    assert!(!bench.path("s3:").exists());
     let sweep = "sweep --frames 1 --vary focus.centre_um=1,2 --out";
     for (folder, file) in [("full", "notes.txt"), ("table", "sweep.csv"), ("more", "0002")] {
         fs::create_dir(bench.path(folder)).unwrap();
@@ -262,6 +281,10 @@ fn nothing_of_anybody_else_is_replaced() {
         let run = bench.run(&format!("{sweep} links {TINY}"));
         assert!(run.code == 2 && run.err.contains("0000"), "{}", run.err);
         assert!(bench.files("elsewhere").is_empty());
+        // Trying again would not help: no code 74.
+        std::os::unix::fs::symlink(bench.path("nowhere"), bench.path("dangling")).unwrap();
+        let run = bench.run(&format!("generate --out dangling --frames 1 {TINY}"));
+        assert!(run.code == 2 && run.err.contains("dangling"), "{}", run.err);
     }
     let run =
         bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));

@@ -32,6 +32,8 @@ fn any_part_of_a_slide_is_made_alone() {
     refused(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=swath", "layout.kind");
     refused(&bench, "slide tile --at 0,0 --out no.png --set optics.imaging=abbe", "optics.imaging");
     refused(&bench, "slide tile --at 27000,27000 --out no.png --set scan.reach_um=20", "scan.reach_um");
+    fs::create_dir(bench.path("folder.png")).unwrap();
+    refused(&bench, "slide tile --at 0,0 --size 20,20 --out folder.png", "folder.png");
     assert!(!bench.path("no.png").exists());
 }
 
@@ -49,6 +51,7 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     let bench = Bench::new("slide-make");
     let make = format!("slide make {SMALL} --out slide --size 900,600 --shard-px 512");
     refused(&bench, &format!("{make} --max-memory 20MB"), "may be used");
+    refused(&bench, &format!("{make} --set scan.reach_um=20"), "scan.reach_um");
     assert!(!bench.path("slide").exists());
     // The same files with as much as one thread needs.
     bench.good(&format!("{make} --threads 8 --max-memory 300MiB"));
@@ -60,7 +63,17 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     assert_eq!(bench.good("status slide --missing").out, "1,3\n");
     assert_eq!(bench.good("status slide --missing --tasks 2").out, "1\n");
     bench.good(&format!("{make} --shard 1/2"));
-    bench.good("slide finalize slide");
+    assert!(bench.good("status slide").out.contains("Close it with: papsynth slide finalize slide"));
+    bench.good("slide finalize slide --verify");
+    assert!(bench.good("status slide").out.ends_with("it is closed\n"));
+    bench.good("verify slide");
+    fs::write(bench.path("slide/other"), "x").unwrap();
+    refused(&bench, "verify slide", "other: is no file of the slide");
+    assert!(bench.good("clean slide --strays").out.contains("1 other removed"));
+    bench.good("verify slide");
+    fs::remove_file(bench.path("slide/slide.json")).unwrap();
+    refused(&bench, "verify slide", "slide.json");
+    bench.good(&make);
     bench.good("verify slide");
     fs::remove_file(bench.path("slide/slide.ome.zarr/0/c/0/1")).unwrap();
     refused(&bench, "verify slide", "is missing");

@@ -1,6 +1,5 @@
 //! The folder of a data set: begun, resumed, completed.
 
-use std::collections::BTreeSet;
 use std::fmt::{self, Formatter};
 use std::fs;
 use std::io;
@@ -12,6 +11,7 @@ use papsynth::recipe::Recipe;
 
 use crate::coco::{Category, categories};
 use crate::contents;
+use crate::difference;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, is_temporary};
 use crate::formats;
@@ -271,7 +271,7 @@ impl Dataset {
         let difference = if there.stream_version != here.stream_version {
             Some(format!("is of stream version {}, this program writes {}", there.stream_version, here.stream_version))
         } else if there.recipe_sha256 != here.recipe_sha256 {
-            Some(format!("is of another recipe{}", self.first_difference(recipe)))
+            Some(format!("is of another recipe{}", difference::of_recipe(&self.folder, recipe)))
         } else if there.model_sha256 != here.model_sha256 {
             Some("is of another model".to_owned())
         } else if there.seed != here.seed {
@@ -290,31 +290,6 @@ impl Dataset {
             })
         })
     }
-
-    /// Where the recipe in the folder first differs.
-    fn first_difference(&self, recipe: &str) -> String {
-        let there = self.folder.inside(layout::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
-        let read = |text: &str| toml::from_str::<toml::Table>(text).ok();
-        let both = there.and_then(|there| read(&there)).zip(read(recipe));
-        let difference = both.and_then(|(there, here)| difference("", &there, &here));
-        difference.map_or_else(String::new, |difference| format!(" ({difference})"))
-    }
-}
-
-/// The first field in which two recipes differ, and its values.
-fn difference(section: &str, there: &toml::Table, here: &toml::Table) -> Option<String> {
-    let names: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
-    names.into_iter().find_map(|name| {
-        let field = if section.is_empty() { name.clone() } else { format!("{section}.{name}") };
-        match (there.get(name), here.get(name)) {
-            (Some(toml::Value::Table(there)), Some(toml::Value::Table(here))) => difference(&field, there, here),
-            (there, here) if there == here => None,
-            (there, here) => {
-                let shown = |value: Option<&toml::Value>| value.map_or("nothing".to_owned(), toml::Value::to_string);
-                Some(format!("`{field}` is {} there, {} here", shown(there), shown(here)))
-            }
-        }
-    })
 }
 
 /// Something in a folder, if it is there and not empty. What was never finished does not count.
@@ -327,7 +302,9 @@ pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
         Ok(entries) => entries,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
         Err(e) if e.kind() == io::ErrorKind::NotADirectory => {
-            return Err(Error::Folder { path: path.to_owned(), message: "is a file; a folder is wanted".to_owned() });
+            let is =
+                if path.exists() { "is a file; a folder is wanted" } else { "lies below a file; a folder is wanted" };
+            return Err(Error::Folder { path: path.to_owned(), message: is.to_owned() });
         }
         Err(e) => return Err(Error::io("read", path)(e)),
     };

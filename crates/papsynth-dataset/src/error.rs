@@ -48,10 +48,14 @@ pub enum Error {
 
 impl Error {
     /// Whether the system failed (full disk, no permission), so that trying again may help; everything else lies in
-    /// what was asked for.
+    /// what was asked for, such as a name that is too long or that a folder has already.
     #[must_use]
     pub fn is_io(&self) -> bool {
-        matches!(self, Self::Io { .. })
+        use io::ErrorKind::{AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory};
+        let is_asked_for = |source: &io::Error| {
+            matches!(source.kind(), AlreadyExists | InvalidFilename | InvalidInput | IsADirectory | NotADirectory)
+        };
+        matches!(self, Self::Io { source, .. } if !is_asked_for(source))
     }
 
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {

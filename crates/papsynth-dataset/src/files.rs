@@ -312,10 +312,10 @@ impl Folder {
         entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
-    /// Removes what killed processes left behind and says how many files it was. A temporary file that somebody works on is
-    /// locked, and stays.
-    pub(crate) fn sweep(&self) -> Result<u64, Error> {
-        let mut removed = 0;
+    /// Removes what killed processes left behind and says how many files went and how many stayed: a temporary file that somebody works on
+    /// is locked, and somebody else's may not be opened.
+    pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
+        let [mut removed, mut stayed] = [0; 2];
         for path in self.folders()? {
             let entries = match fs::read_dir(&path) {
                 Ok(entries) => entries,
@@ -331,11 +331,13 @@ impl Folder {
                 let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
                 let is_free = || File::options().write(true).open(entry.path()).is_ok_and(|f| f.try_lock().is_ok());
                 let abandoned = is_link || is_free();
-                // Gone already is as good.
-                removed += u64::from(abandoned && fs::remove_file(entry.path()).is_ok());
+                let is_gone = abandoned && fs::remove_file(entry.path()).is_ok();
+                removed += u64::from(is_gone);
+                // Gone by another's hand is as good.
+                stayed += u64::from(!is_gone && entry.path().symlink_metadata().is_ok());
             }
         }
-        Ok(removed)
+        Ok([removed, stayed])
     }
 
     /// Brings the names of these files to the disk: what is recorded afterwards is there even if the power fails.

@@ -116,7 +116,7 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
 ///
 /// # Errors
 /// If the system refuses to read.
-pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<Range<u64>>, Error> {
+pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>, check: Check) -> Result<Vec<Range<u64>>, Error> {
     let each = dataset.layout.frames_per_shard;
     let dataset = &Dataset { folder: dataset.folder.listed()?, ..dataset.clone() };
     let all = frames.start / each..frames.end.div_ceil(each);
@@ -125,7 +125,7 @@ pub fn shards_to_make(dataset: &Dataset, frames: Range<u64>) -> Result<Vec<Range
     for shard in recorded_shards(&dataset.folder)?.into_iter().filter(|shard| all.contains(shard)) {
         let room = dataset.frames_of_shard(shard);
         let wanted = room.start.max(frames.start)..room.end.min(frames.end);
-        if dataset.whole(shard, Check::Sizes)?.is_some_and(|record| record.covers(&wanted)) {
+        if dataset.whole(shard, check)?.is_some_and(|record| record.covers(&wanted)) {
             missing.extend((next < shard).then_some(next..shard));
             next = shard + 1;
         }

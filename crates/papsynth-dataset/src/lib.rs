@@ -2,11 +2,13 @@
 #![forbid(unsafe_code)]
 
 mod card;
+mod clean;
 mod coco;
 mod compare;
 mod contents;
 mod convert;
 mod dataset;
+mod difference;
 mod error;
 mod files;
 mod flatten;
@@ -38,6 +40,7 @@ mod table;
 mod verify;
 mod write;
 
+pub use clean::{Cleaned, clean};
 pub use coco::Category;
 pub use compare::{frames_of, images_of, truth_differs};
 pub use convert::convert;
@@ -56,4 +59,4 @@ pub use record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecor
 pub use shard_writer::ShardWriter;
 pub use store::{Home, Store};
 pub use table::{Column, columns};
-pub use verify::{Cleaned, Finding, Mend, Verdict, clean, verify};
+pub use verify::{Finding, Mend, Verdict, verify};

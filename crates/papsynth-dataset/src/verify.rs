@@ -50,7 +50,7 @@ pub struct Finding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mend {
-    /// `papsynth generate --verify` with the same recipe makes it again.
+    /// `papsynth generate --verify`, of a slide `papsynth slide make --verify`, with the same recipe makes it again.
     Generate,
     /// `papsynth clean` takes it away.
     Clean,
@@ -251,54 +251,6 @@ fn gaps(there: &[u64], expected: &Range<u64>) -> Vec<Range<u64>> {
         next = index + 1;
     }
     gaps
-}
-
-/// What [`clean`] took away.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Cleaned {
-    /// Files that runs which were killed left behind.
-    pub temporary: u64,
-    /// Other files that are none of the data set's.
-    pub strays: u64,
-}
-
-/// Removes from a data set what killed runs left behind and, if wanted, everything else that is none of its files.
-///
-/// # Errors
-/// If there is no data set, strays cannot be told (a record cannot be read, or not all shards are merged yet, so that others may be at work),
-/// or the system refuses.
-pub fn clean(home: impl Into<Home>, strays: bool) -> Result<Cleaned, Error> {
-    let folder = Folder::new(home);
-    clean_in(&folder, strays).map_err(|error| folder.named(error))
-}
-
-fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
-    let manifest = Manifest::read(folder)?;
-    let mut cleaned = Cleaned { temporary: folder.sweep()?, strays: 0 };
-    if !strays {
-        return Ok(cleaned);
-    }
-    let shards = recorded_shards(folder)?;
-    if shards.is_empty() || manifest.shards != shards.len() as u64 {
-        let message =
-            "what others are writing cannot be told from strays before `papsynth merge` has closed the data set";
-        return Err(Error::Folder { path: folder.root().to_owned(), message: message.to_owned() });
-    }
-    let mut listed: BTreeSet<String> = manifest.files.into_iter().map(|file| file.path).collect();
-    listed.insert(layout::MANIFEST.to_owned());
-    for shard in shards {
-        listed.insert(layout::record(shard));
-        listed.extend(read_record(folder, shard)?.files.into_iter().map(|file| file.path));
-    }
-    for name in folder.names()? {
-        // A temporary file that is still there is somebody's work.
-        let file_name = name.rsplit('/').next().unwrap_or(&name);
-        if !listed.contains(&name) && !is_temporary(file_name) {
-            folder.remove(&name)?;
-            cleaned.strays += 1;
-        }
-    }
-    Ok(cleaned)
 }
 
 #[cfg(test)]

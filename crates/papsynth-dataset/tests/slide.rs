@@ -11,7 +11,7 @@ use papsynth::recipe::{Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
+use papsynth_dataset::{Check, Cleaned, Mend, Share, clean};
 
 const SEED: u64 = 11;
 
@@ -62,13 +62,13 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
     let (one, two) = (Folder::new("one"), Folder::new("two"));
     let engine = engine();
     let whole = make(&one.0, &engine, Share::ALL, Check::Sizes);
-    let root = whole.finish().unwrap();
+    let root = whole.finish(Check::Sizes).unwrap();
     make(&two.0, &engine, Share { index: 1, of: 2 }, Check::Sizes);
     let half = SlideSet::open(&two.0).unwrap();
-    let gap = half.finish().unwrap_err().to_string();
+    let gap = half.finish(Check::Sizes).unwrap_err().to_string();
     assert!(gap.contains("3 of 6 shards are missing") && gap.contains("0000-0000"), "{gap}");
     make(&two.0, &engine, Share { index: 0, of: 2 }, Check::Sizes);
-    assert_eq!(half.finish().unwrap(), root);
+    assert_eq!(half.finish(Check::Sizes).unwrap(), root);
     // What is read back is what the engine makes, in every level.
     let part = engine.slide(SEED, 0).unwrap().picture([100, 200], [900, 480], Threads::All).unwrap();
     assert_eq!(whole.picture(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
@@ -96,7 +96,38 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
     let model = Model::builtin();
     let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
-    assert!(refused.to_string().contains("another recipe"), "{refused}");
+    let refused = refused.to_string();
+    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there, 256 here)"), "{refused}");
+}
+
+#[test]
+fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
+    let engine = engine();
+    for round in 0..20 {
+        let folder = Folder::new(&format!("begin-{round}"));
+        let barrier = std::sync::Barrier::new(2);
+        let begin = |seed: u64| {
+            let (slide, recipe, model) = (engine.slide(seed, 0).unwrap(), recipe(), Model::builtin());
+            barrier.wait();
+            SlideSet::create_or_resume(&folder.0, &slide, &SlideInfo { seed, ..info(&recipe, &model) }).is_ok()
+        };
+        let [one, two] = std::thread::scope(|scope| {
+            [1, 2].map(|seed| scope.spawn(move || begin(seed))).map(|thread| thread.join().unwrap())
+        });
+        assert!(one != two, "{one} {two}");
+    }
+}
+
+#[test]
+fn what_asks_too_much_of_the_reach_begins_nothing() {
+    let folder = Folder::new("reach");
+    let mut short = recipe();
+    short.scan.reach_um = 20.0;
+    let model = Model::builtin();
+    let engine = Engine::new(&short, &model, &Inputs::default()).unwrap();
+    let refused = SlideSet::create_or_resume(&folder.0, &engine.slide(SEED, 0).unwrap(), &info(&short, &model));
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("scan.reach_um") && !folder.0.exists(), "{refused}");
 }
 
 #[test]
@@ -104,7 +135,7 @@ fn whatever_is_wrong_is_found_and_mended() {
     let folder = Folder::new("wrong");
     let engine = engine();
     let set = make(&folder.0, &engine, Share::ALL, Check::Sizes);
-    let root = set.finish().unwrap();
+    let root = set.finish(Check::Sizes).unwrap();
     assert_eq!(set.verify().unwrap(), []);
     let mut files = Vec::new();
     let mut folders = vec![folder.0.clone()];
@@ -140,14 +171,40 @@ fn whatever_is_wrong_is_found_and_mended() {
     }
     assert_eq!(SlideSet::open(&folder.0).unwrap().verify().unwrap(), []);
     fs::write(folder.0.join("objects/other.csv"), "x").unwrap();
+    fs::write(folder.0.join("objects/.0000-0000.csv.0123456789abcdef.tmp"), "x").unwrap();
     let found = set.verify().unwrap();
-    assert!(found.len() == 1 && !found[0].mended_by_making, "{found:?}");
-    fs::remove_file(folder.0.join("objects/other.csv")).unwrap();
+    assert!(found.len() == 2 && found.iter().all(|finding| finding.mend == Mend::Clean), "{found:?}");
+    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, strays: 0, stayed: 0 });
+    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, strays: 1, stayed: 0 });
+    assert_eq!(set.verify().unwrap(), []);
+    // What the slide is made from is made anew from the records, if they are of this slide.
+    let head = fs::read(folder.0.join("slide.json")).unwrap();
+    for lost in [None, Some(&head[..head.len() / 2])] {
+        match lost {
+            None => fs::remove_file(folder.0.join("slide.json")).unwrap(),
+            Some(half) => fs::write(folder.0.join("slide.json"), half).unwrap(),
+        }
+        assert!(SlideSet::is_in(&folder.0) && clean(&folder.0, true).is_err());
+        let (slide, recipe, model) = (engine.slide(SEED + 1, 0).unwrap(), recipe(), Model::builtin());
+        let other = SlideInfo { seed: SEED + 1, ..info(&recipe, &model) };
+        let refused = SlideSet::create_or_resume(&folder.0, &slide, &other).unwrap_err().to_string();
+        assert!(refused.contains("slide.json"), "{refused}");
+        make(&folder.0, &engine, Share::ALL, Check::Sizes);
+        assert_eq!(set.verify().unwrap(), []);
+    }
+    // Before it is closed, what is a stray cannot be told.
+    fs::remove_file(folder.0.join("upper.json")).unwrap();
+    let refused = clean(&folder.0, true).unwrap_err().to_string();
+    assert!(refused.contains("papsynth slide finalize"), "{refused}");
+    assert!(!set.is_finished().unwrap());
     let shard = files.iter().find(|file| file.to_string_lossy().contains("slide.ome.zarr/0/c")).unwrap();
     let mut bytes = fs::read(shard).unwrap();
     bytes[100] ^= 4;
     fs::write(shard, bytes).unwrap();
+    let refused = set.finish(Check::Hashes).unwrap_err().to_string();
+    assert!(refused.contains("1 of 6 shards"), "{refused}");
     make(&folder.0, &engine, Share::ALL, Check::Hashes);
-    assert_eq!(set.finish().unwrap(), root);
+    assert_eq!(set.finish(Check::Sizes).unwrap(), root);
+    assert!(set.is_finished().unwrap());
     assert_eq!(set.verify().unwrap(), []);
 }

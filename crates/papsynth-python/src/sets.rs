@@ -217,7 +217,7 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
     if frames == 0 || frames > MOST_FRAMES {
         return Err(PyValueError::new_err(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
     }
-    let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames));
+    let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames, Check::Sizes));
     Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 

@@ -47,7 +47,7 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
     }
     assert_eq!(get(&mut view, "/at/0/5/5").status, 404);
     make(Share::ALL);
-    set.finish().unwrap();
+    set.finish(Check::Sizes).unwrap();
     let picture = ask(&mut view, "/picture/0");
     assert_eq!(picture["levels"], json!(3));
     assert_eq!(ask(&mut view, "/info")["pictures"], 1);

@@ -158,6 +158,12 @@ impl<'a> Slide<'a> {
         self.empty.camera.bits
     }
 
+    /// Middle of the deposit, µm from the slide's first pixel; it may lie beside the slide.
+    #[must_use]
+    pub fn deposit_um(&self) -> [f64; 2] {
+        self.population.middle_um()
+    }
+
     /// Columns and rows of frames.
     #[must_use]
     pub fn frames(&self) -> [u32; 2] {

@@ -15,7 +15,7 @@ use papsynth::recipe::{CameraPreset, Preset};
 use crate::memory::parse_size;
 pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
 pub(crate) use sets::{
-    Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify,
+    Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify, check_of,
 };
 pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]

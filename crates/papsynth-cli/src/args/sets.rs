@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use papsynth::recipe::CameraPreset;
-use papsynth_dataset::{Flatten, Format, Layout, Share};
+use papsynth_dataset::{Check, Flatten, Format, Layout, Share};
 
 use super::EngineArgs;
 use super::values::{camera_parser, flatten_parser, format_parser, parse_share};
@@ -15,6 +15,13 @@ pub(crate) struct LayoutArgs {
     /// Formats to write, one or several [default: folder; webdataset above 10000 frames]
     #[arg(long, value_name = "NAME", value_parser = format_parser(), value_delimiter = ',')]
     pub(crate) format: Vec<Format>,
+    #[command(flatten)]
+    pub(crate) files: FileArgs,
+}
+
+/// The same, whatever the formats.
+#[derive(Debug, Args)]
+pub(crate) struct FileArgs {
     /// What a pixel shows that belongs to several objects, in formats with one label a pixel
     #[arg(long, value_name = "POLICY", value_parser = flatten_parser(), default_value = Flatten::Top.name())]
     pub(crate) flatten: Flatten,
@@ -36,6 +43,12 @@ impl LayoutArgs {
         let many = self.format.is_empty() && frames > Self::MOST_IN_FOLDERS;
         let usual = if many { Format::Webdataset } else { Format::Folder };
         let formats = if self.format.is_empty() { vec![usual] } else { self.format.clone() };
+        (self.files.layout(formats), many)
+    }
+}
+
+impl FileArgs {
+    pub(crate) fn layout(&self, formats: Vec<Format>) -> Layout {
         let mut layout = Layout::new(formats);
         layout.flatten = self.flatten;
         #[cfg(feature = "parquet")]
@@ -45,7 +58,7 @@ impl LayoutArgs {
         if let Some(frames) = self.frames_per_shard {
             layout.frames_per_shard = frames;
         }
-        (layout, many)
+        layout
     }
 }
 
@@ -65,6 +78,11 @@ pub(crate) struct ShareArgs {
     /// `papsynth slide finalize` afterwards
     #[arg(long, value_name = "I/N", value_parser = parse_share)]
     pub(crate) shard: Option<Shards>,
+}
+
+/// How carefully files that are there are looked at, with `--verify` or without.
+pub(crate) fn check_of(verify: bool) -> Check {
+    if verify { Check::Hashes } else { Check::Sizes }
 }
 
 /// Read every file of a data set and say what is wrong.
@@ -122,8 +140,11 @@ pub(crate) struct Convert {
     /// Folder of the new data set: new, empty, or one that this command began
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// Formats to write, one or several
+    #[arg(long, value_name = "NAME", value_parser = format_parser(), value_delimiter = ',', required = true)]
+    pub(crate) format: Vec<Format>,
     #[command(flatten)]
-    pub(crate) layout: LayoutArgs,
+    pub(crate) files: FileArgs,
     /// Say nothing but errors
     #[arg(long, short)]
     pub(crate) quiet: bool,
@@ -161,6 +182,9 @@ pub(crate) struct Merge {
     /// Frames that must be there: those with index 0 to N − 1
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: u64,
+    /// Read all files of shards before they are merged, not their sizes alone
+    #[arg(long)]
+    pub(crate) verify: bool,
 }
 
 /// Say what a data set will cost, from a few frames made for it: time, bytes, memory, shards.

@@ -79,6 +79,9 @@ pub(crate) struct SlideFinalize {
     /// Folder of the slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
+    /// Read all files of shards before, not their sizes alone
+    #[arg(long)]
+    pub(crate) verify: bool,
 }
 
 #[derive(Debug, Args)]

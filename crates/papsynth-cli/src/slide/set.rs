@@ -1,5 +1,6 @@
 //! Slides on the disk.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use papsynth::Threads;
@@ -8,14 +9,14 @@ use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
 use papsynth_dataset::{Check, Error, Share};
 
 use super::open;
-use crate::args::{SlideFinalize, SlideMake};
-use crate::exit::{self, Complaint, Failure};
+use crate::args::{SlideFinalize, SlideMake, check_of};
+use crate::exit::{self, Complaint, Failure, counted};
 use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
 use crate::share;
-use crate::verify::MOST;
+use crate::verify;
 
 pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     if let Some([width, height]) = args.size {
@@ -41,7 +42,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let info = SlideInfo { recipe, model, seed, shard_px, objects_parquet };
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
-    let check = if args.verify { Check::Hashes } else { Check::Sizes };
+    let check = check_of(args.verify);
     let run = SlideRun { share, threads, check, stop: interrupt.flag() };
     let bar = Bar::start(args.quiet);
     let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
@@ -62,7 +63,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
         let message = format!("stopped; every file in {} is whole", args.out.display());
         return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
     }
-    if share == Share::ALL { close(&set, args.quiet) } else { Ok(()) }
+    if share == Share::ALL { close(&set, Check::Sizes, args.quiet) } else { Ok(()) }
 }
 
 /// As many threads as fit, each with a frame of its own.
@@ -80,28 +81,41 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Fail
     Ok(fit.at_once)
 }
 
-/// Numbers of the shards that are missing, row by row, and how many there are in all.
-pub(crate) fn missing(dir: &Path) -> Result<(Vec<u64>, u64), Failure> {
+/// How much of a slide is there.
+pub(crate) struct There {
+    /// Numbers of the shards that are missing, row by row.
+    pub(crate) missing: Vec<u64>,
+    /// How many there are in all.
+    pub(crate) shards: u64,
+    /// Whether it was closed.
+    pub(crate) is_closed: bool,
+}
+
+pub(crate) fn there(dir: &Path) -> Result<There, Failure> {
     let set = SlideSet::open(dir)?;
-    let missing = set.missing(Check::Sizes)?;
+    let missing: BTreeSet<[u32; 2]> = set.missing(Check::Sizes)?.into_iter().collect();
     let numbers = (0_u64..).zip(set.all()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
-    Ok((numbers.collect(), set.all().count() as u64))
+    Ok(There {
+        missing: numbers.collect(),
+        shards: set.all().count() as u64,
+        is_closed: missing.is_empty() && set.is_finished()?,
+    })
 }
 
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {
-    close(&SlideSet::open(&args.dir)?, false)
+    close(&SlideSet::open(&args.dir)?, check_of(args.verify), false)
 }
 
-fn close(set: &SlideSet, quiet: bool) -> Result<(), Failure> {
-    let finished = set.finish()?;
+fn close(set: &SlideSet, check: Check, quiet: bool) -> Result<(), Failure> {
+    let finished = set.finish(check)?;
     if quiet {
         return Ok(());
     }
     let megabytes = finished.bytes / 1_000_000;
     exit::print(&format!(
-        "{}: {} shards, {} objects and parts of cells, {megabytes} MB, root {}\nLook at: {}\n",
+        "{}: {}, {} objects and parts of cells, {megabytes} MB, root {}\nLook at: {}\n",
         set.path().display(),
-        finished.shards,
+        counted(finished.shards, "shard", "shards"),
         finished.objects,
         finished.root_sha256,
         set.path().join("thumbnail.png").display()
@@ -111,30 +125,12 @@ fn close(set: &SlideSet, quiet: bool) -> Result<(), Failure> {
 /// `papsynth verify` of a slide.
 pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     let findings = SlideSet::open(dir)?.verify()?;
-    let there = dir.display();
     if json {
-        let list =
-            findings.iter().map(|finding| serde_json::json!({ "path": finding.path, "message": finding.message }));
-        exit::print(&format!("{:#}\n", serde_json::json!({ "findings": list.collect::<Vec<_>>() })))?;
+        exit::print(&format!("{:#}\n", serde_json::json!({ "findings": findings })))?;
     } else if findings.is_empty() {
-        exit::print(&format!("{there}: whole\n"))?;
+        exit::print(&format!("{}: whole\n", dir.display()))?;
     } else {
-        let mut text = String::new();
-        for finding in findings.iter().take(MOST) {
-            text.push_str(&format!("{}: {}\n", finding.path, finding.message));
-        }
-        if findings.len() > MOST {
-            text.push_str(&format!("and {} more\n", findings.len() - MOST));
-        }
-        exit::print(&text)?;
+        verify::print(&findings)?;
     }
-    if findings.is_empty() {
-        return Ok(());
-    }
-    let help = if findings.iter().any(|finding| finding.mended_by_making) {
-        "the command that made the slide, with --verify, makes again what is wrong"
-    } else {
-        "remove what does not belong there"
-    };
-    Err(Failure::input(Complaint::new(format!("{there}: {} things are wrong", findings.len())).help(help)))
+    verify::judge(dir, &findings)
 }

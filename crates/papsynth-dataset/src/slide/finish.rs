@@ -31,12 +31,12 @@ pub struct Finished {
 
 impl SlideSet {
     /// Makes what follows from the shards, which must all be whole: the upper levels, `thumbnail.png` and `README.md`. What is there
-    /// already and the same is made again and not touched.
+    /// already and the same is made again and not touched. `check` says how carefully the files of shards are looked at before.
     ///
     /// # Errors
     /// If a shard is missing or not whole, which is said, or the system refuses.
-    pub fn finish(&self) -> Result<Finished, Error> {
-        let missing = self.missing(Check::Sizes)?;
+    pub fn finish(&self, check: Check) -> Result<Finished, Error> {
+        let missing = self.missing(check)?;
         if let Some(&first) = missing.first() {
             return Err(wrong(
                 self.path(),

@@ -26,6 +26,7 @@ use papsynth::recipe::Recipe;
 use papsynth_zarr::Shard;
 
 use crate::dataset::stranger;
+use crate::difference;
 use crate::error::Error;
 use crate::files::Folder;
 use crate::layout;
@@ -34,7 +35,6 @@ use crate::record::{Check, FileRecord, Identity};
 pub use finish::Finished;
 pub use record::{SlideHead, SlideRecord};
 pub use shard::{SlideProgress, SlideRun};
-pub use verify::SlideFinding;
 
 use document::Forms;
 use record::RECORD_BYTES;
@@ -72,42 +72,69 @@ pub struct SlideSet {
 }
 
 impl SlideSet {
-    /// Begins a slide in a folder that is empty or not there yet, or goes on with the one in it.
+    /// Begins a slide in a folder that is empty or not there yet, or goes on with the one in it. Where `slide.json` is lost or damaged, the
+    /// records of shards tell whether it is this one.
     ///
     /// # Errors
-    /// If the folder holds something else, or a slide of another recipe, model, seed, number, stream version or shard size, or the
-    /// system refuses.
+    /// If the folder holds something else, or a slide of another recipe, model, seed, number, stream version or shard size, objects in the
+    /// middle of the deposit reach farther than `scan.reach_um`, or the system refuses.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);
         if info.objects_parquet && !crate::parquet::IS_HERE {
             return Err(crate::formats::missing("the table of objects as Parquet", "parquet", path));
         }
-        let folder = Folder::new(path);
         let forms = Forms::new(&head).map_err(|message| wrong(path, message))?;
-        if folder.path(HEAD).exists() {
-            let found = SlideHead::read(&folder)?;
-            if let Some(what) = found.differs(&head) {
-                return Err(wrong(
-                    path,
-                    format!("holds a slide of another {what}; choose another folder, or give what it was begun with"),
-                ));
+        let set = Self { folder: Folder::new(path), head, forms };
+        let text = set.head.to_json();
+        match stranger(&set.folder)? {
+            // Of several that begin at once one is the first.
+            None => {
+                look_at_the_middle(slide)?;
+                if !set.folder.write_unless_there(HEAD, |out| out.bytes(&text))? {
+                    set.compare_or_restore(&recipe)?;
+                }
             }
-        } else if let Some(name) = stranger(&folder)? {
-            return Err(wrong(
-                path,
-                format!("the folder holds something else (`{name}`) and no slide; choose another, or a new one"),
-            ));
+            Some(_) if Self::is_in(path) => set.compare_or_restore(&recipe)?,
+            Some(name) => {
+                let message =
+                    format!("the folder holds something else (`{name}`) and no slide; choose another, or a new one");
+                return Err(wrong(path, message));
+            }
         }
-        let set = Self { folder, head, forms };
         set.folder.sweep()?;
+        set.folder.keep(HEAD, &text)?;
         set.folder.keep(layout::RECIPE, recipe.as_bytes())?;
         set.folder.keep(layout::MODEL, model.as_bytes())?;
         for (name, bytes) in set.documents()? {
             set.folder.keep(&name, &bytes)?;
         }
-        set.folder.keep(HEAD, &set.head.to_json())?;
         Ok(set)
+    }
+
+    /// The slide in the folder must be this one.
+    fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
+        let found = match SlideHead::read(&self.folder) {
+            Err(Error::Input { .. }) if self.is_recorded()? => return Ok(()),
+            found => found?,
+        };
+        let Some(what) = found.differs(&self.head) else { return Ok(()) };
+        let same_recipe = found.identity.recipe_sha256 == self.head.identity.recipe_sha256;
+        let field = if same_recipe { String::new() } else { difference::of_recipe(&self.folder, recipe) };
+        let message =
+            format!("holds a slide of another {what}{field}; choose another folder, or give what it was begun with");
+        Err(wrong(self.path(), message))
+    }
+
+    /// Whether something in the folder is recorded as part of this slide.
+    fn is_recorded(&self) -> Result<bool, Error> {
+        let shards = self.folder.names_in(layout::SHARDS)?.into_iter().map(|name| format!("{}/{name}", layout::SHARDS));
+        for name in shards.chain([UPPER.to_owned()]) {
+            if self.record(&name)?.is_some() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The slide that lies in a folder.
@@ -121,10 +148,18 @@ impl SlideSet {
         Ok(Self { folder, head, forms })
     }
 
-    /// Whether a folder holds a slide.
+    /// Whether a folder holds a slide, be it one that lost its `slide.json`.
     #[must_use]
     pub fn is_in(path: &Path) -> bool {
-        path.join(HEAD).is_file()
+        [HEAD, UPPER, IMAGE].iter().any(|name| path.join(name).exists())
+    }
+
+    /// Whether [`finish`](Self::finish) has closed it, and what that wrote is still there.
+    ///
+    /// # Errors
+    /// If the system refuses to tell.
+    pub fn is_finished(&self) -> Result<bool, Error> {
+        Ok(self.recorded(UPPER, Check::Sizes)?.is_some())
     }
 
     /// Where it lies.
@@ -216,8 +251,20 @@ impl SlideSet {
     }
 }
 
+/// Looks through the middle of the deposit, or where the slide is nearest to it: what a recipe asks too much of shows there first.
+fn look_at_the_middle(slide: &Slide) -> Result<(), Error> {
+    let (side, size, deposit_um) = (slide.side_px(), slide.size_px(), slide.deposit_um());
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place on the slide")]
+    let origin = [0, 1].map(|axis| {
+        let last = size[axis].saturating_sub(side);
+        (deposit_um[axis] / slide.pixel_um()).clamp(0.0, f64::from(last)) as u32
+    });
+    slide.objects(origin, size.map(|px| px.min(side)))?;
+    Ok(())
+}
+
 fn record_name([column, row]: [u32; 2]) -> String {
-    format!("shards/{}.json", name_of([column, row]))
+    format!("{}/{}.json", layout::SHARDS, name_of([column, row]))
 }
 
 /// The name of a shard: its row and its column.
@@ -232,4 +279,62 @@ fn place([column, row]: [u32; 2], plane: usize) -> Shard {
 
 fn wrong(path: &Path, message: String) -> Error {
     Error::Folder { path: path.to_owned(), message }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::sync::atomic::AtomicBool;
+
+    use papsynth::recipe::Preset;
+    use papsynth::{Engine, Inputs, Threads};
+
+    use super::*;
+    use crate::files::fault;
+    use crate::generate::Share;
+    use crate::support::{Scratch, contents};
+
+    #[test]
+    fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_slide() {
+        let mut recipe = Preset::Sparse.recipe();
+        (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (600, 64, 256);
+        recipe.cells.clear();
+        let model = Model::builtin();
+        let engine = Engine::new(&recipe, &model, &Inputs::default()).unwrap();
+        let slide = engine.slide(1, 0).unwrap();
+        let info = SlideInfo {
+            recipe: &recipe,
+            model: &model,
+            seed: 1,
+            shard_px: 512,
+            objects_parquet: crate::parquet::IS_HERE,
+        };
+        let make = |path: &Path| {
+            let set = SlideSet::create_or_resume(path, &slide, &info)?;
+            let stop = AtomicBool::new(false);
+            let run = SlideRun { share: Share::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
+            set.make(&slide, &run, &|_| ())?;
+            set.finish(Check::Sizes)
+        };
+        let good = Scratch::new("slide-faults-none");
+        make(good.path()).unwrap();
+        let expected = contents(good.path());
+        let mut failures = 0;
+        for passed in (0..60).chain((60..).step_by(7)) {
+            let scratch = Scratch::new("slide-faults");
+            let kinds = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied, io::ErrorKind::Other];
+            fault::KIND.set(kinds[failures % 3]);
+            fault::LEFT.set(Some(passed));
+            let result = make(scratch.path());
+            fault::LEFT.set(None);
+            let Err(error) = result else { break };
+            failures += 1;
+            assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
+            let there = contents(scratch.path());
+            assert!(there.iter().all(|file| expected.contains(file)), "after {passed} calls");
+            make(scratch.path()).unwrap();
+            assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
+        }
+        assert!(failures > 60, "{failures}");
+    }
 }

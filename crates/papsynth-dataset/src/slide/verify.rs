@@ -1,68 +1,85 @@
 //! Whether a slide is as it was written.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use super::{HEAD, SlideSet, UPPER, name_of, record_name};
 use crate::error::Error;
 use crate::files::is_temporary;
 use crate::layout;
 use crate::record::{Check, FileRecord};
-
-/// Something wrong with a slide.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SlideFinding {
-    /// The file, from the slide's folder.
-    pub path: String,
-    /// What is wrong with it.
-    pub message: String,
-    /// Whether `papsynth slide` with the same recipe mends it; else the file is one too many.
-    pub mended_by_making: bool,
-}
+use crate::verify::{Finding, Mend};
 
 impl SlideSet {
-    /// Reads every file and says what is missing, cut, changed or too many.
+    /// Reads every file and says what is missing, cut, changed or too many, by path.
     ///
     /// # Errors
     /// If the system refuses to read.
-    pub fn verify(&self) -> Result<Vec<SlideFinding>, Error> {
+    pub fn verify(&self) -> Result<Vec<Finding>, Error> {
         let mut findings = Vec::new();
-        let mut known: BTreeSet<String> = BTreeSet::new();
-        let mut find = |path: &str, message: &str, mended_by_making| {
-            findings.push(SlideFinding { path: path.to_owned(), message: message.to_owned(), mended_by_making });
+        let mut find = |path: &str, message: &str, mend| {
+            findings.push(Finding { path: path.to_owned(), message: message.to_owned(), mend });
         };
-        let own = self.own_files()?;
-        for file in &own {
+        let (files, unrecorded) = self.listed()?;
+        for name in &unrecorded {
+            let there = self.folder.path(name).exists();
+            let message = if there { "is no record of this slide, or was changed" } else { "is missing" };
+            find(name, message, Mend::Generate);
+        }
+        for file in &files {
             if let Some(flaw) = self.folder.flaw(file, Check::Hashes)? {
-                find(&file.path, &flaw, true);
+                find(&file.path, &flaw, Mend::Generate);
             }
         }
-        known.extend(own.into_iter().map(|file| file.path));
-        for name in self.all().map(record_name).chain([UPPER.to_owned()]) {
-            known.insert(name.clone());
-            let Some(record) = self.record(&name)? else {
-                let there = self.folder.path(&name).exists();
-                find(&name, if there { "is no record of this slide, or was changed" } else { "is missing" }, true);
-                continue;
-            };
-            for file in &record.files {
-                if let Some(flaw) = self.folder.flaw(file, Check::Hashes)? {
-                    find(&file.path, &flaw, true);
-                }
-            }
-            known.extend(record.files.into_iter().map(|file| file.path));
+        let known = self.names_of(&files);
+        for path in self.folder.names()?.iter().filter(|path| !known.contains(path.as_str())) {
+            let is_left = is_temporary(path.rsplit('/').next().unwrap_or(path));
+            let message = if is_left { "was left behind by a run that was killed" } else { "is no file of the slide" };
+            find(path, message, Mend::Clean);
         }
-        for path in self.files()? {
-            let name = path.rsplit('/').next().unwrap_or_default();
-            if !known.contains(&path) && !is_temporary(name) {
-                find(&path, "is no file of the slide", false);
-            }
-        }
+        findings.sort();
         Ok(findings)
     }
 
+    /// The names of all files that a slide has which is closed.
+    ///
+    /// # Errors
+    /// If it is not closed, so that others may be at work, a record cannot be read, or the system refuses.
+    pub(crate) fn own_names(&self) -> Result<BTreeSet<String>, Error> {
+        let (files, unrecorded) = self.listed()?;
+        match unrecorded.first() {
+            None => Ok(self.names_of(&files)),
+            Some(name) => {
+                let message = format!(
+                    "what others are writing cannot be told from strays before `papsynth slide finalize` has closed the slide ({name} is missing)"
+                );
+                Err(super::wrong(self.path(), message))
+            }
+        }
+    }
+
+    /// All files but the records, and the records that are missing or are none of this slide.
+    fn listed(&self) -> Result<(Vec<FileRecord>, Vec<String>), Error> {
+        let (mut files, mut unrecorded) = (self.given()?, Vec::new());
+        for name in self.record_names() {
+            match self.record(&name)? {
+                Some(record) => files.extend(record.files),
+                None => unrecorded.push(name),
+            }
+        }
+        Ok((files, unrecorded))
+    }
+
+    fn record_names(&self) -> impl Iterator<Item = String> + use<> {
+        self.all().map(record_name).chain([UPPER.to_owned()])
+    }
+
+    /// The names of these files and of all records.
+    fn names_of(&self, files: &[FileRecord]) -> BTreeSet<String> {
+        files.iter().map(|file| file.path.clone()).chain(self.record_names()).collect()
+    }
+
     /// The files that are no shard's: what they must be follows from `slide.json`.
-    fn own_files(&self) -> Result<Vec<FileRecord>, Error> {
+    fn given(&self) -> Result<Vec<FileRecord>, Error> {
         let file = |path: &str, bytes: &[u8]| FileRecord {
             path: path.to_owned(),
             bytes: bytes.len() as u64,
@@ -79,30 +96,9 @@ impl SlideSet {
         Ok(files)
     }
 
-    /// Every file in the folder, by its path from there; links are not followed.
-    fn files(&self) -> Result<Vec<String>, Error> {
-        let root = self.path();
-        let mut files = Vec::new();
-        for folder in self.folder.folders()? {
-            for entry in std::fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
-                let entry = entry.map_err(Error::io("read", &folder))?;
-                if !entry.file_type().map_err(Error::io("read", &folder))?.is_dir() {
-                    files.push(relative(root, &entry.path()));
-                }
-            }
-        }
-        files.sort();
-        Ok(files)
-    }
-
     /// The name of a shard in its files.
     #[must_use]
     pub fn name_of(at: [u32; 2]) -> String {
         name_of(at)
     }
-}
-
-fn relative(root: &Path, path: &Path) -> String {
-    let inside = path.strip_prefix(root).unwrap_or(path);
-    inside.components().map(|c| c.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
 }

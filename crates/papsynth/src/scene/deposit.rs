@@ -37,6 +37,11 @@ impl Deposit {
         })
     }
 
+    /// Its middle, µm.
+    pub(super) fn centre_um(&self) -> [f64; 2] {
+        self.centre_um
+    }
+
     /// Density at a place of the slide, µm, relative to the mean within the deposit; at most [`DENSEST`].
     pub(super) fn density(&self, [x, y]: [f64; 2]) -> f64 {
         /// Standard deviation of the noise.

@@ -141,6 +141,11 @@ impl Population {
         Ok((population, scene))
     }
 
+    /// Middle of the deposit, µm.
+    pub(crate) fn middle_um(&self) -> [f64; 2] {
+        self.deposit.centre_um()
+    }
+
     fn side_um(&self) -> f64 {
         PLOT_PX as f64 * self.pixel_um
     }
