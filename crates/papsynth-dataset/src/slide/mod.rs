@@ -12,6 +12,7 @@
 mod document;
 mod finish;
 mod objects;
+mod read;
 mod record;
 mod shard;
 mod verify;

@@ -1,23 +1,23 @@
 //! Whole files or none: a file gets its name only when all of it is on the disk.
 
+pub(crate) mod fault;
+mod hash;
+mod pending;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::hash::{BuildHasher, RandomState};
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Problem};
 use crate::record::{Check, FileRecord};
 use crate::store::{Home, Remote};
 
-const TEMPORARY_ENDING: &str = ".tmp";
+pub(crate) use hash::{hex, sha256};
+pub(crate) use pending::{Handle, Output, Pending, is_temporary};
 
-/// How much is read at a time to be hashed.
-const HASH_BLOCK: usize = 1 << 16;
+use hash::measure;
 
 /// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
 ///
@@ -142,9 +142,7 @@ impl Folder {
 
     /// Writes a whole file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
-        let pending = self.pending(name)?;
-        pending.handle()?.write_all(bytes).map_err(Error::io("write", &pending.path))?;
-        pending.commit_as(FileRecord { path: name.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
+        self.pending(name)?.write_whole(bytes)
     }
 
     /// Writes a whole file, unless there is one of the same content.
@@ -183,25 +181,7 @@ impl Folder {
         if let Some((folders, _)) = name.rsplit_once('/') {
             self.inside(folders)?;
         }
-        let path = self.path(name);
-        let folder = path.parent().unwrap_or(&self.root);
-        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
-        // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
-        let unique = RandomState::new().hash_one(&path);
-        let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
-        let open = || {
-            fault::point()?;
-            File::options().read(true).write(true).create_new(true).open(&temporary)
-        };
-        let file = open().or_else(|e| match e.kind() {
-            io::ErrorKind::NotFound => fs::create_dir_all(folder).and_then(|()| open()),
-            _ => Err(e),
-        });
-        let file = file.map_err(Error::io("write", &path))?;
-        // Says that somebody is at work on it; see `sweep`. File systems without locks do without.
-        let _ = file.try_lock();
-        let remote = self.remote.clone();
-        Ok(Pending { file, temporary, path, name: name.to_owned(), committed: false, remote })
+        Pending::open(self.path(name), name, self.remote.clone())
     }
 
     /// What is wrong with a file, if anything is.
@@ -351,221 +331,6 @@ impl Folder {
             match File::open(folder) {
                 Ok(opened) => fault::sync(&opened).map_err(Error::io("write", folder)),
                 Err(_) => Ok(()),
-            }
-        })
-    }
-}
-
-/// Whether a file of this name is one that was never finished.
-pub(crate) fn is_temporary(name: &str) -> bool {
-    name.starts_with('.') && name.ends_with(TEMPORARY_ENDING)
-}
-
-/// A file without its name yet. Dropped before it is committed, it vanishes.
-#[derive(Debug)]
-pub(crate) struct Pending {
-    file: File,
-    temporary: PathBuf,
-    path: PathBuf,
-    name: String,
-    committed: bool,
-    /// The store that the file is put into.
-    remote: Option<Arc<Remote>>,
-}
-
-impl Pending {
-    /// The path that the file will have.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Writes to the file. Nothing is held back: what is written through a handle is written when the call returns.
-    pub(crate) fn handle(&self) -> Result<Handle, Error> {
-        self.file.try_clone().map(Handle).map_err(Error::io("write", &self.path))
-    }
-
-    /// Brings the file to the disk and gives it its name.
-    pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
-        let record = self.seal().map_err(Error::io("write", &self.path))?;
-        self.rename()?;
-        Ok(record)
-    }
-
-    /// The same of a file whose content is known.
-    fn commit_as(mut self, record: FileRecord) -> Result<FileRecord, Error> {
-        fault::sync(&self.file).map_err(Error::io("write", &self.path))?;
-        self.rename()?;
-        Ok(record)
-    }
-
-    /// As [`commit`](Self::commit), but leaves a file of the same content untouched.
-    pub(crate) fn commit_if_new(mut self, folder: &Folder) -> Result<FileRecord, Error> {
-        let record = self.seal().map_err(Error::io("write", &self.path))?;
-        if folder.flaw(&record, Check::Hashes)?.is_some() {
-            self.rename()?;
-        }
-        Ok(record)
-    }
-
-    /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.
-    fn commit_unless_there(mut self) -> Result<bool, Error> {
-        self.seal().map_err(Error::io("write", &self.path))?;
-        if self.remote.is_none() {
-            match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
-                // The temporary name goes with this.
-                Ok(()) => return Ok(true),
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(false),
-                // Not every file system has a second name for a file.
-                Err(_) => {}
-            }
-        }
-        self.rename().map(|()| true)
-    }
-
-    fn seal(&mut self) -> io::Result<FileRecord> {
-        fault::sync(&self.file)?;
-        // Read back: what counts is what is there, however it was written.
-        self.file.seek(SeekFrom::Start(0))?;
-        let (bytes, sha256) = measure(&mut self.file)?;
-        Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
-    }
-
-    fn rename(&mut self) -> Result<(), Error> {
-        let renamed = fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
-        renamed.map_err(Error::io("write", &self.path))?;
-        self.committed = true;
-        self.remote.as_ref().map_or(Ok(()), |remote| remote.put(&self.name, &self.path))
-    }
-}
-
-impl Drop for Pending {
-    fn drop(&mut self) {
-        if !self.committed {
-            // Nothing more can be done about a file that cannot be removed.
-            let _ = fs::remove_file(&self.temporary);
-        }
-    }
-}
-
-/// A file that is written piece by piece.
-pub(crate) struct Output {
-    writer: BufWriter<Handle>,
-    pending: Pending,
-}
-
-impl Output {
-    pub(crate) fn new(pending: Pending) -> Result<Self, Error> {
-        Ok(Self { writer: BufWriter::new(pending.handle()?), pending })
-    }
-
-    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        self.writer.write_all(bytes).map_err(Error::io("write", &self.pending.path))
-    }
-
-    pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
-        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.pending.path)(e.into()))
-    }
-
-    /// The elements of a JSON array between its brackets, one a line.
-    pub(crate) fn json_lines<T: Serialize>(
-        &mut self,
-        items: impl IntoIterator<Item = Result<T, Error>>,
-    ) -> Result<(), Error> {
-        for (i, item) in items.into_iter().enumerate() {
-            self.bytes(if i == 0 { b"\n" } else { b",\n" })?;
-            self.json(&item?)?;
-        }
-        Ok(())
-    }
-
-    /// Everything is written.
-    pub(crate) fn into_pending(mut self) -> Result<Pending, Error> {
-        self.writer.flush().map_err(Error::io("write", &self.pending.path))?;
-        Ok(self.pending)
-    }
-}
-
-/// Writes to a pending file.
-#[derive(Debug)]
-pub(crate) struct Handle(File);
-
-impl Write for Handle {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        fault::point()?;
-        self.0.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()
-    }
-}
-
-impl Seek for Handle {
-    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
-        self.0.seek(position)
-    }
-}
-
-/// Size and SHA-256 of the rest of a file.
-fn measure(file: &mut File) -> io::Result<(u64, String)> {
-    let mut hash = Sha256::new();
-    let mut block = vec![0; HASH_BLOCK];
-    let mut bytes = 0;
-    loop {
-        match file.read(&mut block)? {
-            0 => return Ok((bytes, hex(&hash.finalize()))),
-            read => {
-                hash.update(&block[..read]);
-                bytes += read as u64;
-            }
-        }
-    }
-}
-
-/// SHA-256 as hexadecimal digits.
-pub(crate) fn sha256(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
-}
-
-/// Failures of the disk, made on purpose: every call that touches it passes a point.
-pub(crate) mod fault {
-    #[cfg(test)]
-    thread_local! {
-        /// Points that are still passed without harm; none set, all are.
-        pub(crate) static LEFT: std::cell::Cell<Option<usize>> = const { std::cell::Cell::new(None) };
-        /// How the next one fails: full disk, refused, broken.
-        pub(crate) static KIND: std::cell::Cell<std::io::ErrorKind> = const { std::cell::Cell::new(std::io::ErrorKind::StorageFull) };
-    }
-
-    #[cfg(not(test))]
-    #[expect(clippy::unnecessary_wraps, reason = "fails in tests")]
-    pub(crate) fn point() -> std::io::Result<()> {
-        Ok(())
-    }
-
-    #[cfg(not(test))]
-    pub(crate) fn sync(file: &std::fs::File) -> std::io::Result<()> {
-        file.sync_all()
-    }
-
-    /// No power will fail in a test, and the disk is slow.
-    #[cfg(test)]
-    pub(crate) fn sync(_: &std::fs::File) -> std::io::Result<()> {
-        point()
-    }
-
-    #[cfg(test)]
-    pub(crate) fn point() -> std::io::Result<()> {
-        LEFT.with(|left| match left.get() {
-            None => Ok(()),
-            Some(0) => Err(std::io::Error::new(KIND.get(), "on purpose")),
-            Some(n) => {
-                left.set(Some(n - 1));
-                Ok(())
             }
         })
     }

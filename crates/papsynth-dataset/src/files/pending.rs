@@ -1,0 +1,189 @@
+//! A file that is being written: whole under its name, or not at all.
+
+use std::fs::{self, File};
+use std::hash::{BuildHasher, RandomState};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::hash::{measure, sha256};
+use super::{Folder, fault};
+use crate::error::Error;
+use crate::record::{Check, FileRecord};
+use crate::store::Remote;
+
+const TEMPORARY_ENDING: &str = ".tmp";
+
+/// Whether a file of this name is one that was never finished.
+pub(crate) fn is_temporary(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(TEMPORARY_ENDING)
+}
+
+/// A file without its name yet. Dropped before it is committed, it vanishes.
+#[derive(Debug)]
+pub(crate) struct Pending {
+    file: File,
+    temporary: PathBuf,
+    path: PathBuf,
+    name: String,
+    committed: bool,
+    /// The store that the file is put into.
+    remote: Option<Arc<Remote>>,
+}
+
+impl Pending {
+    /// Opens a file that will have this path once it is committed, and this name in the folder.
+    pub(super) fn open(path: PathBuf, name: &str, remote: Option<Arc<Remote>>) -> Result<Self, Error> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
+        // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
+        let unique = RandomState::new().hash_one(&path);
+        let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
+        let open = || {
+            fault::point()?;
+            File::options().read(true).write(true).create_new(true).open(&temporary)
+        };
+        let file = open().or_else(|e| match e.kind() {
+            io::ErrorKind::NotFound => fs::create_dir_all(folder).and_then(|()| open()),
+            _ => Err(e),
+        });
+        let file = file.map_err(Error::io("write", &path))?;
+        // Says that somebody is at work on it; see `sweep`. File systems without locks do without.
+        let _ = file.try_lock();
+        Ok(Self { file, temporary, path, name: name.to_owned(), committed: false, remote })
+    }
+
+    /// The path that the file will have.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes to the file. Nothing is held back: what is written through a handle is written when the call returns.
+    pub(crate) fn handle(&self) -> Result<Handle, Error> {
+        self.file.try_clone().map(Handle).map_err(Error::io("write", &self.path))
+    }
+
+    /// Brings the file to the disk and gives it its name.
+    pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
+        let record = self.seal().map_err(Error::io("write", &self.path))?;
+        self.rename()?;
+        Ok(record)
+    }
+
+    /// The same of a file with this content.
+    pub(super) fn write_whole(mut self, bytes: &[u8]) -> Result<FileRecord, Error> {
+        let written = self.handle()?.write_all(bytes).and_then(|()| fault::sync(&self.file));
+        written.map_err(Error::io("write", &self.path))?;
+        self.rename()?;
+        Ok(FileRecord { path: self.name.clone(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
+    }
+
+    /// As [`commit`](Self::commit), but leaves a file of the same content untouched.
+    pub(super) fn commit_if_new(mut self, folder: &Folder) -> Result<FileRecord, Error> {
+        let record = self.seal().map_err(Error::io("write", &self.path))?;
+        if folder.flaw(&record, Check::Hashes)?.is_some() {
+            self.rename()?;
+        }
+        Ok(record)
+    }
+
+    /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.
+    pub(super) fn commit_unless_there(mut self) -> Result<bool, Error> {
+        self.seal().map_err(Error::io("write", &self.path))?;
+        if self.remote.is_none() {
+            match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
+                // The temporary name goes with this.
+                Ok(()) => return Ok(true),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(false),
+                // Not every file system has a second name for a file.
+                Err(_) => {}
+            }
+        }
+        self.rename().map(|()| true)
+    }
+
+    fn seal(&mut self) -> io::Result<FileRecord> {
+        fault::sync(&self.file)?;
+        // Read back: what counts is what is there, however it was written.
+        self.file.seek(SeekFrom::Start(0))?;
+        let (bytes, sha256) = measure(&mut self.file)?;
+        Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
+    }
+
+    fn rename(&mut self) -> Result<(), Error> {
+        let renamed = fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
+        renamed.map_err(Error::io("write", &self.path))?;
+        self.committed = true;
+        self.remote.as_ref().map_or(Ok(()), |remote| remote.put(&self.name, &self.path))
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        if !self.committed {
+            // Nothing more can be done about a file that cannot be removed.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// A file that is written piece by piece.
+pub(crate) struct Output {
+    writer: BufWriter<Handle>,
+    pending: Pending,
+}
+
+impl Output {
+    pub(crate) fn new(pending: Pending) -> Result<Self, Error> {
+        Ok(Self { writer: BufWriter::new(pending.handle()?), pending })
+    }
+
+    pub(crate) fn bytes(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.writer.write_all(bytes).map_err(Error::io("write", &self.pending.path))
+    }
+
+    pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
+        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.pending.path)(e.into()))
+    }
+
+    /// The elements of a JSON array between its brackets, one a line.
+    pub(crate) fn json_lines<T: Serialize>(
+        &mut self,
+        items: impl IntoIterator<Item = Result<T, Error>>,
+    ) -> Result<(), Error> {
+        for (i, item) in items.into_iter().enumerate() {
+            self.bytes(if i == 0 { b"\n" } else { b",\n" })?;
+            self.json(&item?)?;
+        }
+        Ok(())
+    }
+
+    /// Everything is written.
+    pub(crate) fn into_pending(mut self) -> Result<Pending, Error> {
+        self.writer.flush().map_err(Error::io("write", &self.pending.path))?;
+        Ok(self.pending)
+    }
+}
+
+/// Writes to a pending file.
+#[derive(Debug)]
+pub(crate) struct Handle(File);
+
+impl Write for Handle {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        fault::point()?;
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Seek for Handle {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.0.seek(position)
+    }
+}
