@@ -1,0 +1,155 @@
+//! Files that are changed, cut, lost or too many.
+
+use std::fs;
+
+use papsynth::model::Model;
+use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, Mend, clean, verify};
+
+use crate::support::{SEED, Scratch, contents, frame, recipe};
+use crate::{fill, is_found, look, make};
+
+/// The usual little generator: which bits turn over must only be the same every time.
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % end
+    }
+}
+
+#[test]
+fn a_whole_data_set_has_a_root() {
+    let (one, two) = (make("root-1"), make("root-2"));
+    let verdict = look(one.path());
+    assert_eq!((verdict.frames, verdict.findings.len()), (3, 0));
+    assert!(verdict.root.is_some());
+    assert_eq!(verdict, look(two.path()));
+    assert_eq!(verdict.files, contents(one.path()).len() as u64);
+}
+
+#[test]
+fn every_bit_that_turns_over_is_found() {
+    let scratch = make("flips");
+    let files = contents(scratch.path());
+    let mut numbers = Numbers(1);
+    // Every file in turn, so that small ones are not spared; a thousand with `PAPSYNTH_TORTURE`.
+    let count = if std::env::var_os("PAPSYNTH_TORTURE").is_some() { 1000 } else { 3 * files.len() };
+    for number in 0..count {
+        let (name, bytes) = &files[number % files.len()];
+        let mut changed = bytes.clone();
+        let bit = numbers.below(bytes.len() * 8);
+        changed[bit / 8] ^= 1 << (bit % 8);
+        fs::write(scratch.join(name), &changed).unwrap();
+        assert!(is_found(&look(scratch.path()), name), "bit {bit} of {name}");
+        fs::write(scratch.join(name), bytes).unwrap();
+    }
+    assert!(look(scratch.path()).root.is_some());
+}
+
+#[test]
+fn every_file_that_is_cut_is_found() {
+    let scratch = make("cuts");
+    let files = contents(scratch.path());
+    let mut numbers = Numbers(2);
+    for number in 0..100 {
+        let (name, bytes) = &files[number % files.len()];
+        let keep = numbers.below(bytes.len());
+        fs::write(scratch.join(name), &bytes[..keep]).unwrap();
+        assert!(is_found(&look(scratch.path()), name), "{keep} bytes of {name}");
+        fs::write(scratch.join(name), bytes).unwrap();
+    }
+}
+
+#[test]
+fn every_file_that_is_gone_or_too_many_is_found() {
+    let scratch = make("gone");
+    for (name, bytes) in contents(scratch.path()) {
+        let path = scratch.join(&name);
+        fs::remove_file(&path).unwrap();
+        if name == "manifest.json" {
+            assert!(verify(scratch.path(), None).is_err());
+            fill(scratch.path(), 2);
+            assert_eq!(fs::read(&path).unwrap(), bytes);
+        } else {
+            let verdict = look(scratch.path());
+            // Without its record a shard is not there: its frames are missing, its files too many.
+            assert!(is_found(&verdict, &name), "{name}: {verdict:?}");
+        }
+        fs::write(&path, bytes).unwrap();
+    }
+    fs::write(scratch.join("images/notes.txt"), "mine").unwrap();
+    fs::write(scratch.join("labels/.000009.tif.0123.tmp"), "half").unwrap();
+    let found = look(scratch.path()).findings;
+    let strays: Vec<(&str, Mend)> = found.iter().map(|finding| (finding.path.as_str(), finding.mend)).collect();
+    assert_eq!(strays, [("images/notes.txt", Mend::Clean), ("labels/.000009.tif.0123.tmp", Mend::Clean)]);
+    let cleaned = clean(scratch.path(), false).unwrap();
+    assert_eq!((cleaned.temporary, cleaned.strays), (1, 0));
+    assert!(scratch.join("images/notes.txt").exists());
+    assert_eq!(clean(scratch.path(), true).unwrap().strays, 1);
+    assert!(look(scratch.path()).root.is_some());
+    assert!(verify(scratch.path(), Some(0..9)).unwrap().findings[0].message.contains("frame"));
+}
+
+#[test]
+fn before_it_is_merged_nothing_is_taken_for_a_stray() {
+    let scratch = Scratch::new("unmerged");
+    let recipe =
+        papsynth::recipe::Recipe { layout: papsynth::recipe::Layout::Map { path: "map.png".to_owned() }, ..recipe() };
+    let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
+    let map = papsynth_dataset::read::InputFile { name: "map.png".to_owned(), bytes: b"a map".to_vec() };
+    let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: Some(&map), layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let one = frame(0, 1, 8, 1);
+    let mut writer = dataset.shard_writer(0).unwrap();
+    writer.begin(&one.finished.scene).unwrap();
+    writer.write_plane(&one.planes[0]).unwrap();
+    writer.end(&one.finished).unwrap();
+    writer.commit().unwrap();
+    // Somebody is writing the second frame.
+    fs::write(scratch.join("images/000001.png"), "half of it").unwrap();
+    let before = contents(scratch.path());
+    let found = verify(scratch.path(), None).unwrap().findings;
+    // That it is not merged is one finding.
+    let paths: Vec<&str> = found.iter().map(|finding| finding.path.as_str()).collect();
+    assert_eq!(paths, ["images/000001.png", "manifest.json"]);
+    let refused = clean(scratch.path(), true).unwrap_err();
+    assert!(!refused.is_io() && refused.to_string().contains("merge"), "{refused}");
+    assert_eq!(contents(scratch.path()), before);
+    fs::write(scratch.join("model.json"), "{}").unwrap();
+    assert!(is_found(&verify(scratch.path(), None).unwrap(), "model.json"));
+    fs::remove_file(scratch.join("recipe.toml")).unwrap();
+    assert!(is_found(&verify(scratch.path(), None).unwrap(), "recipe.toml"));
+}
+
+#[test]
+fn what_is_damaged_is_not_converted() {
+    let scratch = make("convert-damaged");
+    let to = Scratch::new("convert-to");
+    let layout = Layout::new([Format::Cellpose]);
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let convert = || papsynth_dataset::convert(scratch.path(), to.path(), &layout, &stop, &|_| ());
+    for (name, lost) in [("noise-free/000001.tif", false), ("images/000001.png", false), ("shards/000001.json", true)] {
+        let path = scratch.join(name);
+        let good = fs::read(&path).unwrap();
+        let mut bytes = good.clone();
+        *bytes.last_mut().unwrap() ^= 1;
+        if lost { fs::remove_file(&path) } else { fs::write(&path, bytes) }.unwrap();
+        let error = convert().unwrap_err();
+        assert!(!error.is_io() && error.to_string().contains(if lost { "shards" } else { name }), "{error}");
+        fs::write(path, good).unwrap();
+    }
+    assert_eq!(convert().unwrap().made, 3);
+}
+
+#[test]
+#[cfg(unix)]
+fn links_are_strays_and_lead_nowhere() {
+    let (scratch, elsewhere) = (make("links"), Scratch::new("elsewhere"));
+    fs::write(elsewhere.join("precious.txt"), "mine").unwrap();
+    std::os::unix::fs::symlink(elsewhere.path(), scratch.join("link")).unwrap();
+    let found = look(scratch.path()).findings;
+    assert_eq!(found.iter().map(|f| f.path.as_str()).collect::<Vec<_>>(), ["link"]);
+    clean(scratch.path(), true).unwrap();
+    assert!(!scratch.join("link").exists() && elsewhere.join("precious.txt").exists());
+}
