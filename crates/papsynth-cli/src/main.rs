@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+mod allocator;
 mod args;
 mod browser;
 mod calibrate;
@@ -40,7 +41,7 @@ use args::{Cli, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
-    memory::settle();
+    allocator::settle();
     exit::install_reports();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

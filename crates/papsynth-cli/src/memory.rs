@@ -10,15 +10,6 @@ use crate::exit::{Complaint, Failure};
 /// Share of what is available that is used where nothing else is said.
 const SHARE: f64 = 0.8;
 
-/// Keeps the memory of a long run from growing with its length. glibc keeps twice as much freed memory in every thread's heap as the largest
-/// block was that it ever gave back to the system (`M_TRIM_THRESHOLD` in mallopt(3)), so that each object larger than all before would raise
-/// what a run holds. A block given back at the beginning that is larger than those of small frames settles it; of larger frames it
-/// makes no difference.
-pub(crate) fn settle() {
-    const LARGEST: usize = 4 << 20;
-    drop(std::hint::black_box(vec![0_u8; LARGEST]));
-}
-
 /// What may be used: what was asked for, or a share of what is available, where the system tells.
 pub(crate) fn budget(asked: Option<u64>) -> Option<u64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number of bytes")]

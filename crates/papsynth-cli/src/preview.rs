@@ -16,7 +16,7 @@ const GAP: usize = 8;
 const GAP_GREY: u8 = 255;
 
 pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
-    text_file::may_replace(&args.out, b"\x89PNG", "an older picture")?;
+    text_file::is_png(&args.out)?;
     let setup = Setup::load(&args.engine, None)?;
     let key = Key { seed: args.engine.seed, index: args.index };
     let refuse = |error: Error| setup.recipe.refuse(&error);

@@ -37,11 +37,17 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
         let message = format!("--size {},{}: more than {MOST_PIXELS} pixels at once", args.size[0], args.size[1]);
         return Err(Failure::input(Complaint::new(message).help("`papsynth slide make` makes pictures of any size")));
     }
-    text_file::may_replace(&args.out, b"\x89PNG", "an older picture")?;
+    text_file::is_png(&args.out)?;
     let setup = Setup::load(&args.engine, None)?;
     let slide = open(&setup, args.engine.seed, args.slide)?;
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.refuse(&e))?;
     let middle = part.planes.len() / 2;
+    if part.planes.len() > 1 {
+        let (planes, um) = (part.planes.len(), part.planes[middle].stage_um);
+        exit::note(&format!(
+            "of {planes} planes the middle one, at {um} µm, is written; `papsynth slide make` writes all"
+        ));
+    }
     write_png(
         &args.out,
         &part.planes[middle].grey,

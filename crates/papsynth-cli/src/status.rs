@@ -19,9 +19,10 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
         return tell(args, &missing, there.shards, close.as_deref());
     }
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
-    let Some(frames) = args.frames else {
+    let merged = dataset.merged_frames()?;
+    let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
         let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
-        return Err(Failure::input(complaint.help("only a slide knows by itself how large it will be")));
+        return Err(Failure::input(complaint.help("only a slide, or a data set that was merged, knows it by itself")));
     };
     let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
@@ -55,7 +56,7 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
     if !missing.is_empty() {
         let shards = counted(count(&missing), "shard is", "shards are");
         let message = format!("{dir}: {shards} missing or damaged: {}", listed(&missing));
-        let help = "the command that makes the data set makes them, in any share; then merge again";
+        let help = "the command that makes the data set, with --verify, makes them, in any share; then merge again";
         return Err(Failure::input(Complaint::new(message).help(help)));
     }
     let summary = dataset.finish()?;

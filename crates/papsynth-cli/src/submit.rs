@@ -1,9 +1,12 @@
 //! `papsynth submit`: the script that makes a data set on a cluster.
 
+use std::path::Path;
+
 use clap::Parser;
 
-use crate::args::{Cli, Submit, Verb};
+use crate::args::{Cli, Generate, Submit, Verb};
 use crate::exit::{self, Complaint, Failure};
+use crate::setup::Setup;
 
 pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
     // What the tasks would refuse is refused here.
@@ -17,6 +20,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
         let complaint = Complaint::new("--shard and --threads are for the script to set");
         return Err(Failure::input(complaint.help("leave them out; --tasks and --threads before `--` say both")));
     }
+    check_here(&generate)?;
     let frames = generate.indices().end;
     let (layout, _) = generate.layout.layout(frames);
     let shards = frames.div_ceil(layout.frames_per_shard);
@@ -27,9 +31,33 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
     }
     let script = match args.scheduler.as_str() {
         "slurm" => slurm(args),
-        _ => kubernetes(args),
+        _ => {
+            let out = &generate.out;
+            if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
+                exit::note(&format!(
+                    "{} lies in the pod and is lost with it; the volume is mounted at /data, and addresses of object stores need none",
+                    out.display()
+                ));
+            }
+            kubernetes(args)
+        }
     };
     exit::print(&script)
+}
+
+/// What can be told of the recipe on this machine: all of it where it is here.
+fn check_here(generate: &Generate) -> Result<(), Failure> {
+    match &generate.engine.recipe.recipe {
+        Some(path) if !path.exists() => {
+            if path == Path::new("generate") {
+                let complaint = Complaint::new("`generate` after `--` would be taken for a recipe");
+                return Err(Failure::input(complaint.help("leave it out; what follows it is meant")));
+            }
+            exit::note(&format!("{} is not on this machine; the tasks must find it", path.display()));
+            Ok(())
+        }
+        _ => Setup::load(&generate.engine, None).map(drop),
+    }
 }
 
 fn slurm(args: &Submit) -> String {

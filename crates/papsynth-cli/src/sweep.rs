@@ -106,11 +106,36 @@ fn set_name(number: usize) -> String {
 fn axis(text: &str) -> Result<Axis, Failure> {
     let wrong = || Failure::input(Complaint::new(format!("--vary {text}: expected FIELD=A,B,…")));
     let (field, values) = text.split_once('=').ok_or_else(wrong)?;
-    let values: Vec<String> = values.split(',').map(|value| value.trim().to_owned()).collect();
+    let values = parts(values);
     if field.trim().is_empty() || values.iter().any(String::is_empty) {
         return Err(wrong());
     }
+    if let Some(twice) = values.iter().enumerate().find(|(number, value)| values[..*number].contains(value)) {
+        return Err(Failure::input(Complaint::new(format!("--vary {text}: {} stands there twice", twice.1))));
+    }
     Ok(Axis { field: field.trim().to_owned(), values })
+}
+
+/// What stands between commas, but those within brackets and quotes.
+fn parts(text: &str) -> Vec<String> {
+    let (mut parts, mut depth, mut quote) = (vec![String::new()], 0_u32, None);
+    for c in text.chars() {
+        match (quote, c) {
+            (Some(open), _) if open == c => quote = None,
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[' | '{') => depth += 1,
+            (None, ']' | '}') => depth = depth.saturating_sub(1),
+            (None, ',') if depth == 0 => {
+                parts.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(last) = parts.last_mut() {
+            last.push(c);
+        }
+    }
+    parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
 /// The values of a combination: the last axis changes first.
@@ -175,5 +200,13 @@ mod tests {
         assert_eq!(all[5], ["2", "z"]);
         assert!(axis("a").is_err() && axis("a=").is_err() && axis("=1").is_err());
         assert_eq!(csv_line(["a", "b,c", "d\"e"].into_iter()), "a,\"b,c\",\"d\"\"e\"\n");
+    }
+
+    #[test]
+    fn commas_within_brackets_and_quotes_part_nothing() {
+        assert_eq!(parts("1, 2,3"), ["1", "2", "3"]);
+        assert_eq!(parts("{ uniform = [2, 6] },3"), ["{ uniform = [2, 6] }", "3"]);
+        assert_eq!(parts("[1, [2, 3]],\"a, b\",']'"), ["[1, [2, 3]]", "\"a, b\"", "']'"]);
+        assert_eq!(parts("a,,]b,c"), ["a", "", "]b", "c"]);
     }
 }

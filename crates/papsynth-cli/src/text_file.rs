@@ -20,6 +20,17 @@ pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), F
     Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
 }
 
+/// Makes sure that a PNG can be written there, and that its name says nothing else.
+pub(crate) fn is_png(out: &Path) -> Result<(), Failure> {
+    const OTHERS: [&str; 7] = ["jpg", "jpeg", "tif", "tiff", "gif", "bmp", "webp"];
+    let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    if OTHERS.contains(&ending.as_str()) {
+        let message = format!("--out {}: the picture is a PNG; expected a name that ends in .png", out.display());
+        return Err(Failure::input(Complaint::new(message)));
+    }
+    may_replace(out, b"\x89PNG", "an older picture")
+}
+
 /// Makes sure, before long work, that a file can be written there, and leaves nothing behind.
 pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
     if out.is_dir() {

@@ -51,6 +51,7 @@ pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
     let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
     let mends: Vec<&str> = [
         (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
+        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
         (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
     ]
     .into_iter()

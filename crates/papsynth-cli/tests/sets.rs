@@ -289,6 +289,8 @@ fn nothing_of_anybody_else_is_replaced() {
     let run =
         bench.run(&format!("sweep --out twice --frames 1 --vary focus.centre_um=1 --vary focus.centre_um=3,4 {TINY}"));
     assert!(run.code == 2 && run.err.contains("varied already") && !bench.path("twice").exists(), "{}", run.err);
+    let run = bench.run(&format!("sweep --out equal --frames 1 --vary focus.centre_um=1,1 {TINY}"));
+    assert!(run.code == 2 && run.err.contains("twice") && !bench.path("equal").exists(), "{}", run.err);
     let run = bench.run(&format!("generate --out range --range 1..3 --frames-per-shard 2 {TINY}"));
     assert!(run.code == 2 && run.err.contains("multiple of 2") && !bench.path("range").exists(), "{}", run.err);
 }
@@ -340,6 +342,24 @@ fn a_plan_tells_time_bytes_and_shards() {
         assert!(run.out.contains(part), "{part}: {}", run.out);
     }
     assert!(bench.files("").is_empty(), "nothing is left");
+}
+
+#[test]
+fn what_tasks_would_miss_is_said_before() {
+    let bench = Bench::new("submit-here");
+    let submit = |words: &str| bench.run(&format!("submit {words} --frames 30"));
+    let run = submit("slurm --tasks 2 -- generate --out x");
+    assert!(run.code == 2 && run.err.contains("leave it out"), "{}", run.err);
+    let run = submit("slurm --tasks 2 -- --out x --set a.b=1");
+    assert!(run.code == 2 && run.err.contains("a.b"), "{}", run.err);
+    let run = submit("slurm --tasks 2 -- there.toml --out x");
+    assert!(run.code == 0 && run.err.contains("there.toml is not on this machine"), "{}", run.err);
+    let pod = |out: &str| submit(&format!("kubernetes --tasks 2 --image i -- --out {out}"));
+    let run = pod("many");
+    assert!(run.code == 0 && run.err.contains("many lies in the pod"), "{}", run.err);
+    for out in ["/data/many", "s3://bucket/many"] {
+        assert_eq!(pod(out).err, "", "{out}");
+    }
 }
 
 #[test]

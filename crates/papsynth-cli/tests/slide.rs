@@ -32,6 +32,9 @@ fn any_part_of_a_slide_is_made_alone() {
     refused(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=swath", "layout.kind");
     refused(&bench, "slide tile --at 0,0 --out no.png --set optics.imaging=abbe", "optics.imaging");
     refused(&bench, "slide tile --at 27000,27000 --out no.png --set scan.reach_um=20", "scan.reach_um");
+    refused(&bench, "slide tile --at 0,0 --size 20,20 --out no.jpg", "ends in .png");
+    let planes = bench.good(&format!("slide tile {SMALL} --at 0,0 --size 20,20 --out planes.png --set focus.planes=3"));
+    assert!(planes.err.contains("of 3 planes the middle one"), "{}", planes.err);
     fs::create_dir(bench.path("folder.png")).unwrap();
     refused(&bench, "slide tile --at 0,0 --size 20,20 --out folder.png", "folder.png");
     assert!(!bench.path("no.png").exists());
@@ -59,7 +62,7 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     assert_eq!(bench.files("slide"), bench.files("other"));
     fs::remove_dir_all(bench.path("slide")).unwrap();
     bench.good(&format!("{make} --shard 0/2"));
-    refused(&bench, "slide finalize slide", "shards are missing");
+    refused(&bench, "slide finalize slide", "shards are missing or damaged");
     assert_eq!(bench.good("status slide --missing").out, "1,3\n");
     assert_eq!(bench.good("status slide --missing --tasks 2").out, "1\n");
     bench.good(&format!("{make} --shard 1/2"));

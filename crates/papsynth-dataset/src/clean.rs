@@ -8,6 +8,7 @@ use crate::dataset::{read_record, recorded_shards};
 use crate::error::Error;
 use crate::files::{Folder, is_temporary};
 use crate::layout;
+use crate::nested;
 use crate::record::Manifest;
 #[cfg(feature = "zarr")]
 use crate::slide::SlideSet;
@@ -42,11 +43,14 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
         return Ok(cleaned);
     }
     let own = owner.names(folder)?;
-    for name in folder.names()? {
-        // A temporary file that is still there is somebody's work.
-        if own.contains(&name) || is_temporary(name.rsplit('/').next().unwrap_or(&name)) {
-            continue;
-        }
+    let mut found = folder.names()?;
+    // A temporary file that is still there is somebody's work.
+    found.retain(|name| !own.contains(name) && !is_temporary(name.rsplit('/').next().unwrap_or(name)));
+    if let Some(inner) = nested::below(folder, &found) {
+        let message = format!("{} lies within and has files of its own; move it elsewhere first", inner.display());
+        return Err(Error::Folder { path: folder.root().to_owned(), message });
+    }
+    for name in found {
         if folder.is_remote() || folder.path(&name).symlink_metadata().is_ok() {
             folder.remove(&name)?;
             cleaned.strays += 1;

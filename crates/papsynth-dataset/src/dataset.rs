@@ -17,6 +17,7 @@ use crate::files::{Folder, is_temporary};
 use crate::formats;
 use crate::layout::{self, Layout};
 use crate::merge;
+use crate::nested;
 use crate::read::{self, InputFile};
 use crate::record::{Check, FileRecord, FrameSummary, Identity, Manifest, ShardRecord};
 use crate::shard_writer::ShardWriter;
@@ -100,19 +101,22 @@ impl Dataset {
 
     fn begun(&self, given: &[(String, Vec<u8>)]) -> Result<(), Error> {
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
-        match stranger(&self.folder)? {
+        let stranger = stranger(&self.folder)?;
+        if stranger.is_none() {
+            nested::refuse(&self.folder)?;
+        }
+        match stranger {
             // Of several that begin at once one is the first.
             None if merge::begin_manifest(self)? => {}
             None => self.compare_or_restore(&recipe)?,
             Some(_) if self.folder.has(layout::MANIFEST)? => self.compare_or_restore(&recipe)?,
             Some(_) if self.restore()? => {}
             Some(name) => {
-                return Err(Error::Folder {
-                    path: self.folder.root().to_owned(),
-                    message: format!(
-                        "the folder holds something else (`{name}`) and no data set; choose another, or a new one"
-                    ),
-                });
+                let message = match recorded_shards(&self.folder)?.is_empty() {
+                    true => format!("the folder holds something else (`{name}`) and no data set; choose another, or a new one"),
+                    false => "its manifest.json is lost, and its shards are of another recipe, model, seed or layout; give what it was made from".to_owned(),
+                };
+                return Err(Error::Folder { path: self.folder.root().to_owned(), message });
             }
         }
         self.folder.sweep()?;
@@ -164,6 +168,14 @@ impl Dataset {
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
     pub(crate) fn images_of(&self, frame: &FrameSummary, shard: u64) -> [Option<String>; 2] {
         self.layout.images_of(self.identity.seed, shard, frame)
+    }
+
+    /// How many frames [`finish`](Self::finish) has merged; none of a data set that was only begun.
+    ///
+    /// # Errors
+    /// If the manifest cannot be read.
+    pub fn merged_frames(&self) -> Result<u64, Error> {
+        Ok(Manifest::read(&self.folder)?.frames)
     }
 
     /// Whether [`finish`](Self::finish) has merged all frames that are recorded, and its files are still there.

@@ -21,6 +21,7 @@ mod layers;
 mod layout;
 pub mod memory;
 mod merge;
+mod nested;
 #[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
 mod parquet;
 mod picture;

@@ -212,7 +212,17 @@ impl ShardRecord {
         if record.sealed().sha256 != record.sha256 {
             return Err(json("is not as it was written: its own SHA-256 is another".to_owned()));
         }
+        // The manifest vouches for the bytes of a record, and not for what they say.
+        if record.to_json() != bytes {
+            return Err(json("is not as it was written: it says the same in other bytes".to_owned()));
+        }
         Ok(record)
+    }
+
+    /// The bytes of its file.
+    pub(crate) fn to_json(&self) -> Vec<u8> {
+        // A number that has no JSON is in no record that was written.
+        serde_json::to_vec_pretty(self).unwrap_or_default()
     }
 
     /// Frames must be of this shard, in order, and of sizes that there are: what is read of them is allocated by these numbers.

@@ -1,13 +1,13 @@
 //! One shard, frame by frame, plane by plane, in every format of the data set.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, Truth};
 use papsynth::{Finished, Plane, white_level as white};
 
 use crate::coco::{Document, Info, category_name};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, read_record};
 use crate::error::Error;
 use crate::files::Output;
 use crate::flatten::Flatten;
@@ -53,6 +53,7 @@ impl<'a> ShardWriter<'a> {
         let folder = &dataset.folder;
         // From now on the shard is not whole, whatever it was before.
         folder.inside(layout::SHARDS)?;
+        folders_are_own(dataset, shard)?;
         folder.remove(&layout::record(shard))?;
         let place = Place { folder, layout: &dataset.layout, shard };
         let sinks = dataset.layout.formats.iter().map(|format| format.sink(place)).collect::<Result<_, _>>()?;
@@ -187,12 +188,21 @@ impl<'a> ShardWriter<'a> {
         // First the files and their names, then what says that they are there.
         folder.sync_names(&record.files)?;
         let name = layout::record(self.shard);
-        let text = serde_json::to_vec_pretty(&record);
-        let text = text.map_err(|e| Error::io("encode", &folder.path(&name))(e.into()))?;
-        folder.sync_names([&folder.write(&name, &text)?])?;
+        folder.sync_names([&folder.write(&name, &record.to_json())?])?;
         folder.release(record.files.iter().map(|file| file.path.as_str()).chain([name.as_str()]));
         Ok(record.frames)
     }
+}
+
+/// Where links lead outside nothing can be written: that is said while the record still stands.
+fn folders_are_own(dataset: &Dataset, shard: u64) -> Result<(), Error> {
+    if dataset.folder.is_remote() {
+        return Ok(());
+    }
+    let Ok(record) = read_record(&dataset.folder, shard) else { return Ok(()) };
+    let folders: BTreeSet<&str> =
+        record.files.iter().filter_map(|file| file.path.rsplit_once('/')).map(|(folder, _)| folder).collect();
+    folders.into_iter().try_for_each(|name| dataset.folder.no_link(name))
 }
 
 fn not_begun(dataset: &Dataset, shard: u64) -> Error {

@@ -1,6 +1,8 @@
 //! Whether a data set is whole to the last bit.
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::ops::Range;
 
 use papsynth::key::STREAM_VERSION;
@@ -15,7 +17,7 @@ use crate::formats::huggingface;
 use crate::layout;
 use crate::merge;
 use crate::read;
-use crate::record::{Check, FileRecord, Manifest, WRITER};
+use crate::record::{Check, Entry, FileRecord, Manifest, WRITER};
 use crate::store::Home;
 
 /// Largest recipe that is read back.
@@ -54,6 +56,8 @@ pub enum Mend {
     Generate,
     /// `papsynth clean` takes it away.
     Clean,
+    /// `papsynth merge`, when all shards are there.
+    Merge,
 }
 
 /// Reads every file of a data set, compares the files of each shard with each other, and makes again what is merged of them. With `expected`, every frame of that range must be there; without, every frame up to the last.
@@ -79,10 +83,16 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
         Err(error) => return Err(error),
     };
     let manifest = folder.record(layout::MANIFEST)?;
-    let Manifest { writer, files: merged, .. } = Manifest::read(folder)?;
+    let Manifest { writer, files: merged, frames: known, shards: closed, .. } = Manifest::read(folder)?;
     let mut listed: BTreeSet<String> = BTreeSet::from([layout::MANIFEST.to_owned()]);
     let (mut frames, mut there, mut is_damaged) = (0, Vec::new(), false);
-    for shard in recorded_shards(folder)? {
+    let recorded = recorded_shards(folder)?;
+    if (recorded.len() as u64) < closed {
+        // What a lost record vouched for is no stray, and what was merged was made of it.
+        is_damaged = true;
+        listed.extend(names_of_lost(folder, &recorded)?);
+    }
+    for &shard in &recorded {
         listed.insert(layout::record(shard));
         match dataset.whole_or_flaw(shard, Check::Hashes)? {
             Ok(record) => {
@@ -102,7 +112,7 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
             }
         }
     }
-    let expected = expected.unwrap_or_else(|| 0..there.last().map_or(0, |last: &u64| last + 1));
+    let expected = expected.unwrap_or_else(|| 0..there.last().map_or(0, |last: &u64| last + 1).max(known));
     for gap in gaps(&there, &expected) {
         let message = match gap.end - gap.start {
             1 => format!("is missing with frame {}", gap.start),
@@ -125,7 +135,8 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
         find(path, message, Mend::Generate);
     }
     // What is merged is made again and compared, and then the list of files, if all are there to make them from.
-    if is_known && !is_damaged && !merged.is_empty() {
+    let is_closed = closed >= recorded.len() as u64 && !merged.is_empty();
+    if is_known && !is_damaged && is_closed {
         let found: BTreeSet<String> = findings.iter().map(|finding| finding.path.clone()).collect();
         for Flaw { path, message } in merged_flaws(&dataset, &writer, &merged)? {
             listed.insert(path.clone());
@@ -133,6 +144,13 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
                 findings.push(Finding { path, message, mend: Mend::Generate });
             }
         }
+    }
+    if !is_closed {
+        let message = match recorded.is_empty() {
+            true => "no frame is made yet".to_owned(),
+            false => format!("{} of {} shards are merged", closed, recorded.len()),
+        };
+        findings.push(Finding { path: layout::MANIFEST.to_owned(), message, mend: Mend::Merge });
     }
     if findings.is_empty() && merge::manifest_sha256(&dataset, &writer, &merged)? != manifest.sha256 {
         let message = "does not name the files that are there".to_owned();
@@ -151,6 +169,23 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
     findings.sort();
     let root = findings.is_empty().then_some(manifest.sha256);
     Ok(Verdict { root, frames, files, findings })
+}
+
+/// The files that the manifest lists of shards whose records are gone, the records too.
+fn names_of_lost(folder: &Folder, recorded: &[u64]) -> Result<Vec<String>, Error> {
+    let path = folder.inside(layout::MANIFEST)?;
+    let failed = |e| Error::io("read", &path)(e);
+    let mut names = Vec::new();
+    // A file a line.
+    for line in BufReader::new(File::open(&path).map_err(failed)?).lines() {
+        let line = line.map_err(failed)?;
+        let entry = line.strip_suffix(',').or(line.strip_suffix("]}")).unwrap_or(&line);
+        let Ok(entry) = serde_json::from_str::<Entry>(entry) else { continue };
+        if entry.shard.is_some_and(|shard| recorded.binary_search(&shard).is_err()) {
+            names.push(entry.path);
+        }
+    }
+    Ok(names)
 }
 
 /// What is wrong with the files that the data set was begun with, and with what the manifest says of them.

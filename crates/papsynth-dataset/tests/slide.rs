@@ -66,7 +66,7 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
     make(&two.0, &engine, Share { index: 1, of: 2 }, Check::Sizes);
     let half = SlideSet::open(&two.0).unwrap();
     let gap = half.finish(Check::Sizes).unwrap_err().to_string();
-    assert!(gap.contains("3 of 6 shards are missing") && gap.contains("0000-0000"), "{gap}");
+    assert!(gap.contains("3 of 6 shards are missing or damaged") && gap.contains("0000-0000"), "{gap}");
     make(&two.0, &engine, Share { index: 0, of: 2 }, Check::Sizes);
     assert_eq!(half.finish(Check::Sizes).unwrap(), root);
     // What is read back is what the engine makes, in every level.
@@ -177,6 +177,19 @@ fn whatever_is_wrong_is_found_and_mended() {
     assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, strays: 0, stayed: 0 });
     assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, strays: 1, stayed: 0 });
     assert_eq!(set.verify().unwrap(), []);
+    // What says the same in other bytes is not what was written.
+    for name in ["shards/0000-0000.json", "upper.json"] {
+        let mut bytes = fs::read(folder.0.join(name)).unwrap();
+        bytes.push(b'\n');
+        fs::write(folder.0.join(name), bytes).unwrap();
+        let found = set.verify().unwrap();
+        assert!(found.len() == 1 && found[0].path == name && found[0].mend == Mend::Generate, "{found:?}");
+        make(&folder.0, &engine, Share::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
+        assert_eq!(set.verify().unwrap(), []);
+    }
+    let (slide, recipe_here, model) = (engine.slide(SEED, 0).unwrap(), recipe(), Model::builtin());
+    let within = SlideSet::create_or_resume(&folder.0.join("objects/inner"), &slide, &info(&recipe_here, &model));
+    assert!(within.unwrap_err().to_string().contains("lies within"));
     // What the slide is made from is made anew from the records, if they are of this slide.
     let head = fs::read(folder.0.join("slide.json")).unwrap();
     for lost in [None, Some(&head[..head.len() / 2])] {

@@ -161,7 +161,7 @@ pub(crate) struct Status {
     /// Folder or object store of the data set, or folder of a slide
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Frames that there will be: those with index 0 to N − 1; a slide knows its size by itself
+    /// Frames that there will be: those with index 0 to N − 1; a slide, or a data set that was merged, knows it by itself
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) frames: Option<u64>,
     /// Print only what is missing, as numbers and ranges that `sbatch --array` takes; nothing if nothing is

@@ -36,11 +36,16 @@ pub(crate) enum SlideVerb {
     Make(SlideMake),
     /// Close a slide whose shards were made by several: the upper levels, a thumbnail, a card. Fails on any gap.
     Finalize(SlideFinalize),
-    /// Make any part of a slide alone, as a PNG.
+    /// Make any part of a slide alone, as a PNG; of several planes the middle one.
     Tile(SlideTile),
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth slide make --out slide --size 8192,8192 --set scan.deposit.x_um=1000 --set scan.deposit.y_um=1000
+  papsynth slide make mine.toml --out big --shard 0/16         one of sixteen shares
+  papsynth slide make mine.toml --out big --verify             reads what is there, and makes again what is wrong")]
 pub(crate) struct SlideMake {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
@@ -75,6 +80,7 @@ pub(crate) struct SlideMake {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  papsynth slide finalize big")]
 pub(crate) struct SlideFinalize {
     /// Folder of the slide
     #[arg(value_name = "DIR")]
@@ -85,10 +91,11 @@ pub(crate) struct SlideFinalize {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  papsynth slide tile --at 30000,28000 --size 1024,768 --out tile.png")]
 pub(crate) struct SlideTile {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// PNG to write
+    /// PNG to write: of a slide of several planes the middle one
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Number of the slide among those of the seed

@@ -121,6 +121,17 @@ impl Folder {
 
     /// The path of a file that is read or written: neither it nor a folder on the way is a link, which could lead outside.
     pub(crate) fn inside(&self, name: &str) -> Result<PathBuf, Error> {
+        self.no_link(name)?;
+        if let Some(remote) = &self.remote
+            && !self.path(name).exists()
+        {
+            remote.get(name, &self.path(name))?;
+        }
+        Ok(self.path(name))
+    }
+
+    /// Neither a file or folder nor a folder on the way to it is a link.
+    pub(crate) fn no_link(&self, name: &str) -> Result<(), Error> {
         let mut path = self.root.clone();
         for part in name.split('/') {
             path.push(part);
@@ -131,13 +142,7 @@ impl Folder {
                 Err(_) => break,
             }
         }
-        if let Some(remote) = &self.remote
-            && !path.is_dir()
-            && !self.path(name).exists()
-        {
-            remote.get(name, &self.path(name))?;
-        }
-        Ok(self.path(name))
+        Ok(())
     }
 
     /// Writes a whole file.

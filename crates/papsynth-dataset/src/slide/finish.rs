@@ -8,14 +8,14 @@ use sha2::{Digest, Sha256};
 
 use super::document::{LAYERS, folder};
 use super::read::parts;
-use super::{SlideSet, UPPER, name_of, place, wrong};
+use super::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, wrong};
 use crate::error::Error;
 use crate::files::hex;
 use crate::record::{Check, FileRecord};
 use crate::write;
 
 /// Longer side of the thumbnail at most, px.
-const THUMBNAIL: usize = 1024;
+const THUMBNAIL_PX: usize = 1024;
 
 /// A closed slide.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl SlideSet {
             return Err(wrong(
                 self.path(),
                 format!(
-                    "{} of {} shards are missing, the first is {}; `papsynth slide make` with the same recipe makes them",
+                    "{} of {} shards are missing or damaged, the first is {}; `papsynth slide make --verify` with the same recipe makes them",
                     missing.len(),
                     self.all().count(),
                     name_of(first)
@@ -61,7 +61,7 @@ impl SlideSet {
             self.upper::<u32>(&self.forms.labels, Some(group.name()), 0, halved_labels, &mut files)?;
         }
         self.upper::<u16>(&self.forms.layers, Some(LAYERS), 0, halved_labels, &mut files)?;
-        files.push(self.folder.keep("thumbnail.png", &self.thumbnail()?)?);
+        files.push(self.folder.keep(THUMBNAIL, &self.thumbnail()?)?);
         let mut objects = 0;
         let mut all: Vec<FileRecord> = Vec::new();
         for at in self.all() {
@@ -69,7 +69,7 @@ impl SlideSet {
             objects += record.objects;
             all.extend(record.files);
         }
-        files.push(self.folder.keep("README.md", self.card(objects).as_bytes())?);
+        files.push(self.folder.keep(CARD, self.card(objects).as_bytes())?);
         self.write_record(UPPER, files.clone(), objects)?;
         all.extend(files);
         all.sort_by(|a, b| a.path.cmp(&b.path));
@@ -144,7 +144,7 @@ impl SlideSet {
         let sizes = self.forms.image.levels().iter().map(|array| array.shape());
         let level = sizes
             .enumerate()
-            .find(|(_, [_, _, rows, columns])| rows.max(columns) <= &THUMBNAIL)
+            .find(|(_, [_, _, rows, columns])| rows.max(columns) <= &THUMBNAIL_PX)
             .map_or(self.levels() - 1, |(level, _)| level);
         let [width, height] = self.level_px(level).unwrap_or([1; 2]);
         let grey = self.picture(level, plane, 0..height, 0..width)?;
@@ -152,7 +152,7 @@ impl SlideSet {
         let bytes: Vec<u16> = grey.iter().map(|grey| grey >> shift).collect();
         let pixel_um = self.head.pixel_um * f64::from(1_u32 << level);
         write::png(&bytes, width, self.head.channels, 8, pixel_um)
-            .map_err(|e| wrong(self.path(), format!("thumbnail.png: {e}")))
+            .map_err(|e| wrong(self.path(), format!("{THUMBNAIL}: {e}")))
     }
 
     fn card(&self, objects: u64) -> String {

@@ -31,6 +31,7 @@ use crate::difference;
 use crate::error::Error;
 use crate::files::Folder;
 use crate::layout;
+use crate::nested;
 use crate::record::{Check, FileRecord, Identity};
 
 pub use finish::Finished;
@@ -41,10 +42,14 @@ use document::Forms;
 use record::RECORD_BYTES;
 
 /// Name of the file that says what a slide is made from.
-const HEAD: &str = "slide.json";
+const HEAD: &str = crate::nested::SLIDE[0];
 
 /// Name of the record of what was added at the end.
 const UPPER: &str = "upper.json";
+
+/// Names of the small picture and of the card.
+const THUMBNAIL: &str = "thumbnail.png";
+const CARD: &str = "README.md";
 
 /// Folder of the image.
 const IMAGE: &str = "slide.ome.zarr";
@@ -91,6 +96,7 @@ impl SlideSet {
         match stranger(&set.folder)? {
             // Of several that begin at once one is the first.
             None => {
+                nested::refuse(&set.folder)?;
                 look_at_the_middle(slide)?;
                 if !set.folder.write_unless_there(HEAD, |out| out.bytes(&text))? {
                     set.compare_or_restore(&recipe)?;
@@ -117,6 +123,13 @@ impl SlideSet {
     fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
         let found = match SlideHead::read(&self.folder) {
             Err(Error::Input { .. }) if self.is_recorded()? => return Ok(()),
+            Err(Error::Input { problem, .. }) if !self.folder.names_in(layout::SHARDS)?.is_empty() => {
+                let message = format!(
+                    "its {HEAD} is lost or damaged ({problem}), and its shards are of another recipe, model, seed, size or number; give what it was \
+                     begun with"
+                );
+                return Err(wrong(self.path(), message));
+            }
             found => found?,
         };
         let Some(what) = found.differs(&self.head) else { return Ok(()) };

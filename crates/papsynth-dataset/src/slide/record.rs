@@ -10,7 +10,7 @@ use crate::error::{Error, Problem};
 use crate::files::{Folder, sha256};
 use crate::record::{FileRecord, Identity, WRITER, broken};
 
-const FORMAT: &str = "papsynth-slide";
+const FORMAT: &str = crate::nested::SLIDE[1];
 const VERSION: u32 = 1;
 
 /// Largest record that is read back.
@@ -178,6 +178,9 @@ impl SlideRecord {
         }
         if record.clone().sealed().sha256 != record.sha256 {
             return said("is not as it was written: its own SHA-256 is another");
+        }
+        if record.to_json() != bytes {
+            return said("is not as it was written: it says the same in other bytes");
         }
         Ok(record)
     }

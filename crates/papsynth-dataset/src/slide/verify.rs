@@ -2,7 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::{HEAD, SlideSet, UPPER, name_of, record_name};
+use papsynth::truth::Group;
+use papsynth_zarr::{Array, Pyramid};
+
+use super::document::{LAYERS, folder};
+use super::{CARD, HEAD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
 use crate::error::Error;
 use crate::files::is_temporary;
 use crate::layout;
@@ -30,7 +34,9 @@ impl SlideSet {
                 find(&file.path, &flaw, Mend::Generate);
             }
         }
-        let known = self.names_of(&files);
+        let mut known = self.names_of(&files);
+        // What a lost record vouched for is no stray.
+        known.extend(unrecorded.iter().flat_map(|name| self.vouched_for(name)));
         for path in self.folder.names()?.iter().filter(|path| !known.contains(path.as_str())) {
             let is_left = is_temporary(path.rsplit('/').next().unwrap_or(path));
             let message = if is_left { "was left behind by a run that was killed" } else { "is no file of the slide" };
@@ -67,6 +73,38 @@ impl SlideSet {
             }
         }
         Ok((files, unrecorded))
+    }
+
+    /// The names of the files that a record must name.
+    fn vouched_for(&self, record: &str) -> Vec<String> {
+        let Some(at) = self.all().find(|&at| record_name(at) == record) else {
+            let upper = |labels: Option<&str>, pyramid: &Pyramid| {
+                let levels = pyramid.levels().iter().enumerate().skip(pyramid.with_shard());
+                let files = |(level, array): (usize, &Array)| {
+                    array.shards().map(|shard| format!("{}/{}", folder(labels, level), array.file(shard))).collect()
+                };
+                levels.flat_map::<Vec<String>, _>(files).collect()
+            };
+            return [vec![CARD.to_owned(), THUMBNAIL.to_owned()], self.of_arrays(upper)].concat();
+        };
+        let square = |labels: Option<&str>, pyramid: &Pyramid| {
+            let planes = if labels.is_none() { self.head.planes_um.len() } else { 1 };
+            let levels = pyramid.levels().iter().enumerate().take(pyramid.with_shard());
+            let files = |(level, array): (usize, &Array)| {
+                let name = |plane| format!("{}/{}", folder(labels, level), array.file(place(at, plane)));
+                (0..planes).map(name).collect()
+            };
+            levels.flat_map::<Vec<String>, _>(files).collect()
+        };
+        let objects = ["csv", "geojson", "parquet"].map(|ending| format!("objects/{}.{ending}", name_of(at)));
+        [objects.to_vec(), self.of_arrays(square)].concat()
+    }
+
+    /// What is told of the pyramids of the picture and of all labels.
+    fn of_arrays(&self, tell: impl Fn(Option<&str>, &Pyramid) -> Vec<String>) -> Vec<String> {
+        let labels = Group::ALL.iter().map(|group| tell(Some(group.name()), &self.forms.labels));
+        let others = [tell(None, &self.forms.image), tell(Some(LAYERS), &self.forms.layers)];
+        labels.chain(others).flatten().collect()
     }
 
     fn record_names(&self) -> impl Iterator<Item = String> + use<> {

@@ -153,3 +153,104 @@ fn links_are_strays_and_lead_nowhere() {
     clean(scratch.path(), true).unwrap();
     assert!(!scratch.join("link").exists() && elsewhere.join("precious.txt").exists());
 }
+
+#[test]
+fn a_record_that_says_the_same_in_other_bytes_is_found_and_written_again() {
+    let scratch = make("reworded");
+    let before = contents(scratch.path());
+    let name = "shards/000000.json";
+    let text = fs::read_to_string(scratch.join(name)).unwrap();
+    let compact = serde_json::from_str::<serde_json::Value>(&text).unwrap().to_string();
+    for other in [format!("{text}\n"), text.replacen("  ", "\t", 1), compact] {
+        fs::write(scratch.join(name), other).unwrap();
+        assert!(is_found(&look(scratch.path()), name));
+        fill(scratch.path(), 2);
+        assert_eq!(contents(scratch.path()), before);
+    }
+}
+
+#[test]
+fn a_lost_record_is_named_and_what_it_vouched_for_is_no_stray() {
+    let scratch = make("lost-last");
+    for lost in [&[1_u64][..], &[0, 1]] {
+        for shard in lost {
+            fs::remove_file(scratch.join(&format!("shards/{shard:06}.json"))).unwrap();
+        }
+        let verdict = verify(scratch.path(), None).unwrap();
+        let [finding] = &verdict.findings[..] else { panic!("{verdict:?}") };
+        let first = format!("shards/{:06}.json", lost[0]);
+        assert_eq!((finding.path.as_str(), finding.mend), (first.as_str(), Mend::Generate), "{verdict:?}");
+        fill(scratch.path(), 2);
+        assert!(look(scratch.path()).root.is_some());
+    }
+}
+
+#[test]
+fn what_is_not_merged_is_not_called_damaged() {
+    let scratch = Scratch::new("unmerged");
+    let (recipe, layout) = (recipe(), Layout::new([Format::Folder]));
+    let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let told = |message: &str| {
+        let verdict = verify(scratch.path(), None).unwrap();
+        let [finding] = &verdict.findings[..] else { panic!("{verdict:?}") };
+        assert_eq!(
+            (finding.path.as_str(), finding.mend, finding.message.as_str()),
+            ("manifest.json", Mend::Merge, message)
+        );
+    };
+    let write = |index| {
+        let one = frame(index, 1, 8, 1);
+        let mut writer = dataset.shard_writer(index).unwrap();
+        writer.begin(&one.finished.scene).unwrap();
+        writer.write_plane(&one.planes[0]).unwrap();
+        writer.end(&one.finished).unwrap();
+        writer.commit().unwrap();
+    };
+    told("no frame is made yet");
+    write(0);
+    told("0 of 1 shards are merged");
+    dataset.finish().unwrap();
+    assert!(verify(scratch.path(), None).unwrap().root.is_some());
+    write(1);
+    told("1 of 2 shards are merged");
+}
+
+#[test]
+fn a_set_within_a_set_is_refused_and_not_cleaned_away() {
+    let scratch = make("outer");
+    let begin = |path: &std::path::Path| {
+        let (recipe, layout) = (recipe(), Layout::new([Format::Folder]));
+        let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
+        Dataset::create_or_resume(path, &info).map(drop)
+    };
+    for inner in ["inner", "images/inner", "one/two/../inner"] {
+        let refused = begin(&scratch.join(inner)).unwrap_err().to_string();
+        assert!(refused.contains("lies within"), "{refused}");
+        assert!(look(scratch.path()).root.is_some());
+    }
+    // One that came there in another way stays.
+    let beside = Scratch::new("beside");
+    begin(beside.path()).unwrap();
+    fs::rename(beside.path(), scratch.join("inner")).unwrap();
+    let before = contents(scratch.path());
+    let refused = clean(scratch.path(), true).unwrap_err().to_string();
+    assert!(refused.contains("inner lies within"), "{refused}");
+    assert_eq!(contents(scratch.path()), before);
+}
+
+#[test]
+#[cfg(unix)]
+fn what_cannot_be_mended_for_a_link_keeps_its_record() {
+    let (scratch, elsewhere) = (make("link-mend"), Scratch::new("link-mend-elsewhere"));
+    let before: Vec<_> = fs::read_dir(scratch.join("shards")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    fs::create_dir_all(elsewhere.path()).unwrap();
+    fs::remove_dir_all(scratch.join("images")).unwrap();
+    std::os::unix::fs::symlink(elsewhere.path(), scratch.join("images")).unwrap();
+    let (recipe, layout) = (recipe(), Layout { frames_per_shard: 2, ..Layout::new(Format::built()) });
+    let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: None, layout: &layout };
+    let dataset = Dataset::create_or_resume(scratch.path(), &info).unwrap();
+    let refused = dataset.shard_writer(0).err().unwrap().to_string();
+    assert!(refused.contains("images") && before.iter().all(|file| file.exists()), "{refused}");
+    assert!(contents(elsewhere.path()).is_empty());
+}
