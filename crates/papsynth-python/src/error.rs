@@ -38,5 +38,6 @@ pub(crate) fn engine(py: Python<'_>, source: &str, error: &papsynth::Error) -> P
 
 /// What reading files says.
 pub(crate) fn dataset(error: &papsynth_dataset::Error) -> PyErr {
-    if error.is_io() { PyOSError::new_err(error.to_string()) } else { PyValueError::new_err(error.to_string()) }
+    let is_of_system = matches!(error, papsynth_dataset::Error::Io { .. });
+    if is_of_system { PyOSError::new_err(error.to_string()) } else { PyValueError::new_err(error.to_string()) }
 }
