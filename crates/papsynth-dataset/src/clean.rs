@@ -25,7 +25,8 @@ pub struct Cleaned {
     pub stayed: u64,
 }
 
-/// Removes from a data set or a slide what killed runs left behind and, if wanted, everything else that is none of its files.
+/// Removes from a data set or a slide what killed runs left behind and, if wanted, everything else that is none of its files, with
+/// the folders that are empty then.
 ///
 /// # Errors
 /// If there is neither, strays cannot be told (a record cannot be read, or the work of all shards is not closed yet, so that others may be
@@ -58,6 +59,8 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
             cleaned.stayed += 1;
         }
     }
+    // One may stand where a file belongs.
+    folder.remove_empty()?;
     Ok(cleaned)
 }
 

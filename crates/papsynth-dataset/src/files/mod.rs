@@ -22,8 +22,11 @@ use hash::measure;
 /// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
 ///
 /// # Errors
-/// If the system refuses; then there is no such file, or still the former one.
+/// If there is a folder of that name, or the system refuses; then there is no such file, or still the former one.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    if path.is_dir() {
+        return Err(Error::io("write", path)(io::ErrorKind::IsADirectory.into()));
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Folder::new(folder).write(&name, bytes).map(|_| ())
@@ -245,6 +248,13 @@ impl Folder {
             }
         }
         Ok(found)
+    }
+
+    /// Removes folders in which there is nothing, or only such folders. The root stays, and so does what the system keeps.
+    pub(crate) fn remove_empty(&self) -> Result<(), Error> {
+        // From the inmost: what lies within a folder comes after it.
+        self.folders()?.iter().skip(1).rev().for_each(|path| drop(fs::remove_dir(path)));
+        Ok(())
     }
 
     /// Every file, by its name, in order. Links are files: nothing of ours is one.

@@ -113,7 +113,12 @@ impl Pending {
     }
 
     fn rename(&mut self) -> Result<(), Error> {
-        let renamed = fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
+        let rename = || fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
+        let renamed = rename().or_else(|error| match error.kind() {
+            // A folder in the file's place gives way if there is nothing in it.
+            io::ErrorKind::IsADirectory if fs::remove_dir(&self.path).is_ok() => rename(),
+            _ => Err(error),
+        });
         renamed.map_err(Error::io("write", &self.path))?;
         self.committed = true;
         self.remote.as_ref().map_or(Ok(()), |remote| remote.put(&self.name, &self.path))

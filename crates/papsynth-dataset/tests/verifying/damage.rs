@@ -92,6 +92,32 @@ fn every_file_that_is_gone_or_too_many_is_found() {
 }
 
 #[test]
+fn a_folder_where_a_file_belongs_is_found_and_gives_way() {
+    let scratch = make("folder-for-file");
+    let before = contents(scratch.path());
+    let name = "images/000001.png";
+    let place = scratch.join(name);
+    let mend = |strays: Option<u64>| {
+        assert!(is_found(&look(scratch.path()), name));
+        if let Some(strays) = strays {
+            assert_eq!(clean(scratch.path(), true).unwrap().strays, strays);
+            assert!(!place.exists() && scratch.join("images").exists());
+        }
+        fill(scratch.path(), 2);
+        assert_eq!(contents(scratch.path()), before);
+        fs::remove_file(&place).unwrap();
+    };
+    fs::remove_file(&place).unwrap();
+    fs::create_dir(&place).unwrap();
+    mend(None);
+    fs::create_dir_all(place.join("deep")).unwrap();
+    mend(Some(0));
+    fs::create_dir_all(place.join("deep")).unwrap();
+    fs::write(place.join("deep/notes.txt"), "mine").unwrap();
+    mend(Some(1));
+}
+
+#[test]
 fn before_it_is_merged_nothing_is_taken_for_a_stray() {
     let scratch = Scratch::new("unmerged");
     let recipe =
