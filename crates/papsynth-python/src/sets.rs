@@ -20,7 +20,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Most frames whose shards are listed.
 const MOST_FRAMES: u64 = 1_000_000_000;
 
-/// Makes the frames of a data set that are not whole there, or one share of them.
+/// Makes the frames of a data set that are not whole there, or a part of them.
 ///
 /// Parameters
 /// ----------
@@ -28,9 +28,9 @@ const MOST_FRAMES: u64 = 1_000_000_000;
 /// out : str or os.PathLike
 ///     New, empty, or a data set of the same recipe, seed and formats.
 /// frames : int
-///     Frames that there will be in all, by every share.
+///     Frames that there will be in all, by all parts.
 /// seed : int
-/// share : tuple of int
+/// shard : tuple of int
 ///     (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
 /// formats : list of str
 ///     Such as "folder" or "webdataset", as of the command line.
@@ -55,7 +55,7 @@ const MOST_FRAMES: u64 = 1_000_000_000;
 /// ValueError
 ///     If the folder holds something else.
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, share=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
+#[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
@@ -63,7 +63,7 @@ pub(crate) fn generate<'py>(
     out: PathBuf,
     frames: u64,
     seed: u64,
-    share: (u64, u64),
+    shard: (u64, u64),
     formats: Option<Vec<String>>,
     frames_per_shard: Option<u64>,
     threads: usize,
@@ -71,9 +71,9 @@ pub(crate) fn generate<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let made_by = engine.get();
-    let (index, of) = share;
+    let (index, of) = shard;
     if of == 0 || index >= of {
-        return Err(PyValueError::new_err(format!("share: ({index}, {of}) is none; expected (i, n) with i below n")));
+        return Err(PyValueError::new_err(format!("shard: ({index}, {of}) is none; expected (i, n) with i below n")));
     }
     for (name, number) in [("frames", frames), ("threads", threads as u64)] {
         if number == 0 {

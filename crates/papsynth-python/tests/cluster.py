@@ -16,7 +16,7 @@ from pathlib import Path
 import papsynth
 
 RECIPE = {"field": {"width_px": 320, "height_px": 240}}
-FRAMES, SEED, SHARES = 60, 7, 20
+FRAMES, SEED, PARTS = 60, 7, 20
 WORDS = {"formats": ["folder", "webdataset"], "frames_per_shard": 1}
 
 
@@ -27,10 +27,10 @@ def check(holds, claim):
 
 
 def dying(deaths, after):
-    """What a share is made by, where the first so many die: before their end, or after it and before anybody hears of it."""
+    """What a part is made by, where the first so many die: before their end, or after it and before anybody hears of it."""
     usual = papsynth._sets.generate
 
-    def share_of(recipe, out, frames, seed, share, options):
+    def part_of(recipe, out, frames, seed, shard, options):
         marks = Path(out).parent / "deaths"
         marks.mkdir(exist_ok=True)
 
@@ -43,16 +43,20 @@ def dying(deaths, after):
                     continue
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        usual(recipe, out, frames, seed, share=share, progress=None if after else die, **options)
+        usual(recipe, out, frames, seed, shard=shard, progress=None if after else die, **options)
         if after:
             die()
-        return share[0]
 
-    return share_of
+    return part_of
 
 
 def deaths_in(folder):
     return len(list((folder / "deaths").iterdir()))
+
+
+def is_progress(told):
+    whole = [count for count, _ in told]
+    return len(whole) > 2 and whole == sorted(set(whole)) and whole[-1] == FRAMES and {of for _, of in told} == {FRAMES}
 
 
 def with_ray(folder, expected):
@@ -62,9 +66,13 @@ def with_ray(folder, expected):
 
     # Workers have their packages from here, and their tasks by value.
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error")
-    papsynth.ray._share = dying(12, after=False)
-    root = papsynth.ray.generate(RECIPE, folder / "set", FRAMES, SEED, shares=SHARES, **WORDS)
+    papsynth.ray._part = dying(12, after=False)
+    told = []
+    root = papsynth.ray.generate(
+        RECIPE, folder / "set", FRAMES, SEED, shards=PARTS, progress=lambda *counts: told.append(counts), **WORDS
+    )
     check(deaths_in(folder) == 12 and root == expected, f"Ray: the same root hash with 12 workers killed: {root}")
+    check(is_progress(told), "Ray: progress is told from commit records")
     samples = list(papsynth.ray.dataset(RECIPE, SEED, 5, transform=lambda frame: frame.image))
     same = all((papsynth.render(RECIPE, SEED, index).image == image).all() for index, image in enumerate(samples))
     check(same and len(samples) == 5, "Ray: samples come in the order of their indices")
@@ -82,9 +90,13 @@ def with_dask(folder, expected):
 
     dask.config.set({"distributed.scheduler.allowed-failures": 20})
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        papsynth.dask._share = dying(8, after=True)
-        root = papsynth.dask.generate(RECIPE, folder / "set", FRAMES, SEED, client=client, shares=SHARES, **WORDS)
+        papsynth.dask._part = dying(8, after=True)
+        told = []
+        root = papsynth.dask.generate(
+            RECIPE, folder / "set", FRAMES, SEED, client=client, shards=PARTS, progress=lambda *counts: told.append(counts), **WORDS
+        )
     check(deaths_in(folder) == 8 and root == expected, f"Dask: the same root hash with 8 workers killed after the write: {root}")
+    check(is_progress(told), "Dask: progress is told from commit records")
     killed_driver("dask", folder, expected)
 
 
@@ -93,7 +105,7 @@ def killed_driver(engine, folder, expected):
     script = f"""
 import papsynth.{engine} as engine
 if __name__ == "__main__":
-    print(engine.generate({RECIPE!r}, {str(out)!r}, {FRAMES}, {SEED}, shares={SHARES}, **{WORDS!r}))
+    print(engine.generate({RECIPE!r}, {str(out)!r}, {FRAMES}, {SEED}, shards={PARTS}, **{WORDS!r}))
 """
     (folder / "driver.py").write_text(script)
     words = [sys.executable, str(folder / "driver.py")]

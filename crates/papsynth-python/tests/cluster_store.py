@@ -155,9 +155,9 @@ def main(program, folder):
     check(Faulty.refused > 10 and Faulty.lost > 10, f"{Faulty.refused} requests were refused, {Faulty.lost} answers lost")
 
     out = f"s3://{BUCKET}/some/where"
-    papsynth.generate(RECIPE, out, FRAMES, SEED, share=(1, 2), **WORDS)
+    papsynth.generate(RECIPE, out, FRAMES, SEED, shard=(1, 2), **WORDS)
     check(papsynth.missing(out, FRAMES) == list(range(0, FRAMES, 2)), "Python knows what is missing in a store")
-    papsynth.generate(RECIPE, out, FRAMES, SEED, share=(0, 2), **WORDS)
+    papsynth.generate(RECIPE, out, FRAMES, SEED, shard=(0, 2), **WORDS)
     check(papsynth.merge(out, FRAMES) == expected, "Python: the same root hash in an object store")
 
     lost = "killed/images/000007.png" if "images/000007.png" in files else f"killed/{sorted(name for name in files if '000007' in name)[0]}"

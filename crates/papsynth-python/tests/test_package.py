@@ -85,8 +85,8 @@ def test_bytes_are_those_of_the_command_line(tmp_path):
 def test_data_sets_have_the_root_hash_of_the_command_line(tmp_path):
     words = ["--frames", "4", "--seed", "7", "--no-parquet"] if has_parquet() else ["--frames", "4", "--seed", "7"]
     subprocess.run([PROGRAM, "generate", "--out", tmp_path / "cli", "--quiet", *words, *WORDS], check=True)
-    for share in range(3):
-        papsynth.generate(SMALL, tmp_path / "py", 4, seed=7, share=(share, 3))
+    for part in range(3):
+        papsynth.generate(SMALL, tmp_path / "py", 4, seed=7, shard=(part, 3))
     assert papsynth.merge(tmp_path / "py", 4) == papsynth.verify(tmp_path / "cli", 4)["root"]
 
 
@@ -96,7 +96,7 @@ def has_parquet():
 
 def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
     seen = []
-    first = papsynth.generate(SMALL, tmp_path / "set", 4, share=(0, 2), progress=seen.append)
+    first = papsynth.generate(SMALL, tmp_path / "set", 4, shard=(0, 2), progress=seen.append)
     assert first == {"kept": 0, "made": 2} and sorted(seen) == [0, 2]
     assert papsynth.missing(tmp_path / "set", 4) == [1, 3]
     with pytest.raises(ValueError, match="2 shards are missing: 1, 3"):
@@ -108,7 +108,7 @@ def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
     assert [path for path, _ in papsynth.verify(tmp_path / "set")["findings"]] == ["images/000002.png"]
     with pytest.raises(ValueError, match="seed"):
         papsynth.generate(SMALL, tmp_path / "set", 4, seed=1)
-    for wrong in ({"share": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
+    for wrong in ({"shard": (2, 2)}, {"threads": 0}, {"formats": ["jpeg"]}, {"frames_per_shard": 0}):
         with pytest.raises(ValueError):
             papsynth.generate(SMALL, tmp_path / "none", 4, **wrong)
     with pytest.raises(OSError):

@@ -67,7 +67,7 @@ def generate(
     frames: int,
     seed: int = 0,
     *,
-    share: tuple[int, int] = (0, 1),
+    shard: tuple[int, int] = (0, 1),
     formats: list[str] | None = None,
     frames_per_shard: int | None = None,
     threads: int = 1,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -22,14 +23,50 @@ def _list(formats: str | Sequence[str] | None) -> list[str] | None:
     return [formats] if isinstance(formats, str) else None if formats is None else list(formats)
 
 
-def tasks(recipe: Any, frames: int, workers: int, options: dict[str, Any]) -> int:
-    """Into how many tasks a cluster divides a data set: one a shard, but tasks of 64 frames at least where there are more of them than
-    four a worker. Whatever is wrong with the recipe is raised here, before a task is begun."""
+def written(recipe: Any, frames: int, options: dict[str, Any]) -> int:
+    """Number of shards that are written. Whatever is wrong with the recipe or the options is raised here, before a cluster is begun."""
     if unknown := set(options) - {"formats", "frames_per_shard", "threads", "verify", "model"}:
         raise TypeError(f"{', '.join(sorted(unknown))}: not known; expected formats, frames_per_shard, threads, verify or model")
     engine(recipe, options.get("model"))
-    shards = _native.shards(frames, _list(options.get("formats")), options.get("frames_per_shard"))
-    return min(shards, max(4 * workers, frames // 64, 1))
+    return _native.shards(frames, _list(options.get("formats")), options.get("frames_per_shard"))
+
+
+def tasks(written: int, frames: int, workers: int, shards: int | None) -> int:
+    """Into how many tasks a cluster divides so many shards: one each, but tasks of 64 frames at least where there are more of them than
+    four a worker, unless the number is said."""
+    if shards is not None and shards < 1:
+        raise ValueError(f"shards: {shards}; expected 1 or more")
+    return min(written, max(4 * workers, frames // 64, 1) if shards is None else shards)
+
+
+class Told:
+    """Tells, now and then, how many shards are whole, by their commit records."""
+
+    def __init__(self, out: str, frames: int, written: int, progress: Callable[[int, int], object] | None):
+        self._out, self._frames, self._written, self._progress = out, frames, written, progress
+        self._last, self._next = -1, time.monotonic()
+
+    def now_and_then(self) -> None:
+        if self._progress is None or time.monotonic() < self._next:
+            return
+        begun = time.monotonic()
+        try:
+            whole = self._written - len(missing(self._out, self._frames))
+        except (ValueError, OSError):
+            # Before the first task there is no data set. What else is wrong is said by whoever needs it.
+            whole = 0
+        self._tell(whole)
+        # However many records there are, reading them takes no more than a twentieth of the time.
+        ended = time.monotonic()
+        self._next = ended + max(1.0, 20 * (ended - begun))
+
+    def finish(self) -> None:
+        self._tell(self._written)
+
+    def _tell(self, whole: int) -> None:
+        if self._progress is not None and whole != self._last:
+            self._last = whole
+            self._progress(whole, self._written)
 
 
 def generate(
@@ -38,7 +75,7 @@ def generate(
     frames: int,
     seed: int = 0,
     *,
-    share: tuple[int, int] = (0, 1),
+    shard: tuple[int, int] = (0, 1),
     formats: str | Sequence[str] | None = None,
     frames_per_shard: int | None = None,
     threads: int = 1,
@@ -46,7 +83,7 @@ def generate(
     model: Any = None,
     progress: Callable[[int], object] | None = None,
 ) -> dict[str, int]:
-    """Makes the frames of a data set that are not whole there, or one share of them.
+    """Makes the frames of a data set that are not whole there, or a part of them.
 
     Killed and called again it goes on; several processes may work on the same folder. `merge` closes the data set.
 
@@ -58,10 +95,10 @@ def generate(
         New, empty, or a data set of the same recipe, seed and formats: a folder, or an object store (``s3://bucket/prefix``, ``gs://``,
         ``az://``) with keys in the environment.
     frames : int
-        Frames that there will be in all, by every share.
+        Frames that there will be in all, by all parts.
     seed : int
-    share : tuple of int
-        (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
+    shard : tuple of int
+        (i, n), as of `--shard i/n`: every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
     formats : str or list of str
         Such as ``"folder"`` (the default) or ``"webdataset"``.
     frames_per_shard : int, optional
@@ -95,7 +132,7 @@ def generate(
         os.fspath(out),
         frames,
         seed,
-        share=tuple(share),
+        shard=tuple(shard),
         formats=_list(formats),
         frames_per_shard=frames_per_shard,
         threads=threads,

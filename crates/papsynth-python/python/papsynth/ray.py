@@ -1,4 +1,4 @@
-"""Data sets made by a Ray cluster: one task a share of the shards."""
+"""Data sets made by a Ray cluster: a task a part of the shards."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ def _ray():
     return ray
 
 
-def _share(recipe, out, frames, seed, share, options):
-    _sets.generate(recipe, out, frames, seed, share=share, **options)
-    return share[0]
+def _part(recipe, out, frames, seed, shard, options):
+    _sets.generate(recipe, out, frames, seed, shard=shard, **options)
 
 
 def generate(
@@ -34,7 +33,7 @@ def generate(
     frames: int,
     seed: int = 0,
     *,
-    shares: int | None = None,
+    shards: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> str:
@@ -47,11 +46,11 @@ def generate(
     ----------
     recipe, out, frames, seed
         As of `papsynth.generate`.
-    shares : int, optional
-        Number of tasks; by default one a shard, but of 64 frames at least where that leaves each processor four. What a task has at work
-        is lost with its worker, but for the shards that are whole.
+    shards : int, optional
+        Into how many parts the work is divided, a task each, as n of `--shard i/n`; by default one for each shard that is written, but of
+        64 frames at least where that leaves each processor four. What a task has at work is lost with its worker, but for what is whole.
     progress : callable, optional
-        Called with the number of shares that are done and that there are.
+        Called with the number of shards that are written whole, and of all, from commit records: what was there before counts.
     **options
         As of `papsynth.generate`: formats, frames_per_shard, threads, verify, model.
 
@@ -62,21 +61,26 @@ def generate(
     """
     ray = _ray()
     # What is wrong is said before a cluster is begun.
-    _sets.tasks(recipe, frames, 1, options)
+    written = _sets.written(recipe, frames, options)
+    _sets.tasks(written, frames, 1, shards)
     if not ray.is_initialized():
         ray.init()
     out = _sets.place(out)
-    most = _sets.tasks(recipe, frames, max(1, int(ray.cluster_resources().get("CPU", 1))), options)
-    shares = most if shares is None else max(1, min(shares, frames))
-    task = ray.remote(max_retries=_RETRIES, retry_exceptions=[OSError], num_cpus=options.get("threads", 1))(_share)
-    pending = [task.remote(recipe, out, frames, seed, (share, shares), options) for share in range(shares)]
-    done = 0
-    while pending:
-        ready, pending = ray.wait(pending, timeout=1.0)
-        ray.get(ready)
-        done += len(ready)
-        if progress is not None and ready:
-            progress(done, shares)
+    told = _sets.Told(out, frames, written, progress)
+    parts = _sets.tasks(written, frames, max(1, int(ray.cluster_resources().get("CPU", 1))), shards)
+    task = ray.remote(max_retries=_RETRIES, retry_exceptions=[OSError], num_cpus=options.get("threads", 1))(_part)
+    pending = [task.remote(recipe, out, frames, seed, (part, parts), options) for part in range(parts)]
+    try:
+        while pending:
+            ready, pending = ray.wait(pending, num_returns=len(pending), timeout=1.0)
+            ray.get(ready)
+            told.now_and_then()
+    except BaseException:
+        # One that cannot be made ends all: nobody waits for the others.
+        for one in pending:
+            ray.cancel(one)
+        raise
+    told.finish()
     return _sets.merge(out, frames)
 
 
