@@ -14,7 +14,7 @@ pub(crate) const CHORE: Chore = Chore {
     details: "Runs are killed at N random moments (1000 unless it is said) and completed again, once on a disk that is full; a thousand bits of a data set in every format are turned \
               over, one at a time, it is cut a hundred times and loses each of its files, and all must be found. Every field of a recipe gets whatever it cannot be. Inputs of every fuzz target are \
               changed N times (100000). N tiny images (100000) must not need more memory than a tenth of them, and estimates of memory are held against what is needed. N windows (1000) of a slide are put together from tiles of three sizes. By \
-              hand, before a release: with these numbers it takes hours.",
+              hand, before a release: with these numbers it takes three quarters of an hour on 2 cores.",
     run,
 };
 
