@@ -26,7 +26,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let (kills, fuzz, tiny) = (number("--kills", 1000)?, number("--fuzz", 100_000)?, number("--tiny", 100_000)?);
     let windows = number("--windows", 1000)?;
     arguments.finish()?;
-    let test = |package: &str, suite: &str, filter: &str| {
+    let test = |package: &str, filter: &str| {
         let mut cargo = workspace.cargo();
         cargo.args([
             "test",
@@ -34,7 +34,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
             "--package",
             package,
             "--test",
-            suite,
+            "it",
             filter,
             "--",
             "--nocapture",
@@ -45,12 +45,12 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         cargo.env("PAPSYNTH_WINDOWS", windows.to_string());
         shell::run(&mut cargo)
     };
-    test("papsynth-cli", "sets", "whatever_is_killed")?;
-    test("papsynth-cli", "sets", "a_full_disk")?;
-    test("papsynth-dataset", "verifying", "every_")?;
-    test("papsynth-cli", "hostile", "")?;
-    test("papsynth-dataset", "corpus", "")?;
-    test("papsynth-cli", "memory", "")?;
-    test("papsynth", "slide", "windows_of_tiles")?;
+    test("papsynth-cli", "sets::whatever_is_killed")?;
+    test("papsynth-cli", "sets::a_full_disk")?;
+    test("papsynth-dataset", "verifying::damage::every_")?;
+    test("papsynth-cli", "hostile::")?;
+    test("papsynth-dataset", "corpus::")?;
+    test("papsynth-cli", "memory::")?;
+    test("papsynth", "slide::windows_of_tiles")?;
     Ok(Outcome::Done)
 }

@@ -26,10 +26,11 @@ pub(crate) struct Outcome {
 
 impl Bench {
     pub(crate) fn new(name: &str) -> Self {
-        let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-{}", std::process::id()));
-        let _ = fs::remove_dir_all(&root);
-        fs::create_dir_all(&root).unwrap();
-        Self { root }
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        fs::create_dir_all(folder).unwrap();
+        let path = |n: u32| folder.join(format!("{name}-{}-{n}", std::process::id()));
+        // Tests that run beside each other may use the same name.
+        Self { root: (0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap() }
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

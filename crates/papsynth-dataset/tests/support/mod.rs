@@ -22,10 +22,9 @@ pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
+        let path = |n: u32| std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}-{n}", std::process::id()));
+        // Tests that run beside each other may use the same name.
+        Self((0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap())
     }
 
     pub(crate) fn path(&self) -> &Path {

@@ -12,8 +12,9 @@ pub(crate) struct Scratch(PathBuf);
 impl Scratch {
     /// With folders `real` and `synthetic` of three pictures each.
     pub(crate) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("papsynth-study-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
+        let path = |n: u32| std::env::temp_dir().join(format!("papsynth-study-{}-{name}-{n}", std::process::id()));
+        // Tests that run beside each other may use the same name.
+        let path = (0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap();
         for (side, glass) in [("real", 200), ("synthetic", 230)] {
             fs::create_dir_all(path.join(side)).unwrap();
             for k in 0..3 {

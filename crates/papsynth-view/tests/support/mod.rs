@@ -20,9 +20,9 @@ pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("papsynth-view-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
+        let path = |n: u32| std::env::temp_dir().join(format!("papsynth-view-{}-{name}-{n}", std::process::id()));
+        // Tests that run beside each other may use the same name.
+        let path = (0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap();
         Self(path)
     }
 

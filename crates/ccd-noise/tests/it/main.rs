@@ -1,0 +1,5 @@
+//! Integration tests, linked as one program.
+
+mod emva;
+mod jpeg;
+mod laws;

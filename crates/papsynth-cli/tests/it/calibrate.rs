@@ -1,0 +1,494 @@
+//! `papsynth calibrate` from outside: images of known blur and noise in, the same numbers out.
+
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
+#[allow(dead_code, reason = "each test uses its part")]
+use crate::support;
+use std::fs;
+use std::path::PathBuf;
+
+use crate::support::{Bench, Outcome};
+use ccd_noise::{Camera, CameraParams, ReadNoise};
+use optics_psf::{Border, BrightField, BrightFieldParams, Gaussian, Microscope, MicroscopeParams, Padding, Scratch};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use tiff::encoder::{TiffEncoder, colortype};
+use toml::Table;
+
+/// Side of the images, pixels of 0.25 µm.
+const SIDE: usize = 128;
+
+fn uniform(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
+    low + (high - low) * f64::from(rng.next_u32()) / 4_294_967_296.0
+}
+
+/// A row-major image of what `at` gives for x and y.
+fn image(side: usize, at: impl Fn(f64, f64) -> f64) -> Vec<f32> {
+    (0..side * side).map(|i| at((i % side) as f64, (i / side) as f64) as f32).collect()
+}
+
+/// Absorbance of a nucleus, an ellipse with a soft border and clumps of chromatin; lengths in µm.
+fn nucleus(seed: u64) -> impl Fn(f64, f64) -> f64 {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let clumps: Vec<[f64; 3]> = (0..40)
+        .map(|_| {
+            let (r, turn) = (uniform(&mut rng, 0.0, 1.0).sqrt() * 3.3, uniform(&mut rng, 0.0, core::f64::consts::TAU));
+            [r * libm::cos(turn), 0.85 * r * libm::sin(turn), uniform(&mut rng, -0.5, 0.8)]
+        })
+        .collect();
+    move |x, y| {
+        let (u, v) = (x / 4.2, y / 3.5);
+        let d = (1.0 - (u * u + v * v).sqrt()) * 3.8;
+        let inside = 0.5 * (1.0 + libm::erf(d / 0.25));
+        let at = |[cx, cy, h]: &[f64; 3]| h * libm::exp(-((x - cx) * (x - cx) + (y - cy) * (y - cy)) / 0.18);
+        0.35 * inside * (0.9 + 0.5 * clumps.iter().map(at).sum::<f64>()).max(0.05)
+    }
+}
+
+/// Planes of an object as a microscope shows it that moves its stage; `object` is given in µm from the middle.
+fn bright_field(condenser_na: f64, stages_um: &[f64], object: impl Fn(f64, f64) -> f64) -> Vec<Vec<f32>> {
+    let microscope = Microscope::new(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() }).unwrap();
+    let samples = 2 * SIDE;
+    let params = BrightFieldParams {
+        width: samples,
+        height: samples,
+        padding: Padding::Periodic,
+        depths_um: vec![0.0],
+        stages_um: stages_um.to_vec(),
+        ..BrightFieldParams::default()
+    };
+    let field = BrightField::new(&microscope, &params).unwrap();
+    let mut specimen = field.specimen();
+    let um = |v: f64| (v - SIDE as f64) * 0.125;
+    field.set_absorbance(&mut specimen, 0, &image(samples, |x, y| object(um(x), um(y))));
+    (0..stages_um.len()).map(|plane| field.image(&mut specimen, plane)).collect()
+}
+
+fn blurred(image: &[f32], width: usize, sigma_px: f64) -> Vec<f32> {
+    let mut out = image.to_vec();
+    let gaussian = Gaussian::new(sigma_px).unwrap();
+    gaussian.blur_into(image, width, Border::Replicate, &mut out, &mut Scratch::new());
+    out
+}
+
+fn write_pages(path: PathBuf, planes: &[Vec<f32>], width: usize) {
+    let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+    for plane in planes {
+        let (width, height) = (width as u32, (plane.len() / width) as u32);
+        encoder.write_image::<colortype::Gray32Float>(width, height, plane).unwrap();
+    }
+}
+
+fn write_grey16(path: PathBuf, grey: &[u16], width: usize) {
+    let mut encoder = TiffEncoder::new(fs::File::create(path).unwrap()).unwrap();
+    encoder.write_image::<colortype::Gray16>(width as u32, (grey.len() / width) as u32, grey).unwrap();
+}
+
+/// Three nuclei, each in focus in a plane of its own, with a Gaussian of 0.6 px for each plane from there.
+fn three_nuclei(planes: usize) -> Vec<Vec<f32>> {
+    let nuclei = [(40.0, 44.0, 8), (150.0, 60.0, 9), (90.0, 150.0, 10)];
+    let focused: Vec<(Vec<f32>, usize)> = nuclei
+        .map(|(cx, cy, plane)| {
+            let nucleus = nucleus(plane as u64);
+            let light = |x: f64, y: f64| 200.0 * libm::exp10(-nucleus(0.25 * (x - cx), 0.25 * (y - cy)));
+            (image(192, light), plane)
+        })
+        .to_vec();
+    (0..planes)
+        .map(|k| {
+            let mut light = vec![200.0_f32; 192 * 192];
+            for (nucleus, plane) in &focused {
+                let nucleus = blurred(nucleus, 192, 0.6 * k.abs_diff(*plane) as f64);
+                light.iter_mut().zip(nucleus).for_each(|(sum, value)| *sum += value - 200.0);
+            }
+            light
+        })
+        .collect()
+}
+
+fn toml(bench: &Bench, name: &str, section: &str) -> Table {
+    let table: Table = toml::from_str(&fs::read_to_string(bench.path(name)).unwrap()).unwrap();
+    table[section].as_table().unwrap().clone()
+}
+
+fn number(table: &Table, key: &str) -> f64 {
+    let value = &table[key];
+    value.as_float().or(value.as_integer().map(|v| v as f64)).unwrap()
+}
+
+fn json(bench: &Bench, name: &str) -> serde_json::Value {
+    serde_json::from_str(&fs::read_to_string(bench.path(name)).unwrap()).unwrap()
+}
+
+/// A run that must be refused with code 2, name what is wrong, and write nothing.
+fn refused(bench: &Bench, words: &str, named: &[&str]) {
+    let Outcome { code, err, out } = bench.run(&format!("calibrate {words}"));
+    assert_eq!(code, 2, "{words}\n{out}{err}");
+    for named in named {
+        assert!(err.contains(named), "{words}: wanted {named:?} in\n{err}");
+    }
+    assert!(!bench.path("calibration").exists(), "{words}");
+}
+
+#[test]
+fn a_stack_in_micrometres_gives_fig_10_and_the_condenser() {
+    let bench = Bench::new("calibrate-condenser");
+    let stages: Vec<f64> = (-5..=4).map(|i| 0.8 * f64::from(i)).collect();
+    write_pages(bench.path("stack.tif"), &bright_field(0.41, &stages, nucleus(3)), SIDE);
+    let run = bench.good("calibrate --stack stack.tif --step-um 0.8 --pixel-um 0.25");
+    assert!(run.out.contains("in focus in plane 5") && run.out.contains("condenser NA"), "{}", run.out);
+    let optics = toml(&bench, "calibration/optics.toml", "optics");
+    assert_eq!(optics["kind"].as_str(), Some("bright-field"));
+    assert!((number(&optics, "condenser_na") - 0.41).abs() < 0.02, "{optics}");
+    assert_eq!(number(&toml(&bench, "calibration/optics.toml", "light"), "wavelength_um"), 0.57);
+    let known = [("na", 0.95), ("mount_index", 1.515), ("immersion_index", 1.0)];
+    for (key, value) in known.into_iter().chain([("extra_blur_um", 0.0), ("stray_light", 0.0)]) {
+        assert_eq!(number(&optics, key), value, "{key}");
+    }
+    // The default aperture is the one that gives the paper's 0.25 µm for each µm.
+    let gaussian = toml(&bench, "calibration/optics-gaussian.toml", "optics");
+    assert_eq!(gaussian["kind"].as_str(), Some("gaussian"));
+    assert!((number(&gaussian, "sigma_z_um_per_um") - 0.25).abs() < 0.02, "{gaussian}");
+    let focus = &json(&bench, "calibration/calibration.json")["focus"];
+    let (error, bound) = (&focus["condenser"]["error"], &focus["condenser"]["bound"]);
+    let error = error.as_f64().unwrap();
+    assert!((0.004..0.02).contains(&error) && bound == "inside", "{error} {bound}");
+    assert!((number(&optics, "condenser_na") - 0.41).abs() < 3.0 * error, "{optics} {error}");
+    assert!(focus["asymmetry"].as_f64().unwrap() < 0.02, "{focus}");
+    let svg = fs::read_to_string(bench.path("calibration/focus.svg")).unwrap();
+    assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>") && svg.contains("<text"), "{svg}");
+    assert!(svg.contains("µm per µm"));
+
+    // Opened wider, blur grows; the same command replaces what it wrote.
+    write_pages(bench.path("stack.tif"), &bright_field(0.6, &stages, nucleus(3)), SIDE);
+    bench.good("calibrate --stack stack.tif --step-um 0.8 --pixel-um 0.25 --window 44,44,40,40");
+    let optics = toml(&bench, "calibration/optics.toml", "optics");
+    assert!((number(&optics, "condenser_na") - 0.6).abs() < 0.03, "{optics}");
+}
+
+#[test]
+fn a_folder_of_planes_gives_the_law_in_planes() {
+    let bench = Bench::new("calibrate-planes");
+    fs::create_dir(bench.path("planes")).unwrap();
+    for (k, plane) in three_nuclei(19).iter().enumerate() {
+        // Names whose letters alone would put plane 10 before plane 2.
+        bench.grey_png(&format!("planes/z{k}.png"), 192, 192, |x, y| plane[(y * 192 + x) as usize].round() as u8);
+    }
+    let run = bench.good("calibrate --stack planes --out here");
+    assert!(run.out.contains("give --pixel-um and --step-um") && !run.out.contains("condenser"), "{}", run.out);
+    let names: Vec<String> = bench.files("here").into_keys().collect();
+    assert_eq!(names, ["calibration.json", "focus.svg"]);
+    let focus = &json(&bench, "here/calibration.json")["focus"];
+    let mut focused: Vec<u64> =
+        focus["nuclei"].as_array().unwrap().iter().map(|n| n["focused"].as_u64().unwrap()).collect();
+    focused.sort_unstable();
+    assert_eq!(focused, [8, 9, 10]);
+    for side in ["before", "after"] {
+        let side = &focus[side];
+        assert!((side["slope_px"].as_f64().unwrap() - 0.6).abs() < 0.015, "{side}");
+        assert!((side["proportional_px"].as_f64().unwrap() - 0.6).abs() < 0.015, "{side}");
+        assert!(side["r_squared"].as_f64().unwrap() > 0.999, "{side}");
+    }
+    // The files of a folder, named one by one, and a length alone.
+    let files: String = (0..19).rev().map(|k| format!(" planes/z{k}.png")).collect();
+    let again = bench.good(&format!("calibrate --out there --step-um 0.5 --stack{files}"));
+    assert!(again.out.contains("1.2") && again.out.contains("px for each um of travel"), "{}", again.out);
+    assert!(again.out.contains("give --pixel-um\n"), "{}", again.out);
+    assert_eq!(json(&bench, "there/calibration.json")["focus"]["nuclei"], focus["nuclei"]);
+}
+
+#[test]
+fn edges_are_found_and_measured() {
+    let bench = Bench::new("calibrate-edge");
+    // An edge at an angle, with a disk and noise beside it.
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xED6E);
+    let noise: Vec<f64> = (0..SIDE * SIDE).map(|_| (0..12).map(|_| uniform(&mut rng, -0.5, 0.5)).sum()).collect();
+    let drawn = image(SIDE, |x, y| {
+        let d = 0.8 * (x - 50.3) + 0.6 * (y - 60.1);
+        let r = ((x - 100.0) * (x - 100.0) + (y - 90.0) * (y - 90.0)).sqrt() - 9.0;
+        let disk = 50.0 * 0.5 * libm::erfc(r / (0.6 * 2_f64.sqrt()));
+        80.0 + 120.0 * 0.5 * libm::erfc(-d / (0.9 * 2_f64.sqrt())) - disk + noise[y as usize * SIDE + x as usize]
+    });
+    bench.grey_png("edge.png", SIDE as u32, SIDE as u32, |x, y| drawn[y as usize * SIDE + x as usize].round() as u8);
+    for line in ["", "--line 35,48,65,72 ", "--line 62,44,38,76 "] {
+        let run = bench.good(&format!("calibrate --edge edge.png {line}--pixel-um 0.2"));
+        let found = json(&bench, "calibration/calibration.json")["edge"].clone();
+        let (sigma, error) = (found["sigma_px"].as_f64().unwrap(), found["error_px"].as_f64().unwrap());
+        assert!((sigma - 0.9).abs() < 0.03 && error > 0.001 && error < 0.03, "{line}: {found}");
+        assert!((found["normal"][0].as_f64().unwrap() - 0.8).abs() < 0.02, "{line}: {found}");
+        let gaussian = toml(&bench, "calibration/optics-gaussian.toml", "optics");
+        assert!((number(&gaussian, "sigma_xy_um") - 0.18).abs() < 0.006, "{gaussian}");
+        // What is not measured is the paper's.
+        assert_eq!(number(&gaussian, "sigma_z_um_per_um"), 0.25);
+        assert!(run.out.contains("sigma_xy") && bench.path("calibration/edge.svg").exists());
+    }
+}
+
+#[test]
+fn blur_beyond_the_lens_is_told_from_that_of_the_lens() {
+    let bench = Bench::new("calibrate-extra");
+    let half = |x: f64, y: f64| 0.15 * libm::erfc(-(0.8 * x + 0.6 * y) / (0.03 * 2_f64.sqrt()));
+    let sharp = &bright_field(0.41, &[0.0], half)[0];
+    for (extra_px, least, most) in [(0.0, 0.0, 0.04), (0.8, 0.19, 0.21)] {
+        let seen = if extra_px > 0.0 { blurred(sharp, SIDE, extra_px) } else { sharp.clone() };
+        write_pages(bench.path("edge.tif"), &[seen], SIDE);
+        bench.good("calibrate --edge edge.tif --line 52,64,76,64 --pixel-um 0.25");
+        let optics = toml(&bench, "calibration/optics.toml", "optics");
+        let extra = number(&optics, "extra_blur_um");
+        assert!((least..=most).contains(&extra), "{extra_px} px: {extra}");
+        assert_eq!(number(&optics, "condenser_na"), 0.41);
+    }
+}
+
+/// Frames of one light; all are `SIDE` pixels wide and high.
+fn expose(camera: &Camera, folder: PathBuf, names: &[&str], electrons: f32, rng: &mut Xoshiro256PlusPlus) {
+    fs::create_dir_all(&folder).unwrap();
+    for name in names {
+        let mut grey = vec![0; SIDE * SIDE];
+        camera.expose_into(&vec![electrons; SIDE * SIDE], SIDE, &mut grey, rng);
+        write_grey16(folder.join(name), &grey, SIDE);
+    }
+}
+
+/// A camera of 12 bits with everything that photon transfer measures.
+fn camera() -> CameraParams {
+    CameraParams {
+        bit_depth: 12,
+        gain_dn_per_e: 0.25,
+        full_well_e: 18_000.0,
+        offset_dn: 100.0,
+        read_noise: ReadNoise::Same { e: 9.0 },
+        prnu: 0.01,
+        dsnu_e: 5.0,
+        ..CameraParams::default()
+    }
+}
+
+const PAIR: [&str; 2] = ["1.tif", "2.tif"];
+const MANY: [&str; 8] = ["1.tif", "2.tif", "3.tif", "4.tif", "5.tif", "6.tif", "7.tif", "8.tif"];
+
+#[test]
+fn flats_give_the_camera() {
+    let bench = Bench::new("calibrate-flat");
+    let (camera, mut rng) = (Camera::new(&camera()).unwrap(), Xoshiro256PlusPlus::seed_from_u64(0xF1A7));
+    expose(&camera, bench.path("flats/Dark"), &MANY, 0.0, &mut rng);
+    for (ms, electrons) in [(5, 1000.0), (10, 2000.0), (20, 4000.0), (60, 12_000.0), (100, 20_000.0)] {
+        expose(&camera, bench.path(&format!("flats/{ms}ms")), &PAIR, electrons, &mut rng);
+    }
+    expose(&camera, bench.path("flats/40ms"), &MANY, 8000.0, &mut rng);
+    let run = bench.good("calibrate --flat flats --bits 12");
+    let found = json(&bench, "calibration/calibration.json")["camera"].clone();
+    let is = |key: &str, expected: f64, within: f64| {
+        let value = found[key].as_f64().unwrap();
+        assert!((value - expected).abs() < within, "{key}: {value}, not {expected} within {within}");
+    };
+    // A variance of n pixels has a standard error of √(2 ∕ n): 0.8 % here for pairs; bounds are three and more of them.
+    is("gain_dn_per_e", 0.25, 0.005);
+    is("offset_dn", 100.0, 0.05);
+    is("dark_noise_e", 9.0, 0.3);
+    is("dsnu_e", 5.0, 0.3);
+    is("prnu", 0.01, 0.0005);
+    is("full_scale_e", 3995.0 / 0.25, 320.0);
+    assert_eq!(found["saturation"]["reached"], true, "{found}");
+    let preset = toml(&bench, "calibration/camera.toml", "camera");
+    assert_eq!((number(&preset, "bits"), preset["photon_noise"].as_str()), (12.0, Some("exact")));
+    for (key, expected, within) in [
+        ("full_well_e", 15_980.0, 320.0),
+        ("read_noise_e", 9.0, 0.3),
+        ("offset_dn", 100.0, 0.05),
+        ("prnu", 0.01, 0.001),
+    ] {
+        assert!((number(&preset, key) - expected).abs() < within, "{preset}");
+    }
+    let rows: Vec<&str> = run.out.lines().filter(|line| line.contains("flats/")).collect();
+    assert_eq!(rows.len(), 7, "{}", run.out);
+    assert!(rows[0].contains("Dark") && rows[6].contains("100ms"), "{}", run.out);
+    assert!(fs::read_to_string(bench.path("calibration/photon-transfer.svg")).unwrap().contains("Photon transfer"));
+
+    // The same light in pairs of files, the dark elsewhere.
+    for (k, electrons) in [1000.0, 4000.0, 8000.0].into_iter().enumerate() {
+        let names = [format!("{k}a.tif"), format!("{k}b.tif")];
+        expose(&camera, bench.path("pairs"), &names.each_ref().map(String::as_str), electrons, &mut rng);
+    }
+    bench.good("calibrate --flat pairs --dark flats/Dark --bits 12 --out pairs-out");
+    let gain = json(&bench, "pairs-out/calibration.json")["camera"]["gain_dn_per_e"].as_f64().unwrap();
+    assert!((gain - 0.25).abs() < 0.006, "{gain}");
+}
+
+#[test]
+fn flats_that_cannot_be_used_are_refused() {
+    let bench = Bench::new("calibrate-bad-flat");
+    let (camera, mut rng) = (Camera::new(&camera()).unwrap(), Xoshiro256PlusPlus::seed_from_u64(0xBAD));
+    let mut frames = |folder: &str, names: &[&str], electrons: f32| {
+        expose(&camera, bench.path(folder), names, electrons, &mut rng);
+    };
+    frames("darks", &PAIR, 0.0);
+    frames("white", &PAIR, 60_000.0);
+    frames("white", &["3.tif", "4.tif"], 90_000.0);
+    refused(&bench, "--flat white --dark darks --bits 12", &["--flat white", "levels of flats are saturated", "4095"]);
+    frames("sizes/5ms", &PAIR, 4000.0);
+    fs::create_dir(bench.path("sizes/10ms")).unwrap();
+    for name in PAIR {
+        write_grey16(bench.path("sizes/10ms").join(name), &[900; 64 * 32], 64);
+    }
+    refused(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "64 x 32 pixels, others 128 x 128", "one size"]);
+    refused(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
+    fs::remove_dir_all(bench.path("sizes/10ms")).unwrap();
+    refused(&bench, "--flat sizes --dark darks", &["16 bits do not tell", "--bits"]);
+    refused(&bench, "--flat sizes --dark darks --bits 8", &["--bits is 8, but", "grey level"]);
+    refused(&bench, "--flat sizes --dark darks --bits 17", &["17 is not in 8..=16"]);
+    refused(&bench, "--flat sizes --dark no-such --bits 12", &["no-such", "no such folder"]);
+    refused(&bench, "--flat no-such --dark darks --bits 12", &["no-such"]);
+    frames("alike/1", &PAIR, 0.0);
+    refused(&bench, "--flat alike --dark darks --bits 12", &["alike: the brightest level is", "at least 1 %"]);
+    frames("odd", &["1.tif", "2.tif", "3.tif"], 4000.0);
+    refused(&bench, "--flat odd --dark darks --bits 12", &["3 files; expected pairs"]);
+    frames("single/5ms", &["1.tif"], 4000.0);
+    refused(&bench, "--flat single --dark darks --bits 12", &["5ms: 1 frame; expected 2 or more"]);
+    frames("both/5ms", &PAIR, 4000.0);
+    frames("both/dark", &PAIR, 0.0);
+    refused(&bench, "--flat both --dark darks --bits 12", &["--dark", "dark frames of its own"]);
+    let cut = Camera::new(&CameraParams { offset_dn: 0.0, ..self::camera() }).unwrap();
+    expose(&cut, bench.path("cut"), &PAIR, 0.0, &mut rng);
+    refused(&bench, "--flat sizes --dark cut --bits 12", &["cut", "raise the offset"]);
+    fs::create_dir_all(bench.path("tiny/dark")).unwrap();
+    for name in PAIR {
+        write_grey16(bench.path("tiny/dark").join(name), &[100; 12 * 12], 12);
+        write_grey16(bench.path("tiny").join(name), &[900; 12 * 12], 12);
+    }
+    refused(&bench, "--flat tiny --bits 12", &["12 x 12 pixels", "more than 15 pixels"]);
+}
+
+#[test]
+fn stacks_and_edges_that_cannot_be_measured_are_refused() {
+    let bench = Bench::new("calibrate-bad");
+    let planes = three_nuclei(19);
+    let write = |name: &str, planes: &[Vec<f32>]| write_pages(bench.path(name), planes, 192);
+    write("stack.tif", &planes);
+    write("end.tif", &planes[10..]);
+    write("two.tif", &planes[..2]);
+    write("flat.tif", &vec![vec![5.0; 192 * 192]; 4]);
+    let one = "18,26,44,38";
+    refused(&bench, "", &["--stack", "--edge", "--flat"]);
+    refused(&bench, "--stack end.tif", &["--stack end.tif, window ", "the stack's end", "both sides of focus"]);
+    refused(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
+    refused(&bench, "--stack two.tif", &["--stack two.tif: 2 planes; expected 3 or more"]);
+    refused(&bench, "--stack flat.tif", &["no dark, compact thing", "--window"]);
+    refused(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);
+    refused(&bench, "--stack stack.tif --window 180,0,20,20", &["inside the image of 192 x 192", "--window X,Y,W,H"]);
+    refused(&bench, "--stack stack.tif --window 1,1,4,4", &["at least 8 pixels"]);
+    refused(&bench, "--stack stack.tif --window 1,1,9", &["expected X,Y,W,H"]);
+    refused(&bench, "--stack stack.tif --window 1,1,9,99999999999", &["up to 1048576"]);
+    for bad in ["0", "101", "nan", "x"] {
+        refused(&bench, &format!("--stack stack.tif --step-um {bad}"), &["--step-um", "more than 0 and at most 100"]);
+    }
+    refused(&bench, "--stack stack.tif --pixel-um 9", &["--pixel-um", "0.05 to 4"]);
+    refused(&bench, "--stack stack.tif --na 1.2", &["--na is 1.2", "at most immersion-index"]);
+    refused(&bench, "--stack stack.tif --wavelength-um 570", &["--wavelength-um is 570", "0.1 to 10"]);
+    refused(&bench, "--stack stack.tif --mount-index nan", &["--mount-index is NaN", "1 to 3"]);
+    refused(&bench, "--stack no-such.tif", &["no-such.tif: there is no such file"]);
+    refused(&bench, "--stack .", &["plane"]);
+    refused(&bench, "--step-um 1 --edge stack.tif", &["--stack"]);
+    refused(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected one"]);
+    write("one.tif", &planes[9..10]);
+    refused(&bench, "--edge one.tif --line 0,0,4,0", &["--line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
+    refused(&bench, "--edge one.tif --line 180,10,220,10", &["does not lie in"]);
+    refused(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
+    refused(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);
+    write("even.tif", &[vec![5.0; 192 * 192]]);
+    refused(&bench, "--edge even.tif", &["no straight edge was found", "--line"]);
+    refused(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
+    fs::write(bench.path("text.tif"), "no image").unwrap();
+    refused(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
+}
+
+#[test]
+fn a_folder_gathers_one_microscope_and_replaces_nothing_else() {
+    let bench = Bench::new("calibrate-out");
+    let edge = image(64, |x, _| 100.0 + 60.0 * libm::erf((x - 31.7) / (0.8 * 2_f64.sqrt())));
+    write_pages(bench.path("edge.tif"), &[edge], 64);
+    write_pages(bench.path("stack.tif"), &three_nuclei(19), 192);
+    bench.good("calibrate --stack stack.tif --step-um 0.5 --pixel-um 0.25 --window 18,26,44,38 --na 0.75 --out out");
+    let first = toml(&bench, "out/optics.toml", "optics");
+    // The second run keeps what the first has measured.
+    bench.good("calibrate --edge edge.tif --pixel-um 0.25 --na 0.75 --out out");
+    let both = toml(&bench, "out/optics.toml", "optics");
+    assert_eq!(first["condenser_na"], both["condenser_na"]);
+    assert!(number(&both, "extra_blur_um") > 0.1, "{both}");
+    let gaussian = toml(&bench, "out/optics-gaussian.toml", "optics");
+    assert!((number(&gaussian, "sigma_xy_um") - 0.2).abs() < 0.01, "{gaussian}");
+    assert!((number(&gaussian, "sigma_z_um_per_um") - 0.3).abs() < 0.01, "{gaussian}");
+    let before = bench.files("out");
+    // The same command, the same bytes.
+    bench.good("calibrate --edge edge.tif --pixel-um 0.25 --na 0.75 --out out");
+    assert_eq!(bench.files("out"), before);
+    // Another microscope, another file of one of the names, a file in the folder's place.
+    let refused = |words: &str, named: &str| {
+        let run = bench.run(&format!("calibrate --edge edge.tif {words}"));
+        assert_eq!(run.code, 2, "{}{}", run.out, run.err);
+        assert!(run.err.contains(named), "{named}: {}", run.err);
+    };
+    refused("--pixel-um 0.25 --out out", "was measured with --na 0.75; this command has 0.95");
+    assert_eq!(bench.files("out"), before);
+    fs::create_dir(bench.path("mine")).unwrap();
+    fs::write(bench.path("mine/optics.toml"), "[optics]\n").unwrap();
+    refused("--out mine", "another kind of file");
+    fs::write(bench.path("mine/optics.toml"), "").unwrap();
+    fs::write(bench.path("mine/calibration.json"), "{\n  \"calibration\": 1,\n  \"more\": 2\n}").unwrap();
+    refused("--out mine", "no calibration of this program");
+    fs::write(bench.path("mine/calibration.json"), "{\n  \"calibration\": 7\n}").unwrap();
+    refused("--out mine", "of version 7; this program knows 1");
+    assert_eq!(bench.files("mine").len(), 2);
+    refused("--out edge.tif", "expected a folder");
+    let full = bench.run("calibrate --edge edge.tif --out /proc/papsynth");
+    assert!(full.code == 2 || full.code == 74, "{}", full.err);
+}
+
+/// Fragments are recipes: what is not in them is the default.
+#[test]
+fn fragments_are_recipes() {
+    let bench = Bench::new("calibrate-recipe");
+    let edge = image(64, |x, _| 100.0 + 60.0 * libm::erf((x - 31.7) / (0.8 * 2_f64.sqrt())));
+    write_pages(bench.path("edge.tif"), &[edge], 64);
+    let (camera, mut rng) = (Camera::new(&camera()).unwrap(), Xoshiro256PlusPlus::seed_from_u64(0xF1A7));
+    expose(&camera, bench.path("flats/dark"), &PAIR, 0.0, &mut rng);
+    expose(&camera, bench.path("flats/1"), &PAIR, 4000.0, &mut rng);
+    bench.good("calibrate --edge edge.tif --pixel-um 0.25 --flat flats --bits 12");
+    for name in ["optics", "optics-gaussian", "camera"] {
+        bench.good(&format!("preview calibration/{name}.toml --out {name}.png {}", support::TINY));
+    }
+    let both = "--with calibration/optics-gaussian.toml --with calibration/camera.toml";
+    bench.good(&format!("preview --preset sparse {both} --out both.png {}", support::TINY));
+    assert!(bench.run("preview --with edge.tif --out none.png").err.contains("edge.tif"));
+}
+
+/// A folder of real images, or none with a message; on a build server there must be one.
+fn reference(folder: &str) -> Option<PathBuf> {
+    let Some(root) = std::env::var_os("PAPSYNTH_REFERENCE") else {
+        assert!(std::env::var("CI").as_deref() != Ok("true"), "PAPSYNTH_REFERENCE is not set");
+        eprintln!("skipped: PAPSYNTH_REFERENCE is not set");
+        return None;
+    };
+    Some(PathBuf::from(root).join(folder))
+}
+
+#[test]
+fn the_real_stack_is_linear_and_symmetric() {
+    let Some(folder) = reference("focus_stack") else { return };
+    let bench = Bench::new("calibrate-real");
+    let files: String = (0..20).map(|k| format!(" {}", folder.join(format!("plane{k:02}.png")).display())).collect();
+    bench.good(&format!("calibrate --stack{files}"));
+    let focus = &json(&bench, "calibration/calibration.json")["focus"];
+    assert!(focus["nuclei"].as_array().unwrap().len() >= 15);
+    let value = |side: &str, key: &str| focus[side][key].as_f64().unwrap();
+    for side in ["before", "after"] {
+        assert!((value(side, "slope_px") - 0.53).abs() < 0.05, "{side}: {}", focus[side]);
+        assert!((value(side, "proportional_px") - 0.53).abs() < 0.05, "{side}: {}", focus[side]);
+        assert!(value(side, "r_squared") > 0.99, "{side}: {}", focus[side]);
+    }
+    assert!((value("before", "slope_px") - value("after", "slope_px")).abs() < 0.05, "{focus}");
+    // Masks among the planes are no planes.
+    let run = bench.run(&format!("calibrate --stack {} --out folder", folder.display()));
+    assert_eq!(run.code, 2, "{}", run.out);
+    assert!(run.err.contains("no masks among them"), "{}", run.err);
+}

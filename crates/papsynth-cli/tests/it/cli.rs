@@ -1,0 +1,524 @@
+//! The program from outside: exit codes, messages, files.
+
+#[allow(dead_code, reason = "each test uses its part")]
+use crate::support;
+use std::collections::BTreeMap;
+use std::fs;
+
+use crate::support::{Bench, TINY};
+
+/// Texts that are no recipe, each with something that its message must name.
+const HOSTILE: [(&str, &str); 74] = [
+    ("", "holds no setting"),
+    ("\n\n# nothing but a comment\n", "holds no setting"),
+    ("[field]\nwidth_px = nan", "field.width_px: NaN"),
+    ("[field]\nwidth_px = +inf", "field.width_px"),
+    ("[field]\nwidth_px = -inf", "field.width_px"),
+    ("[field]\nwidth_px = 1e400", "recipe.toml:2:12"),
+    ("[field]\nwidth_px = -1376", "field.width_px: -1376 is outside 16 to 32768"),
+    ("[field]\nwidth_px = 0", "field.width_px: 0 is outside 16 to 32768"),
+    ("[field]\nwidth_px = -0.0", "field.width_px"),
+    ("[field]\nwidth_px = 1e300", "field.width_px"),
+    ("[field]\nwidth_px = 18446744073709551615", "field.width_px"),
+    ("[field]\nwidth_px = 99999999999999999999999999999999999999999999", "field.width_px"),
+    ("[field]\nwidth_px = 32768\nheight_px = 32769", "field.height_px"),
+    ("[field]\nwidth_px = \"1376\"", "field.width_px: \"1376\" is a text"),
+    ("[field]\nwidth_px = true", "field.width_px: true is a truth value"),
+    ("[field]\nwidth_px = [1376]", "field.width_px: [1376] is a list"),
+    ("[field]\nwidth_px = 1979-05-27", "field.width_px"),
+    ("[field]\nwidth_px = {}", "field.width_px"),
+    ("[field]\nwidht_px = 1376", "did you mean `width_px`?"),
+    ("[field]\nWIDTH_PX = 1376", "did you mean `width_px`?"),
+    ("[feild]\nwidth_px = 1376", "did you mean `field`?"),
+    ("[field]\nsigma_xy_um = 1", "it belongs into `optics`"),
+    ("field = 3", "field: 3 is a whole number"),
+    ("field = []", "field: [] is a list"),
+    ("[[field]]\nwidth_px = 3", "field"),
+    ("[field]\npixel_um = 0", "field.pixel_um: 0 is outside"),
+    ("[field]\npixel_um = 1e-320", "field.pixel_um"),
+    ("[focus]\nplanes = 100000", "focus.planes: 100000 is outside 1 to 1024"),
+    ("[focus]\nstep_um = 0", "focus.step_um"),
+    ("[focus]\nplanes = { uniform = [3, 1] }", "focus.planes: `uniform = [3, 1]` has its ends swapped"),
+    ("[focus]\nplanes = { uniform = [1, nan] }", "focus.planes: `uniform` needs two finite numbers"),
+    ("[focus]\nplanes = { uniform = [1] }", "recipe.toml:2"),
+    ("[focus]\nplanes = { uniform = [1, 2], normal = [1, 2] }", "recipe.toml:2"),
+    ("[focus]\nplanes = { choice = [] }", "focus.planes: `choice` needs at least one number"),
+    ("[focus]\nplanes = { gauss = [1, 2] }", "focus.planes.gauss: there is no such field"),
+    ("[focus]\nplanes = { normal = [3, -1] }", "focus.planes"),
+    ("[focus]\nplanes = { log_normal = [0, 1] }", "focus.planes"),
+    ("[focus]\nplanes = { log_normal = [3, 1e308] }", "focus.planes"),
+    ("[focus]\nplanes = { normal = [3, 1], min = 50 }", "focus.planes"),
+    ("[focus]\nplanes = { normal = [3, 1], min = nan }", "focus.planes"),
+    ("[focus]\nplanes = { min = 3 }", "focus.planes"),
+    ("[optics]\nkind = \"gaussian\"\nsigma_xy_um = -1", "optics.sigma_xy_um: -1 is outside 0 to 20"),
+    ("[optics]\nna = 0.5", "missing field `kind`"),
+    ("[optics]\nkind = \"bright-field\"\nna = 1.2", "optics.na: 1.2 is above `optics.immersion_index` = 1"),
+    ("[optics]\nkind = \"bright-field\"\nslab_um = 0", "optics.slab_um: 0 is outside 0.1 to 10"),
+    ("[optics]\nkind = \"bright-field\"\noversampling = 1.5", "optics.oversampling: 1.5 is not a whole number"),
+    ("[optics]\nkind = \"bright-field\"\nsigma_xy_um = 1", "sigma_xy_um"),
+    ("[light]\nkind = \"monochrome\"\nwavelength_um = 0", "light.wavelength_um: 0 is outside 0.4 to 0.7"),
+    ("[light]\nkind = \"colour\"\n[optics]\nkind = \"gaussian\"", "light.kind: colour is not known"),
+    ("[camera]\noffset_dn = 255", "camera.offset_dn: 255 is half of the 8-bit range or more"),
+    ("[camera]\nbits = 12\njpeg_quality = 90", "camera.jpeg_quality: 90 is for 8 bits"),
+    ("[camera]\nread_noise_rms_e = 3", "camera.read_noise_rms_e: 3 does not fit"),
+    ("[stain.nucleus]\nhaematein = -1", "stain.nucleus.haematein: -1 is outside 0 to 100"),
+    ("[cells.intermediate.tints]\ncyanophilic = 0\neosinophilic = 0", "cells.intermediate.tints: no tint is left"),
+    ("[camera]\nbits = 7", "camera.bits: 7 is outside 8 to 16"),
+    ("[camera]\nbits = 17", "camera.bits"),
+    ("[camera]\noffset_dn = 200", "camera.offset_dn"),
+    ("[camera]\nphoton_noise = \"poison\"", "camera.photon_noise: `poison` is not known"),
+    ("[background]\nlevel = 0.02\nscatter = 0.4", "background.scatter"),
+    ("[background.illumination]\nkind = \"bowl\"\nexponent = 1", "background.illumination.exponent"),
+    ("[layout]\nkind = \"cluster\"", "did you mean `clusters`?"),
+    ("[layout]\nkind = \"map\"", "missing field `path`"),
+    ("[layout]\ncount = 3", "layout"),
+    ("[layout]\nkind = \"map\"\npath = \"no-such-file.png\"", "no-such-file.png"),
+    ("[layout]\nkind = \"map\"\npath = \"/\"", "recipe.toml:3"),
+    ("[cells.intermediat]\ncount = 3", "did you mean `intermediate`?"),
+    ("[cells.intermediate]\ncount = 1e9", "cells.intermediate.count: 1000000000 is outside 0 to 100000"),
+    ("[cells.intermediate]\nsize = 0", "cells.intermediate.size: 0 is outside 0.1 to 10"),
+    ("cells = \"many\"", "cells: \"many\" is a text"),
+    ("[nucleus]\npatch_um = 0.6", "nucleus.overlap_um"),
+    ("version = 2\nfuture = true", "this recipe is of version 2; this program reads version 1"),
+    ("version = -1", "version -1"),
+    ("[field]\nwidth_px = 3\nwidth_px = 4", "recipe.toml:3:1"),
+    ("[field\nwidth_px = 3", "recipe.toml:1"),
+];
+
+#[test]
+fn hostile_recipes_are_refused_with_the_field_and_leave_nothing_behind() {
+    let bench = Bench::new("hostile");
+    let mut wrong = Vec::new();
+    for (text, named) in HOSTILE {
+        fs::write(bench.path("recipe.toml"), text).unwrap();
+        let run = bench.run("generate recipe.toml --out out --frames 1");
+        if run.code != 2 || !run.err.contains(named) || !run.err.contains("recipe.toml") || bench.path("out").exists() {
+            wrong.push(format!("--- {text:?}: wanted 2 and {named:?}, got {}\n{}", run.code, run.err));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn what_is_no_text_or_too_much_is_refused() {
+    let bench = Bench::new("garbage");
+    let garbage: Vec<u8> = (0..4096_u32).map(|i| (i * 193 + 7).to_le_bytes()[0]).collect();
+    let deep = format!("[field]\nwidth_px = {}1{}", "[".repeat(50_000), "]".repeat(50_000));
+    let dotted = format!("{}b = 1", "a.".repeat(50_000));
+    let long = format!("[field]\nwidth_px = \"{}\"", "x".repeat(1_000_000));
+    let cases: [(&[u8], &str); 7] = [
+        (&garbage, "recipe.toml:1: the byte 0x"),
+        (&[0xff, 0xfe, 0x00], "the byte 0xff is no text"),
+        (&[0; 64], "recipe.toml:1"),
+        (deep.as_bytes(), "recipe.toml:2"),
+        (dotted.as_bytes(), "recipe.toml: recursion limit"),
+        (long.as_bytes(), "field.width_px"),
+        (&[b'#'; (1 << 20) + 1], "larger than 1048576 bytes"),
+    ];
+    for (bytes, named) in cases {
+        fs::write(bench.path("recipe.toml"), bytes).unwrap();
+        let run = bench.run("generate recipe.toml --out out --frames 1");
+        assert_eq!(run.code, 2, "{}", run.err);
+        assert!(run.err.contains(named), "{named}: {}", run.err);
+        assert!(run.err.len() < 10_000, "{} bytes of message", run.err.len());
+        assert!(!bench.path("out").exists());
+    }
+}
+
+#[test]
+fn usage_is_refused_with_code_2() {
+    let bench = Bench::new("usage");
+    for words in [
+        "",
+        "paint",
+        "generate --out out",
+        "generate --out out --frames 0",
+        "generate --out out --frames -1",
+        "generate --out out --range 3..3",
+        "generate --out out --range 5",
+        "generate --out out --frames 1 --threads 0",
+        "generate --out out --frames 1 --seed -1",
+        "generate --out out --frames 1 --preset lcb",
+        "generate --out out --frames 1 --set field.width_px",
+        "generate --out out --frames 1 --set field.width_px=wide",
+        "generate --out out --frames 1 --set nothing=3",
+        "generate --out out --frames 1 --model no-such-model.json",
+        "generate no-such-recipe.toml --out out --frames 1",
+        "generate . --out out --frames 1",
+        "inspect no-such-folder",
+        "inspect .",
+        "learn --class x --pixel-um 0.25 --out out",
+        "learn --class intermediate --nuclei no-such-folder --pixel-um 0.25 --out out",
+        "learn --class intermediate --outlines no-such-file.csv --pixel-um 0.25 --out out",
+        "learn --class new --outlines no-such-file.csv --pixel-um 0.25 --out out",
+        "learn --class intermediate --outlines x.csv --pixel-um 0 --out out",
+    ] {
+        let run = bench.run(words);
+        assert_eq!(run.code, 2, "{words}: {}", run.err);
+        assert!(!run.err.is_empty(), "{words}");
+        assert!(!bench.path("out").exists(), "{words}");
+    }
+    assert!(bench.run("generate --out out --frames 1 --preset lcb").err.contains("lbc"));
+    assert!(
+        bench
+            .run("learn --class intermedate --outlines x.csv --pixel-um 1 --out o")
+            .err
+            .contains("did you mean `intermediate`")
+    );
+}
+
+#[test]
+fn help_version_schema_and_completions_are_printed() {
+    let bench = Bench::new("help");
+    assert!(bench.good("--version").out.starts_with("papsynth "));
+    for verb in ["init", "generate", "preview", "learn", "inspect", "schema", "completions"] {
+        assert!(bench.good(&format!("{verb} --help")).out.contains("Example"), "{verb}");
+    }
+    let schema: serde_json::Value = serde_json::from_str(&bench.good("schema").out).unwrap();
+    assert!(schema["properties"]["optics"].is_object());
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(bench.good(&format!("completions {shell}")).out.contains("papsynth"));
+    }
+}
+
+#[test]
+fn every_preset_prints_a_recipe_that_reads_back() {
+    let bench = Bench::new("init");
+    let list = bench.good("init --list").out;
+    for preset in papsynth::recipe::Preset::ALL {
+        assert!(list.contains(preset.name()));
+        let text = bench.good(&format!("init --preset {}", preset.name())).out;
+        assert_eq!(toml::from_str::<papsynth::recipe::Recipe>(&text).unwrap(), preset.recipe());
+    }
+    bench.good("init --out mine.toml");
+    let again = bench.run("init --out mine.toml");
+    assert_eq!(again.code, 2, "a recipe is never replaced: {}", again.err);
+}
+
+#[test]
+fn a_closed_pipe_is_no_failure() {
+    let bench = Bench::new("pipe");
+    for verb in ["schema", "init", "completions bash", "--help"] {
+        assert_eq!(bench.run_into_closed_pipe(verb), Some(0), "{verb}");
+    }
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_threads_ranges_or_order() {
+    let bench = Bench::new("bytes");
+    bench.good(&format!("generate --out one --frames 4 --threads 1 {TINY}"));
+    let expected = bench.files("one");
+    assert!(expected.keys().any(|name| name.starts_with("images/")), "{:?}", expected.keys());
+    for threads in [2, 8] {
+        let out = format!("threads-{threads}");
+        bench.good(&format!("generate --out {out} --frames 4 --threads {threads} {TINY}"));
+        assert_eq!(bench.files(&out), expected, "{threads} threads");
+    }
+    for range in ["3..4", "0..1", "1..3"] {
+        bench.good(&format!("generate --out ranges --range {range} --threads 2 {TINY}"));
+    }
+    assert_eq!(bench.files("ranges"), expected);
+    // Another seed is another data set.
+    bench.good(&format!("generate --out other --frames 1 --seed 1 {TINY}"));
+    assert_ne!(bench.files("other")["images/000000.png"], expected["images/000000.png"]);
+}
+
+#[test]
+fn a_second_run_completes_what_is_missing_and_touches_nothing_else() {
+    let bench = Bench::new("resume");
+    let command = format!("generate --out out --frames 3 {TINY}");
+    bench.good(&command);
+    let (before, times) = (bench.files("out"), bench.times("out"));
+    fs::remove_file(bench.path("out/images/000001.png")).unwrap();
+    fs::write(bench.path("out/images/.leftover.tmp"), "half").ok();
+    let run = bench.good(&command);
+    assert!(run.out.contains("1 frame made, 2 were there"), "{}", run.out);
+    let mut after = bench.files("out");
+    after.retain(|name, _| before.contains_key(name));
+    assert_eq!(after, before);
+    let touched: Vec<String> = bench
+        .times("out")
+        .into_iter()
+        .filter(|(name, time)| times.get(name) != Some(time))
+        .map(|(name, _)| name)
+        .collect();
+    assert!(touched.iter().all(|name| !name.contains("000000") && !name.contains("000002")), "{touched:?}");
+}
+
+#[test]
+fn a_strange_folder_or_another_data_set_is_left_alone() {
+    let bench = Bench::new("strange");
+    fs::create_dir(bench.path("photos")).unwrap();
+    fs::write(bench.path("photos/cat.txt"), "meow").unwrap();
+    let run = bench.run(&format!("generate --out photos --frames 1 {TINY}"));
+    assert_eq!(run.code, 2, "{}", run.err);
+    assert!(run.err.contains("photos"), "{}", run.err);
+    assert_eq!(bench.files("photos").len(), 1);
+    fs::write(bench.path("file"), "a file").unwrap();
+    assert_eq!(bench.run(&format!("generate --out file --frames 1 {TINY}")).code, 2);
+    bench.good(&format!("generate --out out --frames 1 {TINY}"));
+    let before = bench.files("out");
+    for other in ["--seed 5", "--set optics.na=0.5"] {
+        let run = bench.run(&format!("generate --out out --frames 1 {TINY} {other}"));
+        assert_eq!(run.code, 2, "{other}: {}", run.err);
+        assert_eq!(bench.files("out"), before, "{other}");
+    }
+}
+
+#[test]
+fn what_cannot_be_placed_is_refused_before_anything_is_written() {
+    let bench = Bench::new("layout");
+    let tiny = TINY.replace("--set layout.kind=uniform", "");
+    bench.grey_png("black.png", 8, 8, |_, _| 0);
+    bench.grey_png("left.png", 8, 8, |x, _| if x < 4 { 255 } else { 0 });
+    fs::write(bench.path("truncated.png"), &fs::read(bench.path("left.png")).unwrap()[..40]).unwrap();
+    for (file, named) in [("black.png", "black.png"), ("truncated.png", "truncated"), ("none.png", "none.png")] {
+        fs::write(bench.path("recipe.toml"), format!("[layout]\nkind = \"map\"\npath = \"{file}\"\n")).unwrap();
+        let run = bench.run(&format!("generate recipe.toml --out out --frames 1 {tiny}"));
+        assert_eq!(run.code, 2, "{}", run.err);
+        assert!(run.err.contains(named) && run.err.contains("recipe.toml:3"), "{}", run.err);
+        assert!(!bench.path("out").exists());
+    }
+    // The path is relative to the recipe, not to where the program runs.
+    fs::create_dir(bench.path("deep")).unwrap();
+    fs::rename(bench.path("left.png"), bench.path("deep/left.png")).unwrap();
+    fs::write(bench.path("deep/recipe.toml"), "[layout]\nkind = \"map\"\npath = \"left.png\"\n").unwrap();
+    bench.good(&format!("generate deep/recipe.toml --out out --frames 1 {tiny}"));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_written_ends_with_code_74() {
+    let bench = Bench::new("full");
+    let run = bench.run(&format!("preview --out /dev/full/preview.png {TINY}"));
+    assert!(run.code == 2 || run.code == 74, "{}", run.err);
+    // Nothing can be made below /proc, whoever asks.
+    let run = bench.run(&format!("generate --out /proc/papsynth-out --frames 1 {TINY}"));
+    assert_eq!(run.code, 74, "{}", run.err);
+    assert!(run.err.contains("/proc/papsynth-out"), "{}", run.err);
+}
+
+#[test]
+fn json_tells_start_frames_and_end() {
+    let bench = Bench::new("json");
+    let run = bench.good(&format!("generate --out out --frames 2 --json {TINY}"));
+    let events: Vec<serde_json::Value> = run.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let names: Vec<_> = events.iter().map(|event| event["event"].as_str().unwrap()).collect();
+    assert_eq!(names, ["start", "frame", "frame", "done"]);
+    assert_eq!(events[0]["frames"], 2);
+    assert_eq!(events[3]["made"], 2);
+    assert_eq!(run.err, "");
+    let run = bench.run("generate --out out2 --frames 2 --json --set field.width_px=-1");
+    assert_eq!(run.code, 2);
+    let error: serde_json::Value = serde_json::from_str(run.out.trim()).unwrap();
+    assert_eq!((error["event"].as_str(), error["exit"].as_i64()), (Some("error"), Some(2)));
+    assert_eq!(error["at"]["file"], "--set");
+    assert!(error["message"].as_str().unwrap().contains("field.width_px"));
+}
+
+#[test]
+fn a_profile_accounts_for_the_time_and_changes_no_byte() {
+    let bench = Bench::new("profile");
+    let run = bench.good(&format!("generate --out out --frames 2 --threads 1 --json --profile {TINY}"));
+    let event: serde_json::Value = serde_json::from_str(run.out.lines().last().unwrap()).unwrap();
+    assert_eq!(event["event"], "profile");
+    let stages = event["stages"].as_array().unwrap();
+    let spent: f64 = stages.iter().map(|stage| stage["ms_a_frame"].as_f64().unwrap()).sum();
+    // Stages do not overlap, so one thread cannot have spent more than there was.
+    assert!(spent > 0.0 && spent * event["frames_per_s"].as_f64().unwrap() <= 1000.0, "{event}");
+    assert!(["pixels_per_s", "objects_per_s"].iter().all(|rate| event[rate].as_f64().unwrap() > 0.0), "{event}");
+    let run = bench.good(&format!("generate --out told --frames 2 --profile {TINY}"));
+    let named = |name: &str| run.out.lines().any(|line| line.starts_with(name));
+    assert!(stages.iter().all(|stage| named(stage["stage"].as_str().unwrap())), "{}", run.out);
+    assert!(named("all stages") && run.out.contains("frames a second on"), "{}", run.out);
+    bench.good(&format!("generate --out plain --frames 2 {TINY}"));
+    assert_eq!(bench.files("told"), bench.files("plain"));
+}
+
+#[test]
+fn quiet_says_nothing_and_plain_lines_name_frames() {
+    let bench = Bench::new("quiet");
+    let run = bench.good(&format!("generate --out out --frames 1 --quiet {TINY}"));
+    assert_eq!((run.out.as_str(), run.err.as_str()), ("", ""));
+    let run = bench.good(&format!("generate --out lines --frames 2 {TINY}"));
+    assert!(run.err.contains("frame 0: ") && run.err.contains("(2 of 2)"), "{}", run.err);
+    assert!(run.out.contains("lines: 2 frames made"), "{}", run.out);
+}
+
+#[test]
+fn inspect_shows_what_is_there_and_what_is_damaged() {
+    let bench = Bench::new("inspect");
+    bench.good(&format!("generate --out out --range 1..3 {TINY}"));
+    let table = bench.good("inspect out").out;
+    for part in ["96 x 80 px", "seed", "missing     0", "intermediate"] {
+        assert!(table.contains(part), "{part}: {table}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&bench.good("inspect out --json").out).unwrap();
+    assert_eq!(json["frames"], 2);
+    // A flipped bit keeps the size: only reading finds it.
+    let image = bench.path("out/images/000002.png");
+    let mut bytes = fs::read(&image).unwrap();
+    let last = bytes.len() - 20;
+    bytes[last] ^= 1;
+    fs::write(&image, bytes).unwrap();
+    bench.good("inspect out");
+    let run = bench.run("inspect out --verify");
+    assert_eq!(run.code, 2);
+    assert!(
+        run.out.contains("damaged     shard 2") && run.err.contains("1 shard and 0 files are damaged"),
+        "{}{}",
+        run.out,
+        run.err
+    );
+}
+
+#[test]
+fn preview_writes_one_picture() {
+    let bench = Bench::new("preview");
+    let run = bench.good(&format!("preview --out look.png {TINY}"));
+    assert!(run.out.contains("look.png: 96 x 80 px"), "{}", run.out);
+    let reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(bench.path("look.png")).unwrap()));
+    let info = reader.read_info().unwrap();
+    assert_eq!(info.info().size(), (96 * 2 + 8, 80));
+    assert_eq!(bench.files(".").keys().collect::<Vec<_>>(), ["look.png"]);
+    bench.good(&format!("preview --out look.png {TINY}"));
+}
+
+#[test]
+fn no_file_of_another_kind_is_replaced() {
+    let bench = Bench::new("replace");
+    fs::write(bench.path("mine.toml"), bench.good("init").out).unwrap();
+    let before = bench.files(".");
+    for command in [
+        format!("preview mine.toml --out mine.toml {TINY}"),
+        "learn --class intermediate --pixel-um 0.25 --outlines mine.toml --out mine.toml".to_owned(),
+    ] {
+        let run = bench.run(&command);
+        assert!(run.code == 2 && run.err.contains("mine.toml: there is another kind of file"), "{}", run.err);
+        assert_eq!(bench.files("."), before);
+    }
+}
+
+#[test]
+fn a_map_is_kept_in_the_data_set_and_another_map_is_another_recipe() {
+    let bench = Bench::new("map");
+    let map = |side: usize| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+        encoder.set_color(png::ColorType::Grayscale);
+        let pixels = if side == 0 { [255, 0] } else { [0, 255] };
+        encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+        fs::write(bench.path("map.png"), bytes).unwrap();
+    };
+    map(0);
+    let command = format!("generate --out out --frames 1 {TINY} --set layout.kind=map --set layout.path=map.png");
+    bench.good(&command);
+    let made = bench.files("out");
+    let kept = made.keys().find(|name| name.starts_with("layout-")).expect("the map is kept");
+    assert!(kept.ends_with(".png"));
+    fs::remove_file(bench.path("map.png")).unwrap();
+    bench.good("generate out/recipe.toml --out again --frames 1");
+    assert_eq!(bench.files("again"), made, "the folder holds all it takes");
+    map(1);
+    let run = bench.run(&command);
+    assert!(run.code == 2 && run.err.contains("another recipe"), "{}", run.err);
+    assert_eq!(bench.files("out"), made);
+}
+
+#[test]
+fn all_cells_can_be_set_at_once() {
+    let bench = Bench::new("no-cells");
+    bench.good(&format!("generate --out out --frames 1 {TINY} --set cells={{}} --set debris.speckles.count=3"));
+    let table = fs::read_to_string(bench.path("out/objects.csv")).unwrap();
+    assert!(!table.contains(",nucleus,") && table.contains("speckle"), "{table}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_whole_files_and_the_same_command_goes_on() {
+    let bench = Bench::new("interrupt");
+    let command = format!("generate --out out --frames 400 --threads 2 {TINY}");
+    let run = bench.interrupt_after_first_line(&format!("{command} --json"));
+    assert_eq!(run.code, 130, "{}{}", run.out, run.err);
+    assert!(run.out.contains("\"exit\":130") && run.out.contains("run the same command again"), "{}", run.out);
+    let left: BTreeMap<_, _> = bench.files("out");
+    assert!(left.keys().all(|name| !name.contains(".tmp") && !name.contains(".part")), "{:?}", left.keys());
+    let whole = left.keys().filter(|name| name.starts_with("images/")).count();
+    assert!(whole < 400);
+    bench.good("inspect out --verify");
+    // What is there is kept, byte for byte.
+    bench.good(&format!("{command} --quiet").replace("400", &whole.max(1).to_string()));
+    let after = bench.files("out");
+    for (name, content) in left.iter().filter(|(name, _)| name.starts_with("images/")) {
+        assert_eq!(after.get(name), Some(content), "{name}");
+    }
+}
+
+#[test]
+fn a_class_is_learned_from_outlines_and_used() {
+    let bench = Bench::new("learn");
+    fs::write(bench.path("cells.csv"), support::outlines(12, 100, 80.0)).unwrap();
+    let run =
+        bench.good("learn --class wobbly --like intermediate --outlines cells.csv --pixel-um 0.25 --out model.json");
+    assert!(run.out.contains("class `wobbly`") && run.out.contains("12 outlines of cells"), "{}", run.out);
+    let model = papsynth::model::Model::from_json(&fs::read_to_string(bench.path("model.json")).unwrap()).unwrap();
+    assert!(model.classes.contains_key("wobbly"));
+    assert!(model.provenance.iter().any(|p| p.class == "wobbly" && p.count == 12 && p.source == "cells.csv"));
+    bench.good(&format!("generate --model model.json --out out --frames 1 {TINY} --set cells.wobbly.count=1"));
+    // A model of another version is refused by name.
+    let text = fs::read_to_string(bench.path("model.json")).unwrap().replacen("\"version\":1", "\"version\":9", 1);
+    fs::write(bench.path("future.json"), text).unwrap();
+    let run = bench.run(&format!("generate --model future.json --out out2 --frames 1 {TINY}"));
+    assert_eq!(run.code, 2);
+    assert!(run.err.contains("future.json") && run.err.contains('9'), "{}", run.err);
+    // Broken outlines are named by their line.
+    fs::write(bench.path("bad.csv"), "outline,k,x_px,y_px\n1,0,0,0\n1,1,nan,0\n").unwrap();
+    let run = bench.run("learn --class intermediate --outlines bad.csv --pixel-um 0.25 --out no.json");
+    assert_eq!(run.code, 2);
+    assert!(run.err.contains("bad.csv") && run.err.contains("line 3"), "{}", run.err);
+    assert!(!bench.path("no.json").exists());
+}
+
+#[test]
+fn nuclei_and_label_images_are_learned_from() {
+    let bench = Bench::new("learn-images");
+    for folder in ["nuclei/images", "nuclei/masks", "labels"] {
+        fs::create_dir_all(bench.path(folder)).unwrap();
+    }
+    for i in 0..6_u32 {
+        // Ellipses of different sizes, darker and speckled inside.
+        let (a, b) = (9.0 + f64::from(i % 3), 7.0 + f64::from(i % 2));
+        let inside = |x: u32, y: u32, scale: f64| {
+            let (dx, dy) = (f64::from(x) - 24.0, f64::from(y) - 24.0);
+            (dx / (a * scale)) * (dx / (a * scale)) + (dy / (b * scale)) * (dy / (b * scale)) <= 1.0
+        };
+        let speckle = |x: u32, y: u32| u8::try_from((x * 7919 + y * 104_729 + i * 31) % 13).unwrap();
+        bench.grey_png(&format!("nuclei/images/{i}.png"), 48, 48, |x, y| {
+            if inside(x, y, 1.0) { 90 + speckle(x, y) } else { 200 + speckle(y, x) / 4 }
+        });
+        bench.grey_png(&format!("nuclei/masks/{i}.png"), 48, 48, |x, y| if inside(x, y, 1.0) { 255 } else { 0 });
+        bench.grey_png(&format!("labels/{i}.png"), 48, 48, |x, y| if inside(x, y, 1.8) { 255 } else { 0 });
+    }
+    let learn = "learn --class intermediate --pixel-um 0.25 --labels labels --out";
+    let run = bench.good(&format!("{learn} a.json --nuclei nuclei"));
+    assert!(run.out.contains("6 images of nuclei, 6 outlines of cells"), "{}", run.out);
+    bench.good(&format!("{learn} b.json --nuclei nuclei/images --masks nuclei/masks --source nuclei"));
+    bench.good(&format!("{learn} c.json --nuclei nuclei --numbers-only"));
+    let model = |name: &str| papsynth::model::Model::from_json(&fs::read_to_string(bench.path(name)).unwrap()).unwrap();
+    let donors = |name: &str| model(name).classes["intermediate"].nucleus.donors.len();
+    assert_eq!((donors("a.json"), donors("b.json"), donors("c.json")), (6, 6, 0));
+    // A mask that does not match its image.
+    bench.grey_png("nuclei/masks/3.png", 40, 48, |_, _| 255);
+    for nuclei in ["--nuclei nuclei", "--nuclei nuclei/images --masks nuclei/masks"] {
+        let run = bench.run(&format!("{learn} no.json {nuclei}"));
+        assert_eq!(run.code, 2, "{}", run.err);
+        assert!(run.err.contains("3.png"), "{}", run.err);
+    }
+    fs::remove_file(bench.path("nuclei/masks/3.png")).unwrap();
+    for nuclei in ["--nuclei nuclei", "--nuclei nuclei/images --masks nuclei/masks"] {
+        let run = bench.run(&format!("{learn} no.json {nuclei}"));
+        assert_eq!(run.code, 2, "{}", run.err);
+        assert!(run.err.contains("no mask of the same name"), "{}", run.err);
+    }
+    assert!(!bench.path("no.json").exists());
+}

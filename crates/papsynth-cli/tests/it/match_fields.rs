@@ -1,0 +1,79 @@
+//! `papsynth match` on fields of our own, with a small budget.
+
+#[allow(dead_code, reason = "each test uses its part")]
+use std::fs;
+
+use crate::support::Bench;
+
+/// Coarse pixels: many cells in few of them.
+const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields=1 \
+    --set cells.intermediate.count=5 --set cells.superficial.count=2 --set cells.parabasal.count=0 \
+    --set cells.metaplastic.count=0 --quiet";
+
+#[test]
+fn the_recipe_that_is_found_makes_fields() {
+    let bench = Bench::new("match-finds");
+    bench.good(&format!(
+        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
+    ));
+    let outcome = bench.good("match real --out mine.toml --report mine.json --budget 90 --seed 1 --threads 2");
+    assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);
+    assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
+    assert!(outcome.err.contains("simulated recipes: 30 of 30"), "{}", outcome.err);
+    let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
+    assert!(toml.starts_with("# Matched to 3 fields: ") && toml.contains("# measured: "), "{toml}");
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(bench.path("mine.json")).unwrap()).unwrap();
+    assert_eq!(report["match_report"], 1);
+    let answers = report["fit"]["answers"].as_array().unwrap();
+    let level = answers.iter().find(|a| a["parameter"] == "level").unwrap();
+    assert!((level["value"].as_f64().unwrap() - 0.8).abs() < 0.03, "{level}");
+    assert!(report["fit"]["distance"]["after"].as_f64().unwrap() > 0.0);
+    bench.good("generate mine.toml --out fields --frames 1 --quiet");
+    assert_eq!(bench.files("fields").keys().filter(|name| name.starts_with("images/")).count(), 1);
+
+    // Its own older files are replaced, others are not.
+    fs::write(bench.path("mine.toml"), "# Matched to nothing\n").unwrap();
+    fs::write(bench.path("notes.json"), "{}").unwrap();
+    let outcome = bench.run("match real --out mine.toml --report notes.json --budget 60");
+    assert!(outcome.code != 0 && outcome.err.contains("notes.json"), "{}", outcome.err);
+    assert_eq!(fs::read_to_string(bench.path("notes.json")).unwrap(), "{}");
+}
+
+#[test]
+fn what_cannot_be_matched_is_refused_at_once() {
+    let bench = Bench::new("match-refuses");
+    for folder in ["empty", "tiny", "constant", "noise", "text", "two"] {
+        fs::create_dir_all(bench.path(folder)).unwrap();
+    }
+    bench.grey_png("tiny/a.png", 3, 2, |x, y| u8::try_from(100 + x + y).unwrap());
+    bench.grey_png("constant/a.png", 160, 120, |_, _| 180);
+    bench.grey_png("noise/a.png", 160, 120, |x, y| u8::try_from(200 + (x * 7919 + y * 104_729) % 13).unwrap());
+    fs::write(bench.path("text/a.png"), "no picture").unwrap();
+    bench.grey_png("two/a.png", 160, 120, |x, y| u8::try_from(200 + (x * 7919 + y * 104_729) % 13).unwrap());
+    bench.grey_png("two/b.png", 120, 160, |x, y| u8::try_from(200 + (x * 7919 + y * 104_729) % 13).unwrap());
+    fs::write(bench.path("taken.toml"), "version = 1\n").unwrap();
+    for (words, says) in [
+        ("match nowhere --pixel-um 0.33 --out a.toml", "nowhere"),
+        ("match empty --pixel-um 0.33 --out a.toml", "empty"),
+        ("match tiny --pixel-um 0.33 --out a.toml", "a"),
+        ("match constant --pixel-um 0.33 --out a.toml", "constant"),
+        ("match noise --pixel-um 0.33 --out a.toml", "nuclei"),
+        ("match text --pixel-um 0.33 --out a.toml", "a.png"),
+        ("match two --pixel-um 0.33 --out a.toml", "120 x 160"),
+        ("match noise --out a.toml", "--pixel-um"),
+        ("match noise --pixel-um 0.33 --out taken.toml", "taken.toml"),
+        ("match noise --pixel-um 0.33 --out two", "this is a folder"),
+        ("match noise --pixel-um 0.33 --out taken.toml/a.toml", "taken.toml"),
+        ("match noise --pixel-um 0.33 --out a.toml --report a.toml", "--report a.toml"),
+        ("match noise --pixel-um 0.33 --group N --out a.toml", "no field is of group N"),
+        ("match noise --pixel-um 9 --out a.toml", "micrometres"),
+        ("match noise --pixel-um 0.33 --budget 3 --out a.toml", "windows"),
+        ("match noise --pixel-um 0.33 --budget 60 --quick --out a.toml", "--quick"),
+    ] {
+        let outcome = bench.run(words);
+        assert!(outcome.code != 0 && outcome.out.is_empty(), "{words}: {}", outcome.out);
+        assert!(outcome.err.contains(says) && !outcome.err.contains("panicked"), "{words}: {}", outcome.err);
+        assert!(!bench.path("a.toml").exists(), "{words}");
+    }
+    assert_eq!(fs::read_to_string(bench.path("taken.toml")).unwrap(), "version = 1\n");
+}

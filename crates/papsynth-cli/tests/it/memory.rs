@@ -1,0 +1,126 @@
+//! What frames need of memory is told before, and kept to.
+#![cfg(target_os = "linux")]
+
+use std::io::{BufRead, BufReader};
+
+use crate::support::Bench;
+use serde_json::Value;
+
+/// What a run expected to need and what it needed, bytes.
+fn measured(bench: &Bench, words: &str) -> [u64; 2] {
+    let run = bench.good(&format!("generate --json --out out {words}"));
+    let events: Vec<Value> = run.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let of = |name: &str, key: &str| {
+        events.iter().find(|event| event["event"] == name).and_then(|event| event[key].as_u64()).unwrap()
+    };
+    std::fs::remove_dir_all(bench.path("out")).unwrap();
+    [of("start", "memory_bytes"), of("done", "peak_memory_bytes")]
+}
+
+/// Takes a minute of a core: `cargo xtask torture` runs it, and whoever asks for what is ignored.
+#[test]
+#[ignore = "takes a minute"]
+fn the_estimate_is_never_too_small_and_not_far_too_large() {
+    let bench = Bench::new("estimate");
+    let square = |side: usize, frames: usize| {
+        format!("--frames {frames} --set field.width_px={side} --set field.height_px={side} --set layout.kind=uniform")
+    };
+    let mut wrong = Vec::new();
+    for words in [
+        format!("--threads 1 {} --set cells={{}} --set debris={{}}", square(64, 1)),
+        format!("--threads 1 {}", square(256, 1)),
+        format!("--threads 1 {}", square(1024, 3)),
+        format!("--threads 1 {} --set optics.oversampling=1", square(1024, 1)),
+        format!("--threads 1 {} --set optics.oversampling=4", square(1024, 1)),
+        format!("--threads 1 {} --set field.pixel_um=0.125", square(1024, 1)),
+        format!("--threads 1 {} --set field.pixel_um=0.5", square(1024, 1)),
+        format!("--threads 1 {} --set cells.intermediate.count=200", square(1024, 1)),
+        format!("--threads 1 {} --set light.kind=colour", square(1024, 1)),
+        format!("--threads 1 {} --set focus.planes=3", square(1024, 1)),
+        format!("--threads 1 {} --set focus.planes=9 --format webdataset", square(1024, 1)),
+        format!("--threads 1 {} --set focus.planes=3 --set light.kind=colour", square(768, 1)),
+        format!("--threads 2 {}", square(1024, 4)),
+        format!("--threads 4 {}", square(1024, 1)),
+        format!("--threads 4 {} --set light.kind=colour", square(768, 1)),
+        format!("--threads 1 {} --set cells={{}}", square(4096, 1)),
+        format!("--threads 1 {} --set cells={{}} --set light.kind=colour", square(3072, 1)),
+        "--threads 1 --frames 2 --preset dense".to_owned(),
+        "--threads 1 --frames 2 --preset inflamed".to_owned(),
+        "--threads 1 --frames 2 --preset paper-2015".to_owned(),
+    ] {
+        let [expected, needed] = measured(&bench, &words).map(|bytes| bytes as f64 / 1_048_576.0);
+        let line = format!("{expected:6.0} MiB expected, {needed:6.0} MiB needed, {:.2}: {words}", expected / needed);
+        eprintln!("{line}");
+        if needed > expected || expected > 2.5 * needed {
+            wrong.push(line);
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// What a process has in memory of its own, kilobytes: without the pages of its program, which the system reads and forgets as it likes.
+fn resident(process: u32) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("RssAnon:")).unwrap();
+    line.trim().strip_suffix("kB").unwrap().trim().parse().unwrap()
+}
+
+/// As many as `PAPSYNTH_TINY` says, else 100000: memory does not grow by a twentieth between their second tenth and their last. It goes up and
+/// down with how full the shards at work are, so means are compared.
+#[test]
+#[ignore = "takes a quarter of an hour"]
+fn a_hundred_thousand_tiny_images_need_no_more_memory_than_ten_thousand() {
+    let bench = Bench::new("tiny");
+    let count: u64 = std::env::var("PAPSYNTH_TINY").ok().and_then(|n| n.parse().ok()).unwrap_or(100_000);
+    let mut child = bench.spawn_heard(&format!(
+        "generate --json --threads 2 --out out --frames {count} --format webdataset --preset paper-2015 --set layout.kind=uniform \
+         --set field.width_px=32 --set field.height_px=32 --set cells={{}} --set cells.intermediate.count=1 \
+         --set debris.bacilli.clusters=0 --set debris.leukocytes.clusters=0 --set debris.speckles.count=0"
+    ));
+    let (mut early, mut late) = (Vec::new(), Vec::new());
+    for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+        let event: Value = serde_json::from_str(&line.unwrap()).unwrap();
+        match event["done"].as_u64() {
+            // The last ones may end while nothing runs any more that could be asked.
+            Some(done) if done % 20 != 0 || done + 100 > count => {}
+            Some(done) if done * 10 / count == 1 => early.push(resident(child.id())),
+            Some(done) if done * 10 / count == 9 => late.push(resident(child.id())),
+            _ => {}
+        }
+    }
+    assert!(child.wait().unwrap().success());
+    let mean = |samples: &[f64]| samples.iter().sum::<f64>() / samples.len() as f64;
+    let (early, late) = (mean(&early), mean(&late));
+    let growth = 100.0 * (late / early - 1.0);
+    eprintln!("{count} images: {early:.0} kB in the second tenth, {late:.0} kB in the last, {growth:+.1} %");
+    assert!(growth < 5.0, "{early:.0} kB, then {late:.0} kB");
+}
+
+#[test]
+fn what_does_not_fit_is_made_one_by_one_or_refused() {
+    let bench = Bench::new("fit");
+    let field =
+        |side: usize| format!("--set field.width_px={side} --set field.height_px={side} --set layout.kind=uniform");
+    // The kernel would end a run that tries.
+    let run = bench.run(&format!("generate --out out --frames 1 {} --max-memory 2GiB", field(32_768)));
+    assert_eq!(run.code, 2, "{}", run.err);
+    for part in ["field.width_px", "32768 x 32768", "2.0 GiB", "--max-memory"] {
+        assert!(run.err.contains(part), "{part}: {}", run.err);
+    }
+    assert!(!bench.path("out").exists());
+    let small = format!("{} --set cells={{}} --set debris={{}}", field(512));
+    let events = |words: &str| bench.good(&format!("generate --json {small} {words}"));
+    let run = events("--out one --frames 8 --threads 8 --max-memory 100MiB");
+    let start: Value = serde_json::from_str(run.out.lines().next().unwrap()).unwrap();
+    let (threads, bytes) = (start["threads"].as_u64().unwrap(), start["memory_bytes"].as_u64().unwrap());
+    assert!((1..8).contains(&threads) && bytes <= 100 << 20, "{start}");
+    assert!(run.err.contains(&format!("{threads} of 8 threads make frames")), "{}", run.err);
+    let run = events("--out eight --frames 8 --threads 8 --max-memory 64GiB");
+    let start: Value = serde_json::from_str(run.out.lines().next().unwrap()).unwrap();
+    assert_eq!((start["threads"].as_u64(), run.err.as_str()), (Some(8), ""));
+    assert_eq!(bench.files("one"), bench.files("eight"));
+    for wrong in ["0", "2XB", "-1", "1e9"] {
+        let run = bench.run(&format!("generate --out out --frames 1 --max-memory {wrong}"));
+        assert_eq!(run.code, 2, "{wrong}: {}", run.err);
+    }
+}

@@ -1,0 +1,369 @@
+//! All formats say the same, written from one rendering or converted from each other.
+
+#![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
+
+use std::fs;
+use std::io::Read;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use crate::support::{HEIGHT, SEED, Scratch, WIDTH, colour_frame, contents, frame, recipe};
+use papsynth::Frame;
+use papsynth::model::Model;
+#[cfg(feature = "zarr")]
+use papsynth::scene::View;
+use papsynth::truth::{Group, Part};
+use papsynth_dataset::read::{GreyImage, Limits, label_map, read_label_map};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, FramePlace, Layout, convert, verify};
+use serde_json::Value;
+
+fn begin(path: &Path, layout: &Layout) -> Result<Dataset, Error> {
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout };
+    Dataset::create_or_resume(path, &info)
+}
+
+/// Writes frames, as many a shard as the layout says.
+fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
+    let dataset = begin(path, layout).unwrap();
+    for shard in frames.chunk_by(|a, b| {
+        let of = |frame: &Frame| frame.finished.scene.key.index / layout.frames_per_shard;
+        of(a) == of(b)
+    }) {
+        let number = shard[0].finished.scene.key.index / layout.frames_per_shard;
+        let mut writer = dataset.shard_writer(number).unwrap();
+        for frame in shard {
+            writer.begin(&frame.finished.scene).unwrap();
+            frame.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
+            writer.end(&frame.finished).unwrap();
+        }
+        writer.commit().unwrap();
+    }
+    dataset.finish().unwrap();
+}
+
+fn all(frames_per_shard: u64) -> Layout {
+    Layout { frames_per_shard, ..Layout::new(Format::built()) }
+}
+
+fn to(from: &Path, target: &Path, layout: &Layout) -> Result<u64, Error> {
+    convert(from, target, layout, &AtomicBool::new(false), &|_| ()).map(|outcome| outcome.made)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// The files of a tar file in their order.
+fn untar(path: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut archive = tar::Archive::new(fs::File::open(path).unwrap());
+    let files = archive.entries().unwrap().map(|file| {
+        let mut file = file.unwrap();
+        let name = file.path().unwrap().to_string_lossy().into_owned();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        (name, bytes)
+    });
+    files.collect()
+}
+
+#[test]
+fn what_is_converted_is_what_is_written_at_once() {
+    for (planes, bits, colour) in [(1, 8, false), (1, 12, true), (3, 8, false), (2, 16, true)] {
+        let frames: Vec<Frame> = (0..5)
+            .map(|index| if colour { colour_frame(index, planes, bits) } else { frame(index, planes, bits, 1) })
+            .collect();
+        let name = |what: &str| Scratch::new(&format!("{what}-{planes}-{bits}"));
+        let (folder, at_once, converted) = (name("folder"), name("at-once"), name("converted"));
+        write(folder.path(), &Layout::default(), &frames);
+        write(at_once.path(), &all(2), &frames);
+        assert_eq!(to(folder.path(), converted.path(), &all(2)).unwrap(), 5);
+        assert!(contents(at_once.path()) == contents(converted.path()), "{planes} {bits}");
+        assert!(verify(at_once.path(), Some(0..5)).unwrap().findings.is_empty());
+        // By way of tar files, which have no noise-free images.
+        let (tars, flat, twice) = (name("tars"), name("flat"), name("twice"));
+        let layout = Layout { frames_per_shard: 3, ..Layout::new([Format::Webdataset]) };
+        to(folder.path(), tars.path(), &layout).unwrap();
+        let layout = Layout::new([Format::Cellpose, Format::Qupath, Format::OmeTiff]);
+        write(flat.path(), &layout, &frames);
+        to(tars.path(), twice.path(), &layout).unwrap();
+        assert!(contents(flat.path()) == contents(twice.path()), "{planes} {bits}");
+        let back = to(tars.path(), &twice.join("back"), &Layout::default()).unwrap_err().to_string();
+        assert!(back.contains("noise-free"), "{back}");
+        // A second time nothing is left to do.
+        assert_eq!(to(folder.path(), converted.path(), &all(2)).unwrap(), 0);
+    }
+}
+
+#[test]
+fn every_format_gives_back_planes_and_truth_of_any_frame() {
+    let alone = Format::built().map(|format| vec![format]);
+    let layouts = alone.chain([vec![Format::Stardist, Format::Webdataset, Format::OmeTiff]]);
+    for (number, formats) in layouts.enumerate() {
+        for (planes, bits, colour) in [(1, 12, true), (3, 8, false), (2, 16, true)] {
+            let frames: Vec<Frame> = [1, 2, 3, 6]
+                .map(|index| if colour { colour_frame(index, planes, bits) } else { frame(index, planes, bits, 1) })
+                .into();
+            let scratch = Scratch::new(&format!("frames-{number}-{planes}"));
+            let layout = Layout { frames_per_shard: 3, ..Layout::new(formats.iter().copied()) };
+            write(scratch.path(), &layout, &frames);
+            let dataset = Dataset::open(scratch.path()).unwrap();
+            let places = dataset.places().unwrap();
+            assert_eq!(
+                places.iter().map(|place| (place.index, place.shard)).collect::<Vec<_>>(),
+                [(1, 0), (2, 0), (3, 1), (6, 2)]
+            );
+            let flat = [Format::Cellpose, Format::Stardist, Format::YoloSeg, Format::Qupath];
+            assert_eq!(dataset.has_planes(), formats.iter().any(|format| !flat.contains(format)));
+            for (frame, place) in frames.iter().zip(places) {
+                let summary = dataset.summary(place).unwrap();
+                assert_eq!((summary.index, summary.white()), (place.index, u16::MAX >> (16 - bits)));
+                let mut found = Vec::new();
+                dataset
+                    .planes(&summary, place.shard, &mut |number, levels| {
+                        assert_eq!(number, found.len());
+                        found.push(levels);
+                    })
+                    .unwrap();
+                if dataset.has_planes() || planes == 1 {
+                    assert!(found.iter().eq(frame.planes.iter().map(|plane| &plane.grey)), "{formats:?} {planes}");
+                } else {
+                    let sharp = &frame.finished.all_in_focus;
+                    let is_near = |(level, sharp): (&u16, &f32)| (f32::from(*level) - sharp).abs() <= 0.51;
+                    assert!(found.len() == 1 && found[0].iter().zip(sharp).all(is_near), "{formats:?} {planes}");
+                }
+                let truth = dataset.truth(place).unwrap();
+                assert_eq!([truth.width, truth.height], [WIDTH, HEIGHT]);
+                assert_eq!(truth.objects, frame.finished.truth.objects);
+            }
+            let stranger = FramePlace { index: 4, shard: 1 };
+            assert!(dataset.summary(stranger).unwrap_err().to_string().contains("no frame 4"));
+            assert!(dataset.truth(stranger).unwrap_err().to_string().contains("no image 4"));
+        }
+    }
+}
+
+#[test]
+fn a_conversion_that_was_stopped_goes_on() {
+    let (folder, tars, whole) = (Scratch::new("go-folder"), Scratch::new("go-tars"), Scratch::new("go-whole"));
+    let frames: Vec<Frame> = (0..6).map(|index| frame(index, 1, 8, 1)).collect();
+    write(folder.path(), &Layout::default(), &frames);
+    let layout = Layout { frames_per_shard: 2, ..Layout::new([Format::Webdataset]) };
+    let stop = AtomicBool::new(false);
+    let seen = AtomicBool::new(false);
+    let outcome = convert(folder.path(), tars.path(), &layout, &stop, &|_| {
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        seen.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+    let outcome = outcome.unwrap();
+    assert_eq!((outcome.made, outcome.stopped), (2, true));
+    assert_eq!(to(folder.path(), tars.path(), &layout).unwrap(), 4);
+    write(whole.path(), &layout, &frames);
+    assert!(contents(tars.path()) == contents(whole.path()));
+}
+
+#[test]
+fn flat_labels_follow_the_policy_and_the_record_counts_what_they_lose() {
+    for policy in Flatten::ALL {
+        let scratch = Scratch::new(&format!("flat-{}", policy.name()));
+        let frames = [frame(0, 1, 8, 1)];
+        let layout = Layout { flatten: policy, ..Layout::new([Format::Cellpose, Format::Stardist]) };
+        write(scratch.path(), &layout, &frames);
+        let truth = &frames[0].finished.truth;
+        let dataset = begin(scratch.path(), &layout).unwrap();
+        let record = dataset.whole(0, Check::Hashes).unwrap().unwrap();
+        for (group, part) in [(Group::Cytoplasm, Part::Cytoplasm), (Group::Nucleus, Part::Nucleus)] {
+            let group = group.name();
+            let masks = scratch.join(&format!("cellpose/{group}/000000_masks.tif"));
+            let ids = read_label_map(&masks, &Limits::default()).unwrap().ids;
+            let stardist = scratch.join(&format!("stardist/{group}/masks/000000.tif"));
+            assert_eq!(fs::read(&masks).unwrap(), fs::read(stardist).unwrap());
+            let image = scratch.join(&format!("cellpose/{group}/000000.tif"));
+            assert_eq!(GreyImage::read(&image, &Limits::default()).unwrap().grey, frames[0].planes[0].grey);
+            let all: u64 = truth.objects.iter().filter(|o| o.part == part).map(|o| o.amodal.area()).sum();
+            let shown = ids.iter().filter(|&&id| id > 0).count() as u64;
+            assert_eq!(record.frames[0].lost_px[group], all - shown, "{group} {}", policy.name());
+        }
+        // The data set says so.
+        let card = fs::read_to_string(scratch.join("README.md")).unwrap();
+        assert!(card.contains(&format!("`{}`", policy.name())), "{card}");
+    }
+}
+
+#[test]
+fn samples_of_a_tar_file_stand_together_and_hold_image_truth_and_labels() {
+    let scratch = Scratch::new("samples");
+    let layout = Layout { frames_per_shard: 4, ..Layout::new([Format::Webdataset]) };
+    let frames: Vec<Frame> = (0..6).map(|index| frame(index, 1, 8, 1)).collect();
+    write(scratch.path(), &layout, &frames);
+    let files = untar(&scratch.join("webdataset/000001.tar"));
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    let of = |index: u64| {
+        ["json", "png", "cytoplasm.png", "nucleus.png"].map(|ending| format!("{index:06}.{ending}")).to_vec()
+    };
+    assert_eq!(names, [of(4), of(5)].concat());
+    let image = GreyImage::decode(&files[1].1, &Limits::default()).unwrap();
+    assert_eq!(image.grey, frames[4].planes[0].grey);
+    let labels = label_map(&files[2].1, &Limits::default()).unwrap();
+    assert_eq!(labels, frames[4].finished.truth.labels(Group::Cytoplasm));
+    let sample: Value = serde_json::from_slice(&files[0].1).unwrap();
+    assert_eq!(sample["truth"]["annotations"].as_array().unwrap().len(), 6);
+    // The document of the shard counts its annotations through.
+    let coco = json(&scratch.join("shards/000001.coco.json"));
+    let ids: Vec<u64> = coco["annotations"].as_array().unwrap().iter().map(|a| a["id"].as_u64().unwrap()).collect();
+    assert_eq!(ids, (1..=12).collect::<Vec<_>>());
+    assert_eq!(coco["images"][1]["file_name"], "webdataset/000001.tar/000005.png");
+    assert!(!scratch.join("coco.json").exists() && !scratch.join("images").exists());
+}
+
+#[test]
+fn nuclei_lie_within_their_cells() {
+    let scratch = Scratch::new("geojson");
+    write(scratch.path(), &Layout::new([Format::Qupath]), &[frame(0, 1, 8, 1)]);
+    let collection = json(&scratch.join("qupath/000000.geojson"));
+    let features = collection["features"].as_array().unwrap();
+    let types: Vec<&str> = features.iter().map(|f| f["properties"]["objectType"].as_str().unwrap()).collect();
+    assert_eq!(types, ["cell", "cell", "detection", "detection"]);
+    for feature in features {
+        let ring = feature["geometry"]["coordinates"][0].as_array().unwrap();
+        assert_eq!(ring.first(), ring.last());
+        assert_eq!(feature["nucleusGeometry"].is_object(), feature["properties"]["objectType"] == "cell");
+    }
+    let mut ids: Vec<&str> = features.iter().map(|feature| feature["id"].as_str().unwrap()).collect();
+    ids.dedup();
+    assert_eq!(ids.len(), 4);
+}
+
+#[test]
+fn polygons_are_fractions_of_the_image_and_classes_are_named() {
+    let scratch = Scratch::new("yolo");
+    let frames: Vec<Frame> = (0..40).map(|index| frame(index, 1, 8, 1)).collect();
+    write(scratch.path(), &Layout::new([Format::YoloSeg]), &frames);
+    let manifest = json(&scratch.join("manifest.json"));
+    let names = manifest["categories"].as_array().unwrap().len();
+    let classes = fs::read_to_string(scratch.join("yolo-seg/data.yaml")).unwrap();
+    assert_eq!(classes.lines().filter(|line| line.starts_with("  ")).count(), names);
+    let mut count = 0;
+    for (name, bytes) in contents(&scratch.join("yolo-seg/labels")) {
+        count += 1;
+        let image = scratch.join("yolo-seg/images").join(name.replace(".txt", ".png"));
+        assert!(image.exists(), "{}", image.display());
+        let index: usize = name[name.len() - 10..name.len() - 4].parse().unwrap();
+        let lines: Vec<Vec<f64>> = String::from_utf8(bytes)
+            .unwrap()
+            .lines()
+            .map(|line| line.split(' ').map(|v| v.parse().unwrap()).collect())
+            .collect();
+        for (line, object) in lines.iter().zip(&frames[index].finished.truth.objects) {
+            assert!(line[0] < names as f64 && line[1..].iter().all(|v| (0.0..=1.0).contains(v)));
+            // The shoelace formula: seams of no width add nothing.
+            let corners: Vec<[f64; 2]> =
+                line[1..].chunks(2).map(|p| [p[0] * WIDTH as f64, p[1] * HEIGHT as f64]).collect();
+            let next = corners.iter().cycle().skip(1);
+            let area: f64 = corners.iter().zip(next).map(|(a, b)| (a[0] * b[1] - b[0] * a[1]) / 2.0).sum();
+            assert!((area - object.amodal.area() as f64).abs() < 0.01, "{area}");
+        }
+        assert_eq!(lines.len(), 6);
+    }
+    assert_eq!(count, 40);
+    // By slide: sixteen frames of one are in one split.
+    let splits = fs::read_to_string(scratch.join("splits.csv")).unwrap();
+    let of_first: Vec<&str> = splits.lines().skip(1).take(16).map(|line| line.rsplit(',').next().unwrap()).collect();
+    assert!(of_first.windows(2).all(|pair| pair[0] == pair[1]) && splits.lines().count() == 41);
+}
+
+/// A frame of many tiles, with more objects than fit into one layer.
+#[cfg(feature = "zarr")]
+fn large(width: usize, height: usize) -> Frame {
+    let mut frame = colour_frame(0, 1, 12);
+    frame.finished.scene.view = View { width, height, pixel_um: 0.25 };
+    (frame.finished.truth.width, frame.finished.truth.height) = (width, height);
+    let grey = |i: usize| ((i as u64).wrapping_mul(6_364_136_223_846_793_005) >> 52) as u16;
+    frame.planes[0].grey = (0..width * height * 3).map(grey).collect();
+    frame.planes[0].noise_free = vec![0.0; width * height * 3];
+    frame.finished.all_in_focus = vec![0.0; width * height * 3];
+    // Runs do not know how wide the image is: the masks stay where they are.
+    frame
+}
+
+#[test]
+#[cfg(feature = "zarr")]
+fn groups_of_zarr_hold_every_pixel_at_every_size_and_every_mask_whole() {
+    use papsynth_zarr::{Form, Kind, Pyramid, Shard, ShardReader, Tiling, halved, halved_labels};
+    let scratch = Scratch::new("zarr-large");
+    let (width, height) = (2101, 61);
+    let frame = large(width, height);
+    write(scratch.path(), &Layout::new([Format::OmeZarr]), std::slice::from_ref(&frame));
+    assert!(verify(scratch.path(), Some(0..1)).unwrap().findings.is_empty());
+    let group = scratch.join("ome-zarr/000000.ome.zarr");
+    let open = |pyramid: &Pyramid, level: usize, path: &Path, file: &str| {
+        let file = fs::File::open(path.join(level.to_string()).join(file)).unwrap();
+        ShardReader::open(&pyramid.levels()[level], Shard::default(), file).unwrap()
+    };
+    let tiling = Tiling { chunk: 512, shard: 4096, planes: 1 };
+    let form = Form { kind: Kind::U16, channels: Some(3), planes: None, height, width, tiling, levels: 4 };
+    let image = Pyramid::new(&form).unwrap();
+    for channel in 0..3 {
+        let mut expected: Vec<u16> = frame.planes[0].grey.iter().skip(channel).step_by(3).copied().collect();
+        let mut side = width;
+        for level in 0..4 {
+            let found = open(&image, level, &group, "c/0/0/0").plane::<u16>(channel, 0).unwrap();
+            assert!(found == expected, "channel {channel} of level {level}");
+            (expected, side) = (halved(&expected, side), side.div_ceil(2));
+        }
+    }
+    assert!(!group.join("4").exists());
+    // Two cells overlap: two layers, each with one of them whole, and what is known of it.
+    let labels = Pyramid::new(&Form { channels: None, ..form }).unwrap();
+    for (layer, id) in [(0, 1), (1, 2)] {
+        let path = group.join(format!("labels/cytoplasm-{layer}"));
+        let object = |o: &&papsynth::truth::ObjectTruth| o.id == id && o.part == Part::Cytoplasm;
+        let object = frame.finished.truth.objects.iter().find(object).unwrap();
+        let mut expected = vec![0_u16; width * height];
+        object.amodal.pixels(width).for_each(|pixel| expected[pixel] = id as u16);
+        let mut side = width;
+        for level in 0..4 {
+            assert!(open(&labels, level, &path, "c/0/0").plane::<u16>(0, 0).unwrap() == expected, "{layer} {level}");
+            (expected, side) = (halved_labels(&expected, side), side.div_ceil(2));
+        }
+        let known = &json(&path.join("zarr.json"))["attributes"]["ome"]["image-label"]["properties"];
+        assert_eq!(known.as_array().unwrap().len(), 1);
+        assert_eq!((&known[0]["label-value"], &known[0]["parent"]), (&Value::from(id), &Value::Null));
+        assert_eq!(known[0]["area_px"], object.amodal.area());
+    }
+    let nuclei = json(&group.join("labels/nucleus-0/zarr.json"));
+    assert_eq!(nuclei["attributes"]["ome"]["image-label"]["properties"][1]["parent"], 2);
+}
+
+#[test]
+#[cfg(not(feature = "zarr"))]
+fn a_build_without_zarr_says_so_before_anything_is_written() {
+    let scratch = Scratch::new("no-zarr");
+    let says = "the format `ome-zarr` needs a build of papsynth with `--features zarr`";
+    let error = begin(scratch.path(), &Layout::new([Format::OmeZarr])).unwrap_err().to_string();
+    assert!(error.ends_with(says), "{error}");
+    assert!(contents(scratch.path()).is_empty());
+    assert!(Format::built().all(|format| format != Format::OmeZarr));
+}
+
+#[test]
+#[cfg(not(feature = "parquet"))]
+fn a_build_without_parquet_says_so_and_writes_nothing() {
+    let scratch = Scratch::new("no-parquet");
+    let says = "the format `huggingface` needs a build of papsynth with `--features parquet`";
+    let error = begin(scratch.path(), &Layout::new([Format::Huggingface])).unwrap_err().to_string();
+    assert!(error.ends_with(says), "{error}");
+    let says = "the table of objects as Parquet needs a build of papsynth with `--features parquet`";
+    let layout = Layout { objects_parquet: true, ..Layout::default() };
+    let error = begin(scratch.path(), &layout).unwrap_err().to_string();
+    assert!(error.ends_with(says), "{error}");
+    assert!(contents(scratch.path()).is_empty());
+    assert!(Format::built().all(|format| format != Format::Huggingface));
+}
+
+#[test]
+fn another_layout_is_refused() {
+    let scratch = Scratch::new("layout");
+    begin(scratch.path(), &Layout::default()).unwrap();
+    let error = begin(scratch.path(), &Layout::new([Format::Cellpose])).unwrap_err().to_string();
+    assert!(error.contains("folder with 1 a shard, top") && error.contains("not cellpose"), "{error}");
+}

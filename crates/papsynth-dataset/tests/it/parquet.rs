@@ -1,0 +1,155 @@
+//! What lies in Parquet files is what lies in the others.
+
+#![cfg(feature = "parquet")]
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use crate::support::{HEIGHT, SEED, Scratch, WIDTH, contents, frame, recipe};
+use papsynth::Frame;
+use papsynth::model::Model;
+use papsynth_dataset::read::{GreyImage, Limits as ImageLimits};
+use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, convert, rle, verify};
+use papsynth_parquet::{Limits, Reader, Value};
+
+/// Writes frames, two a shard.
+fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
+    let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout };
+    let dataset = Dataset::create_or_resume(path, &info).unwrap();
+    let each = layout.frames_per_shard;
+    for (shard, frames) in (0..).zip(frames.chunks(usize::try_from(each).unwrap())) {
+        let mut writer = dataset.shard_writer(shard).unwrap();
+        for frame in frames {
+            writer.begin(&frame.finished.scene).unwrap();
+            frame.planes.iter().for_each(|plane| writer.write_plane(plane).unwrap());
+            writer.end(&frame.finished).unwrap();
+        }
+        writer.commit().unwrap();
+    }
+    dataset.finish().unwrap();
+}
+
+fn rows(path: &Path, columns: &[&str]) -> Vec<Vec<Value>> {
+    let reader = Reader::from_bytes(fs::read(path).unwrap(), &Limits::default()).unwrap();
+    reader.rows(columns, 0..u64::MAX).unwrap().collect::<Result<_, _>>().unwrap()
+}
+
+fn text(value: &Value) -> &str {
+    match value {
+        Value::Text(text) => text,
+        other => panic!("{other:?} is no text"),
+    }
+}
+
+fn list(value: &Value) -> &[Value] {
+    match value {
+        Value::List(values) | Value::Struct(values) => values,
+        other => panic!("{other:?} is no list"),
+    }
+}
+
+#[test]
+fn the_table_says_what_the_csv_says_and_has_the_masks() {
+    let scratch = Scratch::new("objects");
+    let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1)];
+    write(scratch.path(), &Layout::default(), &frames);
+    let csv = fs::read_to_string(scratch.join("objects.csv")).unwrap();
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let table = rows(&scratch.join("objects.parquet"), &names);
+    assert_eq!(table.len(), lines.clone().count());
+    for (row, line) in table.iter().zip(lines) {
+        let printed = row.iter().map(|value| match value {
+            Value::Null => String::new(),
+            Value::Bool(flag) => flag.to_string(),
+            Value::U32(id) => id.to_string(),
+            Value::I64(whole) => whole.to_string(),
+            Value::F64(number) => number.to_string(),
+            Value::List(values) => {
+                let numbers = values.iter().map(|value| match value {
+                    Value::F64(number) => number.to_string(),
+                    other => panic!("{other:?} in a list"),
+                });
+                numbers.collect::<Vec<_>>().join(";")
+            }
+            other => text(other).to_owned(),
+        });
+        assert_eq!(printed.collect::<Vec<_>>(), line);
+    }
+    let masks = rows(&scratch.join("objects.parquet"), &["rle", "front_rle", "image_width_px", "image_height_px"]);
+    let objects = frames.iter().flat_map(|frame| &frame.finished.truth.objects);
+    assert_eq!(objects.clone().count(), masks.len());
+    for (row, object) in masks.iter().zip(objects) {
+        assert_eq!(rle::decode(text(&row[0]), WIDTH, HEIGHT).unwrap(), object.amodal);
+        assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.front);
+        assert_eq!(row[2..], [Value::I64(WIDTH as i64), Value::I64(HEIGHT as i64)]);
+    }
+    // Text alone, if that is wanted, and the other is another data set.
+    let plain = Scratch::new("objects-plain");
+    let layout = Layout { objects_parquet: false, ..Layout::default() };
+    write(plain.path(), &layout, &frames);
+    assert!(contents(plain.path()).iter().all(|(name, _)| !name.ends_with(".parquet")));
+    assert!(verify(plain.path(), Some(0..2)).unwrap().findings.is_empty());
+    let info =
+        DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &Layout::default() };
+    let error = Dataset::create_or_resume(plain.path(), &info).unwrap_err().to_string();
+    assert!(error.contains("objects also as Parquet"), "{error}");
+}
+
+#[test]
+fn rows_are_frames_in_files_by_split() {
+    let scratch = Scratch::new("rows");
+    // Sixteen frames are of a slide.
+    let frames: Vec<Frame> = (0..40).map(|index| frame(index, 1, 8, 1)).collect();
+    let layout = Layout { frames_per_shard: 20, ..Layout::new([Format::Huggingface]) };
+    write(scratch.path(), &layout, &frames);
+    let splits = fs::read_to_string(scratch.join("splits.csv")).unwrap();
+    let split = |index: usize| match splits.lines().nth(index + 1).unwrap().rsplit(',').next().unwrap() {
+        "val" => "validation",
+        other => other,
+    };
+    let mut seen = Vec::new();
+    for (name, _) in contents(&scratch.join("huggingface/data")) {
+        let columns = ["index", "image", "planes", "objects"];
+        for row in rows(&scratch.join("huggingface/data").join(&name), &columns) {
+            let Value::I64(index) = row[0] else { panic!("{row:?}") };
+            let index = usize::try_from(index).unwrap();
+            assert_eq!(name, format!("{}-{:06}.parquet", split(index), index / 20));
+            let [Value::Bytes(png), path] = list(&row[1]) else { panic!("frame {index} has no image") };
+            assert_eq!(text(path), format!("{index:06}.png"));
+            assert_eq!(GreyImage::decode(png, &ImageLimits::default()).unwrap().grey, frames[index].planes[0].grey);
+            assert!(list(&row[2]).is_empty());
+            let objects = &frames[index].finished.truth.objects;
+            assert_eq!(list(&row[3]).len(), objects.len());
+            for (found, object) in list(&row[3]).iter().zip(objects) {
+                let found = list(found);
+                assert_eq!(found[0], Value::U32(object.id));
+                assert_eq!(rle::decode(text(&found[16]), WIDTH, HEIGHT).unwrap(), object.amodal);
+            }
+            seen.push(index);
+        }
+    }
+    seen.sort_unstable();
+    assert_eq!(seen, (0..40).collect::<Vec<_>>());
+    let card = fs::read_to_string(scratch.join("huggingface/README.md")).unwrap();
+    for name in ["train", "validation", "test"] {
+        assert_eq!(card.contains(&format!("data/{name}-*.parquet")), (0..40).any(|index| split(index) == name));
+    }
+}
+
+#[test]
+fn stacks_keep_their_planes_and_are_converted_by_way_of_parquet() {
+    for (planes, bits) in [(1, 12), (3, 8)] {
+        let name = |what: &str| Scratch::new(&format!("way-{what}-{planes}"));
+        let (rows, flat, back) = (name("rows"), name("flat"), name("back"));
+        let frames: Vec<Frame> = (0..3).map(|index| frame(index, planes, bits, 1)).collect();
+        write(rows.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &frames);
+        let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::OmeTiff, Format::Webdataset]) };
+        write(flat.path(), &layout, &frames);
+        let stop = AtomicBool::new(false);
+        convert(rows.path(), back.path(), &layout, &stop, &|_| ()).unwrap();
+        assert!(contents(flat.path()) == contents(back.path()), "{planes} {bits}");
+        assert!(verify(rows.path(), Some(0..3)).unwrap().findings.is_empty());
+    }
+}

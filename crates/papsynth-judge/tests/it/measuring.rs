@@ -1,0 +1,167 @@
+//! What is measured on pictures that are known.
+
+use papsynth_judge::{Detail, Error, Gauge, GaugeParams, Known, NucleiFrom, Picture, Statistics};
+
+use crate::support::Toy;
+
+fn gauge(nuclei_from: NucleiFrom) -> Gauge {
+    Gauge::new(&GaugeParams { nuclei_from, ..GaugeParams::default() }).unwrap()
+}
+
+fn close(value: f64, wanted: f64, within: f64) {
+    assert!((value - wanted).abs() <= within, "{value}, not {wanted} ± {within}");
+}
+
+fn middle(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn toy_fields_are_measured_as_they_were_made() {
+    let toy = Toy { width: 640, height: 480, cells: 7, ..Toy::default() };
+    let fields: Vec<_> = toy.pictures(6, 1).iter().map(|p| gauge(NucleiFrom::Points).measure(p).unwrap()).collect();
+    let of = |f: &dyn Fn(&Statistics) -> f64| middle(fields.iter().map(|field| f(&field.statistics)).collect());
+    // 1 − 0.03 x² − 0.01 y², whose mean is 1 − 0.04/3.
+    close(of(&|s| s.background_dn), 230.0 * (1.0 - 0.04 / 3.0), 0.5);
+    close(of(&|s| s.background_x2), -0.03, 0.002);
+    close(of(&|s| s.background_y2), -0.01, 0.002);
+    close(of(&|s| s.background_valley), 0.0405, 0.003);
+    // Rounding to levels adds 1/12.
+    close(of(&|s| s.noise_dn), (4.0_f64 + 1.0 / 12.0).sqrt(), 0.04);
+    close(of(&|s| s.noise_across), 0.0, 0.01);
+    close(of(&|s| s.noise_down), 0.0, 0.01);
+    close(of(&|s| s.edge_sigma_p50), 1.2, 0.1);
+    close(of(&|s| s.nucleus_um2), std::f64::consts::PI * 100.0 * 0.33 * 0.33, 5.0);
+    assert!(of(&|s| s.circularity) > 0.95);
+    assert!(of(&|s| s.solidity) > 0.97);
+    assert!(of(&|s| s.corners) == 0.0);
+    let nuclei: usize = fields.iter().map(|f| f.nuclei.len()).sum();
+    assert!(nuclei >= 38, "{nuclei} of 42 nuclei");
+    for (name, wanted, within) in
+        [("core above surroundings", 0.35, 0.06), ("rim sigma, px", 1.2, 0.45), ("nucleus solidity", 0.97, 0.03)]
+    {
+        close(middle(fields.iter().flat_map(|f| f.nuclei.column(name)).collect()), wanted, within);
+    }
+}
+
+#[test]
+fn nuclei_are_the_same_by_search_by_points_and_by_masks() {
+    let picture = Toy { cells: 4, ..Toy::default() }.picture(11);
+    let Known::Points(points) = &picture.nuclei else { unreachable!() };
+    let found = gauge(NucleiFrom::Search).measure(&picture).unwrap();
+    let marked = gauge(NucleiFrom::Points).measure(&picture).unwrap();
+    assert_eq!(found.nuclei, marked.nuclei);
+    assert_eq!(found.nuclei.len(), 4);
+    let inside = |i: usize| {
+        let (x, y) = ((i % picture.width) as f64, (i / picture.width) as f64);
+        let near = |p: &[f64; 2]| (p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y) < 100.0;
+        points.iter().position(near).map_or(0, |i| u32::try_from(i).unwrap() + 1)
+    };
+    let masks = Picture { nuclei: Known::Masks((0..picture.grey.len()).map(inside).collect()), ..picture.clone() };
+    let given = gauge(NucleiFrom::Masks).measure(&masks).unwrap();
+    assert_eq!(given.nuclei.len(), 4);
+    for (a, b) in given.nuclei.places.iter().zip(&found.nuclei.places) {
+        assert!((a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1.5, "{a:?} {b:?}");
+    }
+    // The centres of masks serve as points.
+    assert_eq!(gauge(NucleiFrom::Points).measure(&masks).unwrap().nuclei, marked.nuclei);
+}
+
+#[test]
+fn statistics_are_the_same_at_either_detail() {
+    let picture = Toy::default().picture(3);
+    let everything = gauge(NucleiFrom::Search).measure(&picture).unwrap();
+    let params = GaugeParams { detail: Detail::Statistics, ..GaugeParams::default() };
+    let short = Gauge::new(&params).unwrap().measure(&picture).unwrap();
+    assert_eq!(format!("{:?}", short.statistics), format!("{:?}", everything.statistics));
+    assert!(short.patches.is_empty() && !everything.patches.is_empty());
+}
+
+#[test]
+fn scale_of_grey_levels_and_dead_borders_do_not_matter() {
+    let picture = Toy::default().picture(5);
+    let plain = gauge(NucleiFrom::Points).measure(&picture).unwrap();
+    let deep =
+        Picture { grey: picture.grey.iter().map(|g| g * 257.0).collect(), full_scale: 65_535.0, ..picture.clone() };
+    let deep = gauge(NucleiFrom::Points).measure(&deep).unwrap();
+    close(deep.statistics.background_dn, plain.statistics.background_dn, 1e-3);
+    assert_eq!(deep.nuclei.places, plain.nuclei.places);
+    // Two black rows below, three black columns to the left.
+    let mut grey = Vec::new();
+    for row in picture.grey.chunks(picture.width) {
+        grey.extend([0.0; 3]);
+        grey.extend_from_slice(row);
+    }
+    grey.extend(vec![1.0; 2 * (picture.width + 3)]);
+    let Known::Points(points) = &picture.nuclei else { unreachable!() };
+    let nuclei = Known::Points(points.iter().map(|p| [p[0] + 3.0, p[1]]).collect());
+    let framed = Picture { grey, width: picture.width + 3, nuclei, ..picture.clone() };
+    let framed = gauge(NucleiFrom::Points).measure(&framed).unwrap();
+    assert_eq!((framed.width, framed.height), (plain.width, plain.height));
+    assert_eq!(framed.nuclei, plain.nuclei);
+    assert_eq!(framed.patches, plain.patches);
+}
+
+#[test]
+fn what_is_no_picture_is_refused() {
+    let good = Toy::default().picture(1);
+    let refused = |picture: Picture| gauge(NucleiFrom::Masks).measure(&picture).unwrap_err();
+    let [mut nan, mut negative, mut bright] = [good.grey.clone(), good.grey.clone(), good.grey.clone()];
+    nan[7] = f32::NAN;
+    negative[7] = -1.0;
+    bright[7] = 256.0;
+    for grey in [nan, negative, bright, vec![7.0; good.grey.len()]] {
+        assert!(matches!(refused(Picture { grey, ..good.clone() }), Error::Picture { .. }));
+    }
+    for width in [0, 31, 319] {
+        assert!(matches!(refused(Picture { width, ..good.clone() }), Error::Size { .. }), "{width}");
+    }
+    for full_scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert!(matches!(refused(Picture { full_scale, ..good.clone() }), Error::Picture { .. }));
+    }
+    assert!(matches!(refused(Picture { nuclei: Known::Masks(vec![1; 7]), ..good.clone() }), Error::Picture { .. }));
+    assert!(matches!(refused(Picture { nuclei: Known::Points(vec![[f64::NAN, 1.0]]), ..good }), Error::Picture { .. }));
+}
+
+#[test]
+fn parameters_have_ranges() {
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 11.0] {
+        let params = GaugeParams { pixel_um: bad, ..GaugeParams::default() };
+        assert!(matches!(Gauge::new(&params), Err(Error::Parameter { field: "pixel_um", .. })));
+    }
+    let mut params = GaugeParams::default();
+    params.nuclei.largest_um2 = 10.0;
+    let message = Gauge::new(&params).unwrap_err().to_string();
+    assert_eq!(message, "nuclei.largest_um2 is 10; accepted is nuclei.smallest_um2 to 100000 um2");
+}
+
+#[test]
+fn coarser_pixels_keep_the_light_and_move_with_their_nuclei() {
+    let picture = Toy::default().picture(2);
+    let coarse = picture.coarsened(1.6);
+    assert_eq!((coarse.width, coarse.height()), (200, 150));
+    let mean = |p: &Picture| p.grey.iter().map(|g| f64::from(*g)).sum::<f64>() / p.grey.len() as f64;
+    close(mean(&coarse), mean(&picture), 0.01);
+    let (Known::Points(fine), Known::Points(moved)) = (&picture.nuclei, &coarse.nuclei) else { unreachable!() };
+    for (a, b) in fine.iter().zip(moved) {
+        close(b[0], (a[0] + 0.5) / 1.6 - 0.5, 1e-12);
+    }
+    assert_eq!(picture.coarsened(1.0), picture);
+    // Whole factors are means of squares.
+    let halved = picture.coarsened(2.0);
+    let square = [0, 1, 320, 321].map(|i| f64::from(picture.grey[10 * 320 + 14 + i])).iter().sum::<f64>() / 4.0;
+    close(f64::from(halved.grey[5 * 160 + 7]), square, 1e-4);
+}
+
+#[test]
+fn what_a_picture_allows_is_known() {
+    for (known, from) in [
+        (Known::Nothing, NucleiFrom::Search),
+        (Known::Points(vec![]), NucleiFrom::Points),
+        (Known::Masks(vec![]), NucleiFrom::Masks),
+    ] {
+        assert_eq!(NucleiFrom::of(&known), from);
+        assert!(NucleiFrom::ALL.contains(&from));
+    }
+}

@@ -1,0 +1,7 @@
+//! Integration tests, linked as one program.
+
+mod camera;
+mod golden;
+mod light;
+mod same_bytes;
+mod slide;
