@@ -38,7 +38,7 @@ pub(super) fn image(
 /// The widest cone of light of all objects, µm.
 fn reach_um(slide: Slide<'_>, microscope: &Microscope, stage_um: f64) -> f64 {
     let depths = slide.scene.objects.iter().map(|object| object.depth_um);
-    depths.map(|depth_um| microscope.cone_radius_um(-depth_um, stage_um)).fold(0.0, f64::max)
+    depths.map(|depth_um| microscope.cone_radius_um(depth_um, stage_um)).fold(0.0, f64::max)
 }
 
 /// Every slab that is not empty, as amplitudes.
@@ -75,7 +75,7 @@ fn layers(
         }
     }
     let layer = |(slab, amplitudes): (i64, Vec<[f64; 2]>)| {
-        Layer::new(-(slab as f64) * slab_um, amplitudes).map_err(|e| format!("optics: {e}"))
+        Layer::new(slab as f64 * slab_um, amplitudes).map_err(|e| format!("optics: {e}"))
     };
     slabs.into_iter().map(layer).collect()
 }

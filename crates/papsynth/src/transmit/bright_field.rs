@@ -168,7 +168,7 @@ impl BrightFieldPath {
         let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
         let microscope = light.lens.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
-        microscope.cone_radius_um(-slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
+        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
     }
 
     /// Multiplies the lights of a group by what the objects let through, on either grid. Gives the mean absorbances over the
@@ -244,12 +244,11 @@ impl BrightFieldPath {
         }
     }
 
-    /// How deep an object lies and how far the stage has travelled, as the optics count them. Depth counts away from the
-    /// objective there, and towards it here.
+    /// How deep an object lies and how far the stage has travelled.
     fn place(scene: &Scene, depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
         match focus {
             FocusAt::Everywhere => [0.0, 0.0],
-            FocusAt::Stage(plane_um) => [-depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
+            FocusAt::Stage(plane_um) => [depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
         }
     }
 

@@ -199,7 +199,7 @@ impl Spread {
             match &self.kind {
                 SpreadKind::BrightField { groups, .. } => {
                     for light in groups.iter().flat_map(|group| &group.lights) {
-                        let margin = light.lens.imager.margin_px(-depth_um, seen_at_um - light.shift_um);
+                        let margin = light.lens.imager.margin_px(depth_um, seen_at_um - light.shift_um);
                         widest = widest.max(margin.map_err(|e| format!("optics: {e}"))?);
                     }
                 }
