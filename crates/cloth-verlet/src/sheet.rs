@@ -1,6 +1,5 @@
 use crate::mesh::cross;
 use crate::outline::distance;
-use crate::refine::Parts;
 use crate::{Point, Vertex};
 use std::sync::Arc;
 
@@ -16,6 +15,15 @@ pub struct Sheet {
     pub(crate) radius: Arc<Vec<f64>>,
     pub(crate) triangles: Arc<Vec<[u32; 3]>>,
     pub(crate) edges: Arc<Vec<Edge>>,
+}
+
+/// A sheet as plain lists, in units of the outline's equivalent radius.
+#[derive(Debug)]
+pub(crate) struct Parts {
+    pub(crate) vertices: Vec<Vertex>,
+    pub(crate) rest: Vec<Point>,
+    pub(crate) radius: Arc<Vec<f64>>,
+    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
 }
 
 /// An edge from `ends[0]` to `ends[1]` with the triangles on its left and right, or [`OUTSIDE`].

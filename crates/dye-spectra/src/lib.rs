@@ -9,6 +9,7 @@ mod lobe;
 mod params;
 mod rows;
 mod srgb;
+mod sum;
 
 pub use colour::{Channel, Colour, Node};
 pub use curve::Curve;

@@ -12,9 +12,11 @@ mod scan;
 mod seam;
 mod source;
 mod spectral;
+mod texture;
 
 pub use error::Error;
 pub use params::{Acceptance, CentreBias, QuiltParams, Seam, Search};
-pub use quilter::{Origin, Quilter, Texture};
+pub use quilter::Quilter;
 pub use rand_core::Rng;
 pub use source::Source;
+pub use texture::{Origin, Texture};
