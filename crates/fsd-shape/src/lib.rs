@@ -2,14 +2,18 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
+mod coordinates;
 mod crossing;
 mod descriptors;
 mod dft;
 mod error;
+#[cfg(feature = "fit")]
 mod fit;
 mod model;
 mod outline;
+#[cfg(feature = "fit")]
 mod pca;
+#[cfg(feature = "fit")]
 mod roughness;
 mod sample;
 mod statistics;
@@ -19,6 +23,7 @@ mod trace;
 pub use crossing::self_intersects;
 pub use descriptors::Descriptors;
 pub use error::Error;
+#[cfg(feature = "fit")]
 pub use fit::{ShapeModelParams, Spread};
 pub use model::{Draw, ShapeModel};
 pub use outline::{Point, centroid, circularity, perimeter, resample, resample_along, signed_area};

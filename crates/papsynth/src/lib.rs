@@ -13,6 +13,7 @@ mod exp10;
 mod frame;
 mod fuse;
 pub mod key;
+#[cfg(feature = "learn")]
 pub mod learn;
 pub mod model;
 mod phantom;
