@@ -47,6 +47,27 @@ impl Sheet {
         &self.vertices
     }
 
+    /// Unit normals of the vertices: the mean of the triangles around each, weighted by their areas; up where the sheet is flat.
+    #[must_use]
+    pub fn normals(&self) -> Vec<Vertex> {
+        let mut normals = vec![[0.0; 3]; self.vertices.len()];
+        for t in self.triangles.iter() {
+            let [a, b, c] = t.map(|v| self.vertices[v as usize]);
+            let (p, q): (Vertex, Vertex) = (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
+            for v in t {
+                for (i, sum) in normals[*v as usize].iter_mut().enumerate() {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    *sum += p[j] * q[k] - p[k] * q[j];
+                }
+            }
+        }
+        for normal in &mut normals {
+            let length = normal.iter().map(|c| c * c).sum::<f64>().sqrt();
+            *normal = if length > 0.0 { normal.map(|c| c / length) } else { [0.0, 0.0, 1.0] };
+        }
+        normals
+    }
+
     /// Indices of the triangles' corners.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {

@@ -1,6 +1,9 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod colour;
+#[cfg(feature = "image")]
+mod convert;
 mod curve;
 mod dye;
 mod error;

@@ -2,6 +2,8 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
+#[cfg(any(feature = "image", feature = "mint", feature = "nalgebra"))]
+mod convert;
 mod coordinates;
 mod crossing;
 mod descriptors;
@@ -20,6 +22,8 @@ mod statistics;
 mod steps;
 mod trace;
 
+#[cfg(feature = "image")]
+pub use convert::trace_image;
 pub use crossing::self_intersects;
 pub use descriptors::Descriptors;
 pub use error::Error;

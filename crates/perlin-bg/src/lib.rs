@@ -1,4 +1,5 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod background;
 mod error;
@@ -6,6 +7,8 @@ mod fractal;
 mod hash;
 mod illumination;
 mod kernel;
+#[cfg(feature = "noise")]
+mod noise_fn;
 mod perlin;
 mod rows;
 mod unit;

@@ -3,6 +3,8 @@
 
 mod candidates;
 mod canvas;
+#[cfg(feature = "image")]
+mod convert;
 mod distance;
 mod draw;
 mod error;
