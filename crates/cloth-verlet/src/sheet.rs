@@ -153,3 +153,29 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
     }
     edges
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{rng, wavy};
+    use crate::{Cloth, ClothParams};
+
+    #[test]
+    fn normals_are_those_of_the_triangles_around() {
+        let (up, ridge) = ([0.0, 0.0, 1.0], 0.5_f64.sqrt());
+        let folded = |height: f64| {
+            let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, height], [1.0, 1.0, height], [2.0, 0.5, height]];
+            let rest = vertices.iter().map(|v| [v[0], v[1]]).collect();
+            let triangles = Arc::new(vec![[0, 1, 2], [1, 3, 2]]);
+            Sheet::new(Parts { vertices, rest, radius: Arc::default(), triangles }, None).normals()
+        };
+        assert_eq!(folded(0.0), [up; 4]);
+        let normals = folded(1.0);
+        assert!((normals[0][0] + ridge).abs() < 1e-12 && (normals[0][2] - ridge).abs() < 1e-12);
+        assert_eq!(normals[3], up);
+        assert!(normals[1][0] < 0.0 && normals[1][2] > ridge && normals[1] == normals[2]);
+        let sheet = Cloth::new(&ClothParams { vertices: 300, ..ClothParams::default() }).unwrap();
+        let sheet = sheet.crumple(&wavy(3.0, 0.1), &mut rng(1)).unwrap();
+        assert!(sheet.normals().iter().filter(|n| n[2] > 0.0).count() * 10 > sheet.vertices().len() * 9);
+    }
+}
