@@ -39,7 +39,8 @@ pub struct Bacilli {
 }
 
 /// A rod-shaped bacterium or a chain of them, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bacillus {
     /// Length of a rod, µm.
     pub length_um: f64,

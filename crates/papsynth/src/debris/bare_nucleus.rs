@@ -35,7 +35,8 @@ pub struct BareNuclei {
 }
 
 /// A bare nucleus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BareNucleus {
     /// Radius of the disc of the same area, µm.
     pub radius_um: f64,

@@ -30,7 +30,8 @@ pub struct Bubbles {
 }
 
 /// An air bubble, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bubble {
     /// Radius, µm.
     pub radius_um: f64,

@@ -12,6 +12,7 @@ use crate::phantom::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
+use crate::truth::traits::Trait;
 
 /// *Candida*: colonies of pseudohyphae and budding yeasts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -48,7 +49,7 @@ pub struct Candidas {
 }
 
 /// What a piece of *Candida* is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Growth {
     /// A pseudohypha with its branches and buds.
@@ -58,7 +59,8 @@ pub enum Growth {
 }
 
 /// A pseudohypha or a yeast, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Candida {
     /// What it is.
     pub growth: Growth,
@@ -231,8 +233,8 @@ impl Thing for Candida {
         }
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         phantom.traits.push(match self.growth {
-            Growth::Hypha => "hypha",
-            Growth::Yeast => "yeast",
+            Growth::Hypha => Trait::Hypha,
+            Growth::Yeast => Trait::Yeast,
         });
         phantom
     }

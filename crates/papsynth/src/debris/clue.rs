@@ -13,7 +13,9 @@ use crate::phantom::tile::Tile;
 use crate::phantom::{Phantom, Pools};
 use crate::random;
 use crate::recipe::Number;
-use crate::scene::{Body, FieldNumbers, Object, Scene};
+use crate::scene::numbers::FieldNumbers;
+use crate::scene::{Body, Object, Scene};
+use crate::truth::traits::Trait;
 
 /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,7 +36,8 @@ pub struct ClueCells {
 }
 
 /// The coat of a clue cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Coat {
     /// Coccobacilli per µm² where it is dense.
     pub density: f64,
@@ -162,7 +165,7 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
         painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
     *phantom = core::mem::take(phantom).stained(painting.absorbance, scene.dyes.bacillus);
-    phantom.traits.push("clue");
+    phantom.traits.push(Trait::Clue);
 }
 
 /// A tile on the place of a wider one.

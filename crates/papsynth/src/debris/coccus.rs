@@ -38,7 +38,8 @@ pub struct Cocci {
 }
 
 /// A colony of cocci, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Colony {
     /// Number of cocci.
     pub cocci: usize,

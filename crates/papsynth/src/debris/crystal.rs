@@ -30,7 +30,8 @@ pub struct Crystals {
 }
 
 /// A grain of dye, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Crystal {
     /// Diameter, µm.
     pub diameter_um: f64,

@@ -39,7 +39,8 @@ pub struct Dirt {
 }
 
 /// A fleck of dirt, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fleck {
     /// Length, µm.
     pub length_um: f64,

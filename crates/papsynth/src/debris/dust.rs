@@ -27,7 +27,8 @@ pub struct Dust {
 }
 
 /// A grain of dust, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Grain {
     /// Diameter, µm.
     pub diameter_um: f64,

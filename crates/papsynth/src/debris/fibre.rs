@@ -34,7 +34,8 @@ pub struct Fibres {
 }
 
 /// A fibre, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fibre {
     /// Length, µm.
     pub length_um: f64,

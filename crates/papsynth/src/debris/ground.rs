@@ -4,7 +4,10 @@ use super::{ClueCells, Kind};
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
-use crate::scene::{Body, FieldNumbers, FieldStain, Object, View};
+use crate::scene::numbers::FieldNumbers;
+use crate::scene::stain::FieldStain;
+use crate::scene::view::View;
+use crate::scene::{Body, Object};
 
 /// A field whose cells have their places, and to which objects are added kind by kind.
 pub(crate) struct Ground<'a> {

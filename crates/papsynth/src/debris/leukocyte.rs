@@ -59,7 +59,8 @@ pub struct Leukocytes {
 }
 
 /// A white blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Leukocyte {
     /// How the nucleus is shaped.
     pub form: NucleusForm,

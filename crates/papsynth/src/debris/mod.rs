@@ -102,7 +102,7 @@ macro_rules! kinds {
         }
 
         /// What an object is, its numbers drawn.
-        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind", rename_all = "kebab-case")]
         pub enum Body {
             /// An epithelial cell.

@@ -38,7 +38,8 @@ pub struct Mucus {
 }
 
 /// A strand of mucus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Strand {
     /// Length, µm.
     pub length_um: f64,

@@ -32,7 +32,8 @@ pub struct OutOfFocus {
 }
 
 /// An object far outside the depth of the slide, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Blob {
     /// Radius, µm.
     pub radius_um: f64,

@@ -11,6 +11,7 @@ use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
 use crate::recipe::{DyeAmounts, Number};
+use crate::truth::traits::Trait;
 
 /// Red blood cells, in clusters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +40,8 @@ pub struct RedCells {
 }
 
 /// A red blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RedCell {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -158,7 +160,7 @@ impl Thing for RedCell {
         });
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         if self.ghost {
-            phantom.traits.push("ghost");
+            phantom.traits.push(Trait::Ghost);
         }
         phantom
     }

@@ -32,7 +32,8 @@ pub struct Scratches {
 }
 
 /// A scratch, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scratch {
     /// Length, µm.
     pub length_um: f64,

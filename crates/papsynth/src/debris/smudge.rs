@@ -39,7 +39,8 @@ pub struct Smudges {
 }
 
 /// A clump of amorphous debris, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Smudge {
     /// Diameter of the disc of its area before it is frayed, µm.
     pub diameter_um: f64,

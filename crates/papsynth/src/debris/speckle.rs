@@ -39,7 +39,8 @@ pub struct Speckles {
 }
 
 /// A speck of dust or stain, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Speckle {
     /// How it was grown.
     pub form: SpeckForm,

@@ -39,7 +39,8 @@ pub struct Trichomonads {
 }
 
 /// A trichomonad, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Trichomonad {
     /// Length, µm.
     pub length_um: f64,

@@ -15,11 +15,11 @@ use std::borrow::Cow;
 
 use dye_spectra::Amounts;
 
-use crate::error::Cause;
 use crate::debris;
+use crate::error::Cause;
 use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene, View};
-use crate::truth::Part;
+use crate::truth::{Part, Trait};
 
 pub(crate) use pools::Pools;
 pub(crate) use studio::Studio;
@@ -61,7 +61,7 @@ pub(crate) struct Phantom {
     /// Its parts, from the outside in.
     pub(crate) pieces: Vec<Piece>,
     /// Variants that its shape shows, for the truth.
-    pub(crate) traits: Vec<&'static str>,
+    pub(crate) traits: Vec<Trait>,
 }
 
 /// Makes the phantoms of a run of objects.
@@ -87,7 +87,9 @@ pub(crate) fn make(
             debris::cover(scene, pools, object, phantom);
         }
         let mut cells = made.into_iter();
-        let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next()).expect("a phantom was made of every cell");
+        let mut phantom = |object: &&Object| {
+            debris::phantom(scene, pools, object).or_else(|| cells.next()).expect("a phantom was made of every cell")
+        };
         Ok(objects.iter().map(&mut phantom).collect())
     })
 }

@@ -13,12 +13,14 @@ use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
 use super::deposit::{DENSEST, Deposit};
-use super::draw::{FieldNumbers, empty, pixel_um};
+use super::draw::{empty, pixel_um};
+use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Object, Plot, Scene, View};
-use crate::error::Cause;
+use super::view::View;
 use crate::debris::{Ground, Sieve};
+use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
@@ -115,7 +117,7 @@ impl Population {
     /// The population of a slide whose own key is given, and the slide without anything on it.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
-        let stain = FieldStain::of_slide(recipe, &slide);
+        let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
         let view = View { width: 0, height: 0, pixel_um };
         let scene = empty(recipe, view, &slide, &stain);
@@ -218,7 +220,7 @@ impl Population {
     fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(&self.scatter, at);
         let (outside, mean) = match self.scatter {
             Scatter::Anywhere => (1.0, 1.0),
@@ -284,7 +286,7 @@ impl Population {
         let number = number(at);
         let field = FieldNumbers { key: self.key.plot(number) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
         // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.

@@ -7,8 +7,8 @@ use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method, Scratch};
 
 use super::{BAND, Band, FocusAt, Light, Passage, Slide};
-use crate::error::Cause;
 use crate::detect::sum_over;
+use crate::error::Cause;
 use crate::exp10::exp10_from;
 use crate::phantom::tile::{TileRef, lay};
 use crate::phantom::{Phantom, Piece};

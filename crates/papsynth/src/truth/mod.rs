@@ -5,13 +5,15 @@
 mod labels;
 mod layer;
 mod mask;
+pub(crate) mod traits;
 
-use crate::scene::Kind;
+use crate::scene::{Kind, Tint};
 
 pub(crate) use labels::fronts;
 pub use labels::{LabelMap, front_masks};
 pub(crate) use layer::with_layers;
 pub use mask::{Bounds, Mask, Run};
+pub use traits::{Trait, Traits, UnknownTrait};
 
 /// Coverage from which on a pixel belongs to a mask.
 pub const COVERED: f32 = 0.5;
@@ -68,8 +70,8 @@ pub struct ObjectTruth {
     pub class: String,
     /// Bethesda category of that class, where it has one ("NILM", "HSIL", …).
     pub bethesda: String,
-    /// Variants drawn for this object, such as "pyknotic" or "flap", separated by semicolons.
-    pub traits: String,
+    /// Variants drawn for this object.
+    pub traits: Traits,
     /// The cluster it was placed with (from 1), or 0 if it was placed alone.
     pub cluster: u32,
     /// Place of its middle, µm from the image's upper left corner.
@@ -79,8 +81,8 @@ pub struct ObjectTruth {
     /// Strength of its stain: the mean decadic absorbance it was given, at 0.57 µm where its dyes have the amounts of a
     /// usual stain.
     pub stain: f64,
-    /// The tint of a cytoplasm ("cyanophilic", "eosinophilic", "orangeophilic"); of all else empty.
-    pub tint: &'static str,
+    /// The tint of a cytoplasm.
+    pub tint: Option<Tint>,
     /// Direction it was turned to, degrees.
     pub rotation_deg: f64,
     /// Area of the whole object, also of what lies outside the image, µm².
@@ -98,6 +100,12 @@ pub struct ObjectTruth {
 }
 
 impl ObjectTruth {
+    /// The name of its tint, or an empty text.
+    #[must_use]
+    pub fn tint_name(&self) -> &'static str {
+        self.tint.map_or("", Tint::name)
+    }
+
     /// The group within which its front-most mask counts.
     #[must_use]
     pub fn group(&self) -> Group {

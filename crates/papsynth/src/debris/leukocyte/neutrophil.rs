@@ -9,6 +9,7 @@ use crate::phantom::pools::Look;
 use crate::phantom::tile::{Point, Tile};
 use crate::phantom::wobble::{placed, smooth, wobbled_circle};
 use crate::random;
+use crate::truth::traits::Trait;
 
 /// Corners of a cytoplasm's outline before it is smoothed, and points between two of them.
 const CORNERS: usize = 14;
@@ -97,7 +98,7 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let mut phantom =
         painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).stained(nucleus.absorbance, site.scene.dyes.nucleus);
     if leukocyte.degenerated {
-        phantom.traits.push("degenerated");
+        phantom.traits.push(Trait::Degenerated);
     }
     phantom
 }

@@ -16,7 +16,7 @@ use crate::phantom::{Phantom, Piece};
 use crate::phantom::{form, nucleus};
 use crate::profile::Stage;
 use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
-use crate::truth::Part;
+use crate::truth::{Part, Trait};
 
 /// Points of a cell's outline before its rim is roughened.
 const POINTS: usize = 180;
@@ -54,10 +54,7 @@ struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     fn new(studio: &'a Studio, scene: &Scene, object: &Object, body: &CellBody) -> Result<Self, Cause> {
-        let class = studio
-            .classes
-            .get(&body.class)
-            .ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
+        let class = studio.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
         let centre = scene.sheet_grid().to_px(object.centre_um);
         let outline = studio.watch.time(Stage::Outlines, || outline(class, scene, object, body, centre))?;
         let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(studio, class, scene, object, body))?;
@@ -214,16 +211,16 @@ fn finish(
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
-fn traits(body: &CellBody) -> Vec<&'static str> {
+fn traits(body: &CellBody) -> Vec<Trait> {
     let fold = body.fold.map(|fold| match fold.form {
-        FoldForm::Flap => "flap",
-        FoldForm::Roll => "rolled",
-        FoldForm::Cigar => "folded",
+        FoldForm::Flap => Trait::Flap,
+        FoldForm::Roll => Trait::Rolled,
+        FoldForm::Cigar => Trait::Folded,
     });
-    let koilocytic = body.halo.map(|_| "koilocytic");
-    let granular = (body.detail.granules > 0.0).then_some("granular");
-    let pyknotic = body.nucleus.pyknotic.then_some("pyknotic");
-    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some("wrinkled");
+    let koilocytic = body.halo.map(|_| Trait::Koilocytic);
+    let granular = (body.detail.granules > 0.0).then_some(Trait::Granular);
+    let pyknotic = body.nucleus.pyknotic.then_some(Trait::Pyknotic);
+    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some(Trait::Wrinkled);
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 
