@@ -1,7 +1,7 @@
 use core::f64::consts::PI;
 
-use lane_fft::{ComplexPlane, PlaneScratch};
 use num_complex::Complex64;
+use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
 use crate::error::{Error, require_count};
 use crate::grid::{LONGEST_SIDE, signed};

@@ -9,7 +9,6 @@ mod debris;
 mod detect;
 mod engine;
 mod error;
-mod exp10;
 mod frame;
 mod fuse;
 pub mod key;
@@ -17,7 +16,6 @@ pub mod learn;
 pub mod model;
 mod phantom;
 pub mod profile;
-mod random;
 pub mod recipe;
 mod render;
 mod rendition;
@@ -27,6 +25,8 @@ pub mod slide;
 mod threads;
 mod transmit;
 pub mod truth;
+
+use portable_numerics::random;
 
 pub use engine::{Engine, Inputs};
 pub use error::{Cause, Error, Flaw};

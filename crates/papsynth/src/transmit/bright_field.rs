@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
+use portable_numerics::elementary::exp10_from;
 
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
@@ -13,7 +14,6 @@ use super::overlap::{Meets, Overlaps};
 use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::exp10::exp10_from;
 use crate::phantom::Phantom;
 use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};

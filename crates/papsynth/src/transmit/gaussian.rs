@@ -5,11 +5,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method, Scratch};
+use portable_numerics::elementary::exp10_from;
 
 use super::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::exp10::exp10_from;
 use crate::phantom::tile::{TileRef, lay};
 use crate::phantom::{Phantom, Piece};
 use crate::scene::{Scene, SceneLight};
