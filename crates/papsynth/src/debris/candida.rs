@@ -3,15 +3,17 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 use crate::truth::traits::Trait;
 
 /// *Candida*: colonies of pseudohyphae and budding yeasts.
@@ -105,7 +107,7 @@ impl Default for Candidas {
     }
 }
 
-impl Kinds for Candidas {
+impl Kinds<Candida> for Candidas {
     fn none() -> Self {
         Self { colonies: 0.0.into(), ..Self::default() }
     }
@@ -127,7 +129,7 @@ impl Kinds for Candidas {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Candida>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count("colonies", &self.colonies) {
             let mut rng = ground.stream(index, "colony");

@@ -8,7 +8,7 @@ use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::pools::PoolMaker;
 use crate::recipe::{Number, Optics, Preset, Recipe};
-use crate::scene;
+use crate::scene::{self, Object, Scene};
 use crate::truth::traits::Trait;
 
 const KEY: Key = Key { seed: 17, index: 3 };
@@ -36,7 +36,7 @@ fn draw(debris: &Debris) -> Scene {
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
     let maker = PoolMaker::new();
     let pools = maker.make(scene.key);
-    let made = |object: &Object| Some((object.body.kind(), phantom(scene, &pools, object)?));
+    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &pools, object)?));
     scene.objects.iter().filter_map(made).collect()
 }
 
@@ -281,7 +281,7 @@ fn hardly_anything_reaches_farther_than_it_says() {
         let pools = maker.make(scene.key);
         let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
         for object in &scene.objects {
-            let Some(phantom) = phantom(&scene, &pools, object) else { continue };
+            let Some(phantom) = crate::phantom::debris(&scene, &pools, object) else { continue };
             let says = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
             let share = reach_um(&scene, object, &phantom) / says;
             (told, most) = (told + 1, most.max(share));

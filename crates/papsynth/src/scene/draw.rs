@@ -1,6 +1,5 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
-use crate::debris::Ground;
 use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::model::Model;
@@ -14,6 +13,7 @@ use super::imaging::{
 };
 use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
+use super::strew::strew;
 use super::view::View;
 use super::weight::WeightMap;
 
@@ -33,7 +33,7 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     let fail = |cause| Error::Image { index: key.index, cause };
     let stain = FieldStain::draw(&recipe.stain, &field, slide_of(recipe, key));
     let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
-    recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects));
+    strew(&recipe.debris, view, &field, &stain, None, &mut objects);
     if u32::try_from(objects.len()).is_err() {
         return Err(fail(Cause::TooManyObjects(objects.len())));
     }

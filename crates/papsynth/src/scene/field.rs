@@ -135,8 +135,12 @@ impl Scene {
 
     /// The stream of a purpose of one object.
     pub(crate) fn stream(&self, kind: &str, object: &Object, purpose: &str) -> Stream {
-        let key = object.plot.map_or(self.key, |plot| self.key.plot(plot.number));
-        key.stream(kind, object.number, purpose)
+        self.key_of(object).stream(kind, object.number, purpose)
+    }
+
+    /// The key of an object's streams: that of the scene, or of the plot it was drawn with.
+    pub(crate) fn key_of(&self, object: &Object) -> Key {
+        object.plot.map_or(self.key, |plot| self.key.plot(plot.number))
     }
 
     /// The key of what belongs to the whole image.

@@ -16,6 +16,7 @@ mod layout;
 pub(crate) mod numbers;
 mod plots;
 pub(crate) mod stain;
+mod strew;
 pub(crate) mod view;
 mod weight;
 

@@ -18,8 +18,9 @@ use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
+use super::strew::strew;
 use super::view::View;
-use crate::debris::{Ground, Sieve};
+use crate::debris::ground::Sieve;
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -308,7 +309,7 @@ impl Population {
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
         let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        self.recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects).through(sieve));
+        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });

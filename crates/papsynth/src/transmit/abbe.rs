@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use optics_psf::{Abbe, AbbeParams, Factor, Lattice, Layer, Microscope, Source, fast_length};
 
-use super::Slide;
 use super::canvas::{Canvas, Mixer, Window};
 use super::lenses::Lens;
+use super::passage::Slide;
 use crate::error::Cause;
 use crate::scene::{SceneMicroscope, View};
 
