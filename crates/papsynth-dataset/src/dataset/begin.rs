@@ -106,7 +106,11 @@ impl Dataset {
     fn compare_or_restore(&self, recipe: &str) -> Result<(), Error> {
         match self.compare(recipe) {
             Err(damaged @ Error::Input { .. }) => {
-                if self.restore()? { Ok(()) } else { Err(damaged) }
+                if self.restore()? {
+                    Ok(())
+                } else {
+                    Err(damaged)
+                }
             }
             compared => compared,
         }
@@ -173,4 +177,3 @@ pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
     }
     Ok(None)
 }
-

@@ -27,7 +27,8 @@ fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
     let dataset = Dataset::open(path)?;
     let Dataset { folder, layout, .. } = &dataset;
     if !layout.has(Format::Folder) {
-        let message = format!("the data set lies in files as {layout}; images and labels are read from the format `folder`");
+        let message =
+            format!("the data set lies in files as {layout}; images and labels are read from the format `folder`");
         return Err(Error::folder(path, message));
     }
     let mut fields = Vec::new();

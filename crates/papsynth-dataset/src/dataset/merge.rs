@@ -267,11 +267,13 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
 mod tests {
     use std::path::Path;
 
+    use papsynth::model::Model;
+
+    use super::super::begin::DatasetInfo;
     use super::*;
     use crate::files::fault;
+    use crate::formats::Layout;
     use crate::support::{SEED, Scratch, contents, frame, recipe};
-    use crate::Format;
-    use crate::files::Check;
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {

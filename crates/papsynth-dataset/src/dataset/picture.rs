@@ -233,7 +233,6 @@ pub fn write_png(
     bits: u32,
     pixel_um: f64,
 ) -> Result<(), Error> {
-    let bytes =
-        write::png(levels, width, channels, bits, pixel_um).map_err(Error::io("write", path))?;
+    let bytes = write::png(levels, width, channels, bits, pixel_um).map_err(Error::io("write", path))?;
     write_file(path, &bytes)
 }

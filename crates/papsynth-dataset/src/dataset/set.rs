@@ -66,7 +66,8 @@ impl Dataset {
 
     /// The data set of a manifest.
     pub(super) fn of(folder: Folder, manifest: Manifest) -> Self {
-        let is_map = |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
+        let is_map =
+            |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
         let map = manifest.files.iter().find(is_map).map(|file| file.path.clone());
         let Manifest { identity, layout, categories, .. } = manifest;
         Self { folder, identity, layout, categories, map, trusted: Arc::default() }

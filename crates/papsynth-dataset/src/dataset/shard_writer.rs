@@ -151,8 +151,7 @@ impl<'a> ShardWriter<'a> {
         frame.check(truth, &sharp)?;
         let geometry = &frame.geometry;
         let picture = if sharp.is_empty() { frame.picture } else { sharp };
-        let summary =
-            FrameSummary::of(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
+        let summary = FrameSummary::of(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
         let files = self.dataset.images_of(&summary, self.shard);
         let document = Document::of_frame(truth, &summary, &frame.saturated, &self.dataset.categories, files)
             .map_err(|error| geometry.wrong(format!("the recipe knows no category `{}`", error.name)))?;

@@ -12,7 +12,7 @@ mod store;
 #[cfg(feature = "cloud")]
 pub use cloud::Bucket;
 pub use file_record::{Check, FileRecord};
-pub use folder::write_file;
 pub(crate) use folder::Folder;
+pub use folder::write_file;
 pub(crate) use pending::{Handle, Output, Pending, is_temporary};
 pub use store::{Home, Store};

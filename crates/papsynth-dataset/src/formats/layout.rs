@@ -82,8 +82,8 @@ impl Layout {
     /// The feature without which this build cannot write it, and what wants it.
     pub(crate) fn needs(&self) -> Option<(&'static str, String)> {
         let format = self.formats.iter().find_map(|format| Some((format.needs()?, format.title())));
-        let table = (self.objects_parquet && !HAS_PARQUET)
-            .then(|| ("parquet", "the table of objects as Parquet".to_owned()));
+        let table =
+            (self.objects_parquet && !HAS_PARQUET).then(|| ("parquet", "the table of objects as Parquet".to_owned()));
         format.or(table)
     }
 

@@ -127,7 +127,8 @@ pub(super) fn ome_picture(picture: &[u16], geometry: &Geometry) -> io::Result<Ve
     }
     let mut out = Cursor::new(Vec::new());
     let levels = Levels::new(picture, geometry);
-    PageWriter::new(&mut out, 3 * picture.len() as u64)?.write_pyramid(levels.pixels(), &page(geometry, Some(&text)))?;
+    PageWriter::new(&mut out, 3 * picture.len() as u64)?
+        .write_pyramid(levels.pixels(), &page(geometry, Some(&text)))?;
     Ok(out.into_inner())
 }
 

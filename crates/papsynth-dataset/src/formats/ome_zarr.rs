@@ -311,11 +311,7 @@ fn broken(error: papsynth_zarr::Error) -> Problem {
 }
 
 /// The planes of a frame, from the bytes of its image's one shard at full size.
-fn planes(
-    bytes: &[u8],
-    geometry: &Geometry,
-    take: &mut Take,
-) -> Result<(), Problem> {
+fn planes(bytes: &[u8], geometry: &Geometry, take: &mut Take) -> Result<(), Problem> {
     let pyramid = of_image(geometry).map_err(|error| Problem::differs(error.to_string()))?;
     let array = &pyramid.levels()[0];
     let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
@@ -341,11 +337,7 @@ fn planes(
 }
 
 /// The planes of a frame of a data set, one after the other.
-pub(crate) fn read_planes(
-    folder: &Folder,
-    geometry: &Geometry,
-    take: &mut Take,
-) -> Result<(), Error> {
+pub(crate) fn read_planes(folder: &Folder, geometry: &Geometry, take: &mut Take) -> Result<(), Error> {
     let array = of_image(geometry)?;
     let path = folder.path(&format!("{}/{}", group_of(geometry.key.index), shard_file(0, &array.levels()[0])));
     let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;

@@ -42,7 +42,11 @@ impl Limits {
 }
 
 /// Reads a file and parses it.
-pub(super) fn parse<T>(path: &Path, limits: &Limits, parse: impl FnOnce(&[u8]) -> Result<T, Problem>) -> Result<T, Error> {
+pub(super) fn parse<T>(
+    path: &Path,
+    limits: &Limits,
+    parse: impl FnOnce(&[u8]) -> Result<T, Problem>,
+) -> Result<T, Error> {
     parse(&bytes(path, limits.max_file_bytes)?).map_err(Error::input(path))
 }
 

@@ -23,8 +23,8 @@ mod tiff;
 mod weights;
 
 pub use components::{Component, components};
-pub(crate) use fields::{NucleiFile, files_in};
 pub use fields::{FieldFile, FieldImage, FieldNuclei};
+pub(crate) use fields::{NucleiFile, files_in};
 pub use file::Limits;
 pub(crate) use file::bytes;
 pub(crate) use image::label_pages;

@@ -206,8 +206,8 @@ mod tests {
 
     use super::super::{SlideInfo, SlideRun};
     use super::*;
-    use crate::files::fault;
     use crate::dataset::Share;
+    use crate::files::fault;
     use crate::support::{Scratch, contents};
 
     #[test]

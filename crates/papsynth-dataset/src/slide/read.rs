@@ -93,9 +93,9 @@ impl SlideSet {
 
     fn level<'a>(&self, pyramid: &'a Pyramid, level: usize) -> Result<&'a Array, Error> {
         let levels = pyramid.levels();
-        levels
-            .get(level)
-            .ok_or_else(|| Error::folder(self.path(), format!("has {} levels, and none of number {level}", levels.len())))
+        levels.get(level).ok_or_else(|| {
+            Error::folder(self.path(), format!("has {} levels, and none of number {level}", levels.len()))
+        })
     }
 
     fn gather<T: Sample>(

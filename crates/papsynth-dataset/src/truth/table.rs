@@ -141,9 +141,27 @@ pub(crate) fn typed_cells(truth: &Truth, object: &ObjectTruth, image: u64) -> im
 /// The columns of the table of a slide that are those of a frame's table, in their order; another, `rle`, follows.
 #[cfg(feature = "zarr")]
 const OF_SLIDE: [&str; 21] = [
-    "id", "part", "kind", "class", "bethesda", "traits", "cluster", "centre_x_um", "centre_y_um", "depth_um",
-    "rotation_deg", "stain", "tint", "area_um2", "area_px", "truncated", "bbox_x_px", "bbox_y_px", "bbox_width_px",
-    "bbox_height_px", "defocus_um",
+    "id",
+    "part",
+    "kind",
+    "class",
+    "bethesda",
+    "traits",
+    "cluster",
+    "centre_x_um",
+    "centre_y_um",
+    "depth_um",
+    "rotation_deg",
+    "stain",
+    "tint",
+    "area_um2",
+    "area_px",
+    "truncated",
+    "bbox_x_px",
+    "bbox_y_px",
+    "bbox_width_px",
+    "bbox_height_px",
+    "defocus_um",
 ];
 
 /// These columns.

@@ -75,10 +75,7 @@ pub(super) fn photometric(channels: usize) -> u16 {
 }
 
 /// The size of a pixel: pixels per centimetre, to a thousandth.
-pub(super) fn resolution<W: Out, K: TiffKind>(
-    directory: &mut DirectoryEncoder<W, K>,
-    pixel_um: f64,
-) -> TiffResult<()> {
+pub(super) fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel_um: f64) -> TiffResult<()> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     let n = (1e7 / pixel_um + 0.5) as u32;
     directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter.to_u16())?;
