@@ -5,9 +5,9 @@ use std::fs;
 use anyhow::{Context, Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
+use crate::shell;
 use crate::workspace::Workspace;
-use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "figures",
@@ -102,7 +102,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         let path = folder.join(format!("fig-{name:0>2}.png"));
         let mut command = workspace.cargo();
         command
-            .args(["run", "--quiet", "--release", "--package", package, "--example", example, "--"])
+            .args(["run", "--release", "--package", package, "--example", example, "--"])
             .args(*arguments)
             .arg(&path);
         shell::run(&mut command)?;

@@ -90,25 +90,25 @@ impl Workspace {
         command
     }
 
-    /// `cargo NAME` of all members but the heavy ones.
-    pub(crate) fn cargo_light(&self, name: &str) -> Command {
+    /// A subcommand of Cargo, of all members but the heavy ones, with every feature but those that bring heavy ones along.
+    pub(crate) fn cargo_light(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
-        command.args([name, "--workspace"]);
+        command.args(subcommand).args(["--workspace", "--features", &self.light_features()]);
         for heavy in HEAVY {
             command.args(["--exclude", heavy.package]);
         }
         command
     }
 
-    /// `cargo NAME` of the heavy members and of those that one of their features brings them to, with these features.
-    pub(crate) fn cargo_heavy(&self, name: &str) -> Command {
+    /// A subcommand of Cargo, of the heavy members and of those that one of their features brings them to, with these features.
+    pub(crate) fn cargo_heavy(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
         let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
         let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
         packages.extend(HEAVY.iter().map(|heavy| heavy.package));
         packages.sort_unstable();
         packages.dedup();
-        command.args([name, "--features", &heavy_features()]);
+        command.args(subcommand).args(["--features", &heavy_features()]);
         for package in packages {
             command.args(["--package", package]);
         }
@@ -116,7 +116,7 @@ impl Workspace {
     }
 
     /// Every feature of every member but those that bring heavy ones along, as Cargo reads them.
-    pub(crate) fn light_features(&self) -> String {
+    fn light_features(&self) -> String {
         let all = self
             .packages
             .iter()
