@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::shell;
@@ -128,18 +128,6 @@ impl Workspace {
     /// A path below the target folder as a person would type it from the root folder.
     pub(crate) fn shown<'a>(&self, path: &'a std::path::Path) -> std::path::Display<'a> {
         path.strip_prefix(&self.root).unwrap_or(path).display()
-    }
-
-    /// Checks that a package has a target of that kind and name, so that a chore can say what is missing.
-    pub(crate) fn expect_target(&self, package: &str, kind: &str, name: &str) -> Result<()> {
-        let found = self
-            .packages
-            .iter()
-            .filter(|p| p.name == package)
-            .flat_map(|p| &p.targets)
-            .any(|(k, n)| k == kind && n == name);
-        ensure!(found, "crate `{package}` has no {kind} `{name}`");
-        Ok(())
     }
 }
 

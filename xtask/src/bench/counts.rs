@@ -83,7 +83,6 @@ fn read(path: &Path) -> Result<BTreeMap<String, Counts>> {
 
 /// Builds the program and runs each of its works under valgrind.
 fn count(workspace: &Workspace) -> Result<Counts> {
-    workspace.expect_target(PACKAGE, "bin", PROGRAM)?;
     // With the features that the program papsynth has, so that both share what they are built of.
     let packages = ["--package", PACKAGE, "--package", "papsynth-cli"];
     shell::run(workspace.cargo().args(["build", "--release", "--bin", PROGRAM]).args(packages))?;
