@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::arguments::Arguments;
 use crate::chore::{Chore, Outcome, in_ci};
-use crate::workspace::Workspace;
+use crate::workspace::{Workspace, heavy_packages};
 use crate::{bench, browser, dataset, deps, equations, external, hashes, package, publish, shell, supply, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
@@ -55,17 +55,10 @@ const FULL: [Step; 9] = [
     ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
 
-/// Files and folders that require the longer tier: its outcome depends on them more than that of the shorter one.
-const COVERED: [&str; 15] = [
+/// Files and folders that require the longer tier, besides the folders of heavy crates and of crates with features that bring them along.
+const COVERED: [&str; 8] = [
     "Cargo.lock",
     "deny.toml",
-    "crates/papsynth-cli/tests",
-    "crates/papsynth-dataset",
-    "crates/papsynth-cloud",
-    "crates/papsynth-parquet",
-    "crates/papsynth-python",
-    "crates/papsynth-view",
-    "crates/papsynth-zarr",
     "docs/SLIDES.md",
     "docs/formats",
     "fixtures/hashes.txt",
@@ -73,6 +66,11 @@ const COVERED: [&str; 15] = [
     "xtask/src/external.rs",
     "xtask/src/package.rs",
 ];
+
+fn covered() -> Vec<String> {
+    let crates = heavy_packages().into_iter().map(|package| format!("crates/{package}"));
+    COVERED.map(str::to_owned).into_iter().chain(crates).collect()
+}
 
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let full = arguments.flag("--full");
@@ -115,7 +113,7 @@ fn recorded(workspace: &Workspace) -> PathBuf {
 
 /// What Git prints of the files that the longer tier covers.
 fn git(workspace: &Workspace, words: &[&str]) -> Result<String> {
-    shell::output(Command::new("git").args(words).arg("--").args(COVERED).current_dir(&workspace.root))
+    shell::output(Command::new("git").args(words).arg("--").args(covered()).current_dir(&workspace.root))
 }
 
 fn record(workspace: &Workspace) -> Result<()> {
@@ -131,7 +129,7 @@ fn record(workspace: &Workspace) -> Result<()> {
 /// Whether the longer tier is required, and by which files.
 fn required(workspace: &Workspace) -> String {
     let Ok(commit) = fs::read_to_string(recorded(workspace)) else {
-        return format!("--full has not passed here. It covers:\n{}", COVERED.join("\n"));
+        return format!("--full has not passed here. It covers:\n{}", covered().join("\n"));
     };
     let commit = commit.trim();
     match git(workspace, &["diff", "--name-only", commit]) {

@@ -38,6 +38,16 @@ pub(crate) fn heavy_features_of(package: &str) -> String {
     own.collect::<Vec<_>>().join(",")
 }
 
+/// The heavy members and those that one of their features brings them to.
+pub(crate) fn heavy_packages() -> Vec<&'static str> {
+    let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
+    let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
+    packages.extend(HEAVY.iter().map(|heavy| heavy.package));
+    packages.sort_unstable();
+    packages.dedup();
+    packages
+}
+
 /// The workspace.
 pub(crate) struct Workspace {
     /// The folder of the root manifest.
@@ -100,16 +110,11 @@ impl Workspace {
         command
     }
 
-    /// A subcommand of Cargo, of the heavy members and of those that one of their features brings them to, with these features.
+    /// A subcommand of Cargo, of [`heavy_packages`], with these features.
     pub(crate) fn cargo_heavy(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
-        let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
-        let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
-        packages.extend(HEAVY.iter().map(|heavy| heavy.package));
-        packages.sort_unstable();
-        packages.dedup();
         command.args(subcommand).args(["--features", &heavy_features()]);
-        for package in packages {
+        for package in heavy_packages() {
             command.args(["--package", package]);
         }
         command
