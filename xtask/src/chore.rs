@@ -1,6 +1,21 @@
-//! How a chore ended, if it did not fail.
+//! What a chore is, and how it ends if it does not fail.
 
 use anyhow::{Result, bail};
+
+use crate::arguments::Arguments;
+use crate::workspace::Workspace;
+
+/// One chore.
+pub(crate) struct Chore {
+    pub(crate) name: &'static str,
+    /// Its arguments, as a usage line shows them.
+    pub(crate) usage: &'static str,
+    /// What it does, in a line.
+    pub(crate) about: &'static str,
+    /// What else there is to know.
+    pub(crate) details: &'static str,
+    pub(crate) run: fn(&Workspace, Arguments) -> Result<Outcome>,
+}
 
 /// How a chore ended.
 #[derive(Debug, PartialEq, Eq)]
