@@ -16,7 +16,7 @@ const COVERED: [&str; 16] = [
     "crates/papsynth-cloud",
     "crates/papsynth-parquet",
     "crates/papsynth-python",
-    "crates/papsynth-view",
+    "crates/papsynth-web",
     "crates/papsynth-zarr",
     "docs/SLIDES.md",
     "docs/formats",

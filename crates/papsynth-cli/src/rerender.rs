@@ -110,16 +110,12 @@ pub(crate) fn render(
             stop,
             profile: None,
         };
-        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| match error {
-            papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
-            other => other.into(),
-        })?;
+        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
         sum.kept += outcome.kept;
         sum.made += outcome.made;
         if outcome.stopped {
             let message = format!("stopped; every file in {} is whole", out.display());
-            let complaint = Complaint::new(message).help("run the same command again to make the rest");
-            return Err(Failure::interrupted(complaint));
+            return Err(Failure::stopped(message, "make"));
         }
     }
     dataset.finish()?;

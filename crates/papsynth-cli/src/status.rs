@@ -6,8 +6,9 @@ use std::ops::Range;
 use papsynth_dataset::{Check, Dataset, shards_to_make};
 
 use crate::args::{Merge, Status, check_of};
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Complaint, Failure};
 use crate::place;
+use crate::words::counted;
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
