@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::focus::Nucleus;
 use crate::instrument::Instrument;
+use crate::nucleus::Nucleus;
 use crate::statistics::{quantile, standard_error};
 
 /// Nuclei from which the condenser is sought, planes on each side that are compared, and the blur of the last of them:

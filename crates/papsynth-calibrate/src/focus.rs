@@ -11,6 +11,7 @@ use crate::condenser::Condenser;
 use crate::error::Error;
 use crate::find;
 use crate::instrument::Instrument;
+use crate::nucleus::Nucleus;
 use crate::statistics::{quantile, standard_error};
 
 /// σ at which the search of [`calibrate::focus`] ends, px, less a step of it: what reaches it may be wider.
@@ -70,26 +71,6 @@ pub struct Focus {
     pub asymmetry: f64,
     /// The condenser's aperture, where it was sought.
     pub condenser: Option<Condenser>,
-}
-
-/// One nucleus.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Nucleus {
-    /// Left, top, width, height, pixels.
-    pub window: [usize; 4],
-    /// Its plane in focus, counted from 0.
-    pub focused: usize,
-    /// σ in each plane, pixels.
-    pub sigma_px: Vec<f64>,
-}
-
-impl Nucleus {
-    /// σ in each plane, with the number of planes from focus.
-    fn points(&self) -> impl Iterator<Item = (i64, f64)> {
-        let focused = self.focused.cast_signed() as i64;
-        self.sigma_px.iter().zip(0_i64..).map(move |(sigma, plane)| (plane - focused, *sigma))
-    }
 }
 
 /// All nuclei, at one distance from focus.

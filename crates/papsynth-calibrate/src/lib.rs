@@ -10,6 +10,7 @@ mod error;
 mod find;
 mod focus;
 mod instrument;
+mod nucleus;
 mod recipe;
 mod statistics;
 
@@ -20,7 +21,8 @@ pub use ccd_noise::calibrate::Light;
 pub use condenser::{Bound, Condenser};
 pub use edge::{Edge, EdgeAt};
 pub use error::Error;
-pub use focus::{Focus, FocusParams, NucleiAt, Nucleus, Offset, Side};
+pub use focus::{Focus, FocusParams, NucleiAt, Offset, Side};
 pub use instrument::Instrument;
+pub use nucleus::Nucleus;
 pub use optics_psf::calibrate::Window;
 pub use recipe::BEGINS as RECIPE_BEGINS;

@@ -12,6 +12,7 @@ use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::setup::Setup;
+use crate::words::runs;
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
@@ -36,9 +37,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     }
     let (layout, _) = args.layout.layout(0);
     let interrupt = Interrupt::watch()?;
-    let frames: Vec<Range<u64>> =
-        frames.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
-    let outcome = render(&after, seed, &frames, &layout, &args.out, interrupt.flag())?;
+    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
         let complaint = Complaint::new(format!("the truth is another: {difference}"));
         return Err(Failure::input(

@@ -1,8 +1,15 @@
 //! Numbers as people read them.
 
+use std::ops::Range;
+
 /// A number and what is counted.
 pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// Runs of numbers that follow each other, of numbers in rising order.
+pub(crate) fn runs(numbers: &[u64]) -> Vec<Range<u64>> {
+    numbers.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect()
 }
 
 /// So many bytes, in the largest unit that they fill.

@@ -5,6 +5,7 @@ mod breakdown;
 mod design;
 mod error;
 mod fields;
+mod judged;
 mod key;
 mod normal;
 mod parameters;

@@ -8,7 +8,7 @@ use papsynth::recipe::{CameraPreset, Preset};
 use super::values::{camera_parser, preset_parser};
 
 /// What a recipe is made of.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct RecipeArgs {
     /// Recipe in TOML, as `papsynth init` prints it; `-` reads standard input [default: the preset `lbc`]
     #[arg(value_name = "RECIPE")]
@@ -28,7 +28,7 @@ pub(crate) struct RecipeArgs {
 }
 
 /// What an engine is made of.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct EngineArgs {
     #[command(flatten)]
     pub(crate) recipe: RecipeArgs,
