@@ -2,13 +2,14 @@
 
 use optics_psf::MicroscopeParams;
 use optics_psf::calibrate::{self, Window};
+use portable_numerics::statistics::median;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::instrument::Instrument;
 use crate::nucleus::Nucleus;
-use crate::statistics::{quantile, standard_error};
+use crate::statistics::standard_error;
 
 /// Nuclei from which the condenser is sought, planes on each side that are compared, and the blur of the last of them:
 /// each nucleus takes as long as all the rest, and more no longer help.
@@ -94,8 +95,7 @@ impl Condenser {
             _ => standard_error(&all),
         };
         let between = BETWEEN_TRIED * instrument.na;
-        all.sort_by(f64::total_cmp);
-        let na = quantile(&all, 0.5);
+        let na = median(&mut all);
         let bound = match na / instrument.na {
             part if part <= FIRST_TRIED + f64::EPSILON => Bound::AtMost,
             part if part >= LAST_TRIED - f64::EPSILON => Bound::AtLeast,

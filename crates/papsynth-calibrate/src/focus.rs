@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use optics_psf::Error as Optics;
 use optics_psf::calibrate::{self, FocusCurve, Line, Window};
+use portable_numerics::statistics::quantile;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,7 @@ use crate::error::Error;
 use crate::find;
 use crate::instrument::Instrument;
 use crate::nucleus::Nucleus;
-use crate::statistics::{quantile, standard_error};
+use crate::statistics::standard_error;
 
 /// σ at which the search of [`calibrate::focus`] ends, px, less a step of it: what reaches it may be wider.
 const WIDEST_PX: f64 = 15.8;
@@ -210,8 +211,7 @@ fn medians(nuclei: &[Nucleus]) -> Vec<Offset> {
     let mut offsets: Vec<Offset> = by_offset
         .into_iter()
         .map(|(planes, mut sigmas)| {
-            sigmas.sort_by(f64::total_cmp);
-            let [low, sigma_px, high] = [0.25, 0.5, 0.75].map(|part| quantile(&sigmas, part));
+            let [low, sigma_px, high] = [0.25, 0.5, 0.75].map(|part| quantile(&mut sigmas, part));
             let fitted = planes != 0 && sigmas.len() >= enough && high < WIDEST_PX;
             Offset { planes, nuclei: sigmas.len(), sigma_px, quartiles_px: [low, high], fitted }
         })
