@@ -77,7 +77,7 @@ pub(super) fn parse_class(text: &str) -> Result<String, String> {
     }
 }
 
-#[cfg(any(feature = "calibrate", feature = "judge", feature = "learn"))]
+#[cfg(any(feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
 pub(super) fn parse_pixel(text: &str) -> Result<f64, String> {
     /// What a recipe's `field.pixel_um` may be as well.
     const ALLOWED: std::ops::RangeInclusive<f64> = 0.05..=4.0;
