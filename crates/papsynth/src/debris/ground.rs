@@ -3,7 +3,8 @@
 use super::{ClueCells, Kind};
 use crate::key::Stream;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::Number;
 use crate::scene::{Body, FieldNumbers, FieldStain, Object, View};
 
 /// A field whose cells have their places, and to which objects are added kind by kind.
@@ -101,11 +102,11 @@ impl<'a> Ground<'a> {
     }
 
     /// A number of the section that is drawn once a field, as a count.
-    pub(super) fn count(&self, name: &str, number: &Number) -> u64 {
+    pub(super) fn count(&self, (name, number): (&str, &Number)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
-        let Some(sieve) = &self.sieve else { return self.field.count(&path, number) as u64 };
+        let Some(sieve) = &self.sieve else { return self.field.count((&path, number)) as u64 };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        let wanted = self.field.draw(&path, number).max(0.0) * sieve.share * more;
+        let wanted = self.field.draw((&path, number)).max(0.0) * sieve.share * more;
         let further = random::chance(wanted - wanted.floor(), &mut self.field.key.stream("field", 1, &path));
         wanted as u64 + u64::from(further)
     }

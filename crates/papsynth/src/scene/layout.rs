@@ -3,7 +3,8 @@
 use rand_core::Rng;
 
 use crate::random;
-use crate::recipe::Layout;
+use crate::recipe::section::named;
+use crate::recipe::{Labels, Layout};
 
 use super::View;
 use super::draw::FieldNumbers;
@@ -35,13 +36,13 @@ pub(super) fn weight_map(
     let place = move |[x, y]: [f64; 2]| [x * width_um, y * height_um];
     match layout {
         Layout::Uniform {} => Ok(WeightMap { width: 1, weights: vec![1.0] }),
-        Layout::Clusters { count, radius_um, outside } => {
-            let count = field.count("layout.count", count).max(1);
-            let outside = field.draw("layout.outside", outside);
+        Layout::Clusters(layout) => {
+            let count = field.count(named!("layout", layout.count)).max(1);
+            let outside = field.draw(named!("layout", layout.outside));
             let clusters: Vec<[f64; 3]> = (0..count as u64)
                 .map(|cluster| {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
-                    let radius = radius_um.draw(&mut rng);
+                    let radius = layout.radius_um.draw(&mut rng);
                     [random::between(0.0, width_um, &mut rng), random::between(0.0, height_um, &mut rng), radius]
                 })
                 .collect();
@@ -49,9 +50,9 @@ pub(super) fn weight_map(
             let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
             Ok(WeightMap { width, weights: distances.iter().map(weight).collect() })
         }
-        Layout::Swath { width_um: band, outside } => {
-            let band = field.draw("layout.width_um", band);
-            let outside = field.draw("layout.outside", outside);
+        Layout::Swath(layout) => {
+            let band = field.draw(named!("layout", layout.width_um));
+            let outside = field.draw(named!("layout", layout.outside));
             let mut rng = field.key.stream("field", 0, "layout.swath");
             let angle = random::direction(&mut rng);
             let (nx, ny) = (libm::cos(angle), libm::sin(angle));
@@ -65,10 +66,11 @@ pub(super) fn weight_map(
         Layout::Map { path } => {
             given.cloned().ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))
         }
-        Layout::Labels { path, smooth_um } => {
+        Layout::Labels(layout) => {
+            let path = &layout.path;
             let map =
                 given.ok_or_else(|| format!("`layout.path` = \"{path}\" names a label image that was not given"))?;
-            let smooth = field.draw("layout.smooth_um", smooth_um);
+            let smooth = field.draw(named!("layout", layout.smooth_um));
             smoothed(map, smooth * map.width as f64 / width_um)
         }
     }
@@ -104,7 +106,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 
 /// What is wrong with what a layout names, before anything is drawn.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), String> {
-    let (Layout::Map { path } | Layout::Labels { path, .. }) = layout else { return Ok(()) };
+    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))?;
     map.sampler().map(|_| ()).map_err(|message| format!("\"{path}\": {message}"))
 }

@@ -5,6 +5,7 @@ use rand_core::Rng;
 
 use crate::key::Key;
 use crate::random;
+use crate::recipe::section::named;
 use crate::recipe::{DyeAmounts, Number, Recipe, TintMix};
 
 use super::draw::FieldNumbers;
@@ -39,30 +40,21 @@ impl<'a> FieldStain<'a> {
     }
 
     fn of(recipe: &'a Recipe, field: &FieldNumbers, slide: &FieldNumbers) -> Self {
-        let stain = &recipe.stain;
-        let of_slide = |name: &str, number: &Number| number.draw(&mut slide.key.stream("slide", 0, name));
-        let of_field = |name: &str, number: &Number| field.draw(name, number);
+        let of_slide = |(name, number): (&str, &Number)| number.draw(&mut slide.key.stream("slide", 0, name));
         let mut balance = [1.0; DYES];
         let mut shift = |sd: f64, rng: &mut crate::key::Stream| {
             for factor in &mut balance {
                 *factor *= libm::exp(sd * random::normal(rng));
             }
         };
-        shift(
-            of_slide("stain.slide_balance", &stain.slide_balance),
-            &mut slide.key.stream("slide", 0, "stain.balance"),
-        );
-        shift(
-            of_field("stain.field_balance", &stain.field_balance),
-            &mut field.key.stream("field", 0, "stain.balance"),
-        );
+        shift(of_slide(named!(recipe.stain.slide_balance)), &mut slide.key.stream("slide", 0, "stain.balance"));
+        shift(field.draw(named!(recipe.stain.field_balance)), &mut field.key.stream("field", 0, "stain.balance"));
         Self {
             recipe,
-            cytoplasm: of_slide("stain.slide_cytoplasm", &stain.slide_cytoplasm)
-                * of_field("stain.field_cytoplasm", &stain.field_cytoplasm),
-            nucleus: of_slide("stain.slide_nucleus", &stain.slide_nucleus)
-                * of_field("stain.field_nucleus", &stain.field_nucleus),
-            texture: of_field("stain.field_texture", &stain.field_texture),
+            cytoplasm: of_slide(named!(recipe.stain.slide_cytoplasm))
+                * field.draw(named!(recipe.stain.field_cytoplasm)),
+            nucleus: of_slide(named!(recipe.stain.slide_nucleus)) * field.draw(named!(recipe.stain.field_nucleus)),
+            texture: field.draw(named!(recipe.stain.field_texture)),
             balance,
         }
     }

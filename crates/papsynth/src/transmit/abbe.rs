@@ -27,7 +27,8 @@ pub(super) fn image(
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
     let layers = layers(slide, optics.slab_um, light, frame)?;
-    let params = AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions } };
+    let params =
+        AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
     let abbe = Abbe::new(microscope, &params).map_err(|e| format!("optics.directions: {e}"))?;
     let whole = abbe.image(&layers, stage_um).map_err(|e| format!("optics: {e}"))?;
     let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
