@@ -3,7 +3,6 @@
 mod background;
 mod error;
 mod fractal;
-mod hash;
 mod illumination;
 mod kernel;
 mod perlin;

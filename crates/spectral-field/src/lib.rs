@@ -4,7 +4,6 @@
 
 mod error;
 mod field;
-mod normal;
 mod params;
 mod spectrum;
 

@@ -1,30 +1,14 @@
 //! What a recipe must fulfil before anything is drawn from it: each number its range, and numbers what relates them.
 
-use std::fmt;
-
 use super::camera::Camera;
 use super::imaging::{Imaging, Light, Optics, Picture};
 use super::number::Number;
 use super::section::Declared;
 use super::whole::{RECIPE_VERSION, Recipe};
+use crate::error::Problem;
 
 /// Most pixels that one plane may have: 2³⁰, a gigapixel.
 const MAX_PIXELS: f64 = 1_073_741_824.0;
-
-/// Something wrong with a recipe.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// The field, as a dotted path: `optics.sigma_xy_um`.
-    pub field: String,
-    /// What is wrong with it: the value, and what would be accepted.
-    pub message: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.field, self.message)
-    }
-}
 
 impl Recipe {
     /// Everything that is wrong with the recipe, each with the field, the value and what would be accepted.

@@ -23,8 +23,8 @@ pub use crate::debris::{
     Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
+pub use crate::error::Problem;
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
-pub use check::Problem;
 pub use dyes::DyeAmounts;
 pub use imaging::{
     Background, Border, Bowl, Colour, Field, Focus, Gaussians, Illumination, Imaging, Light, Microscope, Mixing,

@@ -14,7 +14,7 @@ impl Recipe {
     #[must_use]
     pub fn to_commented_toml(&self) -> String {
         let schema = Self::schema();
-        let value = serde_json::to_value(self).unwrap_or_default();
+        let value = serde_json::to_value(self).expect("every recipe can be written as JSON");
         let mut out = String::from(
             "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
              # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
@@ -27,7 +27,7 @@ impl Recipe {
     /// The recipe as plain TOML.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        toml::to_string(self).unwrap_or_default()
+        toml::to_string(self).expect("every recipe can be written as TOML")
     }
 }
 
@@ -51,7 +51,7 @@ fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Val
 
 /// The name of a field as TOML wants it: as it stands, or in quotes.
 fn key(name: &str) -> String {
-    let line = toml::to_string(&BTreeMap::from([(name, 0)])).unwrap_or_default();
+    let line = toml::to_string(&BTreeMap::from([(name, 0)])).expect("every name can be a key of TOML");
     line.strip_suffix(" = 0\n").unwrap_or(name).to_owned()
 }
 

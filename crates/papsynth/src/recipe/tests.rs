@@ -116,7 +116,7 @@ fn bounded<'s>(schema: &'s Value, found: &mut Vec<&'s str>) {
     for (name, inner) in schema.as_object().into_iter().flatten() {
         if name == "properties" {
             let fields = inner.as_object().into_iter().flatten();
-            found.extend(fields.filter(|(_, field)| field.get("minimum").is_some()).map(|(name, _)| name.as_str()));
+            found.extend(fields.filter(|(_, field)| field.get("maximum").is_some()).map(|(name, _)| name.as_str()));
         }
         bounded(inner, found);
     }

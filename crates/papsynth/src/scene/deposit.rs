@@ -18,13 +18,13 @@ pub(super) struct Deposit {
 }
 
 impl Deposit {
-    pub(super) fn draw(section: &Section, slide: &FieldNumbers) -> Result<Self, String> {
+    pub(super) fn draw(section: &Section, slide: &FieldNumbers) -> Self {
         let key = slide.key.stream("slide", 0, "scan.deposit.patches").next_u64();
         let params = FractalParams { octaves: 3, ..FractalParams::default() };
-        Ok(Self {
+        Self {
             drawn: section.draw("scan.deposit", |path| slide.stream(path)),
-            patches: Fractal::new(&params, key).map_err(|e| format!("scan.deposit: {e}"))?,
-        })
+            patches: Fractal::new(&params, key).expect("three octaves of noise are valid"),
+        }
     }
 
     /// Its middle, µm.

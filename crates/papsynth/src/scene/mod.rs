@@ -24,7 +24,6 @@ pub use crate::debris::{
 };
 pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;
-pub(crate) use cells::unknown_class;
 pub(crate) use draw::FieldNumbers;
 pub use draw::draw;
 pub(crate) use layout::check_layout;
