@@ -35,8 +35,6 @@ enum Role {
     Loopback,
     Study,
     View,
-    /// Reads what people wrote.
-    Recipes,
     Program,
     /// Another front: what the program is to a shell.
     Python,
@@ -67,7 +65,6 @@ const PLACES: [(&str, Role); 26] = [
     ("papsynth-study", Role::Study),
     ("papsynth-view", Role::View),
     ("papsynth-match", Role::Match),
-    ("papsynth-recipe", Role::Recipes),
     ("papsynth-cli", Role::Program),
     ("papsynth-python", Role::Python),
     ("papsynth-benches", Role::Benches),
@@ -91,7 +88,6 @@ impl Role {
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
             Self::Cloud => &[Self::Dataset],
-            Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Numerics, Self::Engine, Self::Judge],
             // It shows files, whoever made them.
@@ -111,9 +107,8 @@ impl Role {
                 Self::Loopback,
                 Self::Study,
                 Self::View,
-                Self::Recipes,
             ],
-            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Cloud, Self::Judge, Self::Recipes],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Cloud, Self::Judge],
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::key::Stream;
 use crate::random;
+use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
-use crate::recipe::specimen::DyeAmounts;
 use crate::scene::numbers::FieldNumbers;
 use crate::scene::stain::FieldStain;
 use crate::scene::view::View;
@@ -81,12 +81,13 @@ impl<'a, T> Ground<'a, T> {
     }
 
     /// A number of the section that is drawn once a field, as a count.
-    pub(super) fn count(&self, name: &str, number: &Number) -> u64 {
+    pub(super) fn count(&self, (name, number): (&str, &Number)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
-        let Some(sieve) = &self.field.sieve else { return self.field.numbers.count(&path, number) as u64 };
+        let numbers = self.field.numbers;
+        let Some(sieve) = &self.field.sieve else { return numbers.count((&path, number)) as u64 };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        let wanted = self.field.numbers.draw(&path, number).max(0.0) * sieve.share * more;
-        let further = random::chance(wanted - wanted.floor(), &mut self.field.numbers.key.stream("field", 1, &path));
+        let wanted = numbers.draw((&path, number)).max(0.0) * sieve.share * more;
+        let further = random::chance(wanted - wanted.floor(), &mut numbers.key.stream("field", 1, &path));
         wanted as u64 + u64::from(further)
     }
 
