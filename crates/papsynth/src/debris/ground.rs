@@ -62,6 +62,18 @@ pub(super) struct Cluster {
     radius_um: f64,
 }
 
+/// Clusters of objects: the purpose of their streams, and what is drawn of each.
+pub(super) struct Clusters<'a> {
+    pub(super) purpose: &'static str,
+    /// Share that lies on a cell.
+    pub(super) on_cells: &'a Number,
+    pub(super) radius_um: &'a Number,
+    /// Objects of a cluster.
+    pub(super) members: &'a Number,
+    /// Standard deviation of their depths, µm.
+    pub(super) spread_um: f64,
+}
+
 /// Where an object lies.
 pub(crate) struct Lie {
     pub(crate) centre_um: [f64; 2],
@@ -138,6 +150,60 @@ impl<'a, T> Ground<'a, T> {
                 Cluster { centre_um, depth_um: cell.depth_um + ON_TOP_UM, radius_um }
             }
             _ => Cluster { centre_um: anywhere, depth_um: random::normal(rng), radius_um },
+        }
+    }
+
+    /// Strews objects that lie anywhere, each at a height of its own. `draw` draws one from its stream.
+    pub(super) fn strew_on_glass(
+        &mut self,
+        count: (&str, &Number),
+        height_um: &Number,
+        draw: impl Fn(&mut Stream) -> T,
+    ) {
+        for number in 0..self.count(count) {
+            let mut rng = self.stream(number, "body");
+            let centre_um = self.anywhere(&mut rng);
+            let thing = draw(&mut rng);
+            let lie = Lie::any_way(centre_um, height_um.draw(&mut rng), &mut rng);
+            self.add(number, 0, lie, thing);
+        }
+    }
+
+    /// Strews objects of which a share lies on cells. `draw` draws one from its stream.
+    pub(super) fn strew_on_cells(
+        &mut self,
+        count: (&str, &Number),
+        on_cells: &Number,
+        draw: impl Fn(&mut Stream) -> T,
+    ) {
+        for number in 0..self.count(count) {
+            let mut rng = self.stream(number, "body");
+            let (centre_um, depth_um) = self.spot(on_cells, &mut rng);
+            let thing = draw(&mut rng);
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            self.add(number, 0, lie, thing);
+        }
+    }
+
+    /// Strews clusters of objects. `draw` draws one, by its number, from its stream.
+    pub(super) fn strew_in_clusters(
+        &mut self,
+        count: (&str, &Number),
+        clusters: &Clusters<'_>,
+        draw: impl Fn(&Self, u64, &mut Stream) -> T,
+    ) {
+        for index in 0..self.count(count) {
+            let mut rng = self.stream(index, clusters.purpose);
+            let cluster = self.cluster(clusters.on_cells, clusters.radius_um, &mut rng);
+            for member in 0..clusters.members.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = self.stream(number, "body");
+                let centre_um = cluster.place(&mut rng);
+                let thing = draw(self, number, &mut rng);
+                let depth_um = cluster.depth_um + clusters.spread_um * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                self.add(number, cluster_id(index), lie, thing);
+            }
         }
     }
 
