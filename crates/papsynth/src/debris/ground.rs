@@ -247,7 +247,7 @@ pub(super) fn member_number(cluster: u64, member: u64) -> u64 {
 }
 
 /// Whether two places are nearer to each other than a distance.
-pub(super) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
+pub(crate) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
     dx * dx + dy * dy < distance * distance
 }
