@@ -35,8 +35,6 @@ enum Role {
     Web,
     /// Measures microscopes and cameras.
     Calibrate,
-    /// Reads what people wrote.
-    Recipes,
     Program,
     /// Another front: what the program is to a shell.
     Python,
@@ -46,7 +44,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 26] = [
+const PLACES: [(&str, Role); 25] = [
     ("portable-numerics", Role::Numerics),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -67,7 +65,6 @@ const PLACES: [(&str, Role); 26] = [
     ("papsynth-calibrate", Role::Calibrate),
     ("papsynth-web", Role::Web),
     ("papsynth-match", Role::Match),
-    ("papsynth-recipe", Role::Recipes),
     ("papsynth-cli", Role::Program),
     ("papsynth-python", Role::Python),
     ("papsynth-benches", Role::Benches),
@@ -91,7 +88,6 @@ impl Role {
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
             Self::Cloud => &[Self::Dataset],
-            Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Numerics, Self::Engine, Self::Judge],
             // It shows files, whoever made them.
@@ -113,7 +109,6 @@ impl Role {
                 Self::Calibrate,
                 Self::Study,
                 Self::Web,
-                Self::Recipes,
             ],
             Self::Python => &[
                 Self::Technique,
@@ -122,7 +117,6 @@ impl Role {
                 Self::Calibrate,
                 Self::Cloud,
                 Self::Judge,
-                Self::Recipes,
             ],
         }
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
 use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
@@ -116,9 +117,7 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
             return Err(Failure::input(Complaint::new(message).help(help)));
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::input(
-            Complaint::new(message).help(format!("there are {}", papsynth_recipe::quoted(known.into_iter()))),
-        ));
+        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", quoted(known.into_iter())))));
     }
     Ok(files)
 }

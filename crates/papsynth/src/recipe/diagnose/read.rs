@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
-use papsynth::model::Model;
-use papsynth::recipe::{Number, RECIPE_VERSION, Recipe};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::nearest::nearest;
-use crate::schema::{Schema, Section, quoted};
+use super::nearest::nearest;
+use super::schema::{Schema, Section, quoted};
+use crate::model::Model;
+use crate::recipe::number::Number;
+use crate::recipe::whole::{RECIPE_VERSION, Recipe};
 
 /// Something wrong with the text of a recipe.
 #[derive(Debug, Clone, PartialEq)]
@@ -271,7 +272,7 @@ fn path_to(table: &DeTable<'_>, span: &Range<usize>, path: &mut Vec<String>) {
 }
 
 /// What would be accepted, and what the field means.
-pub fn help_for(section: Section<'_>) -> String {
+fn help_for(section: Section<'_>) -> String {
     let expected = format!("expected {}", section.expected());
     match section.meaning() {
         Some(meaning) => format!("{expected}. The field: {}", one_line(meaning)),
@@ -355,7 +356,7 @@ mod tests {
     fn a_sound_recipe_is_read() {
         let recipe = read("version = 1\n[field]\nwidth_px = 96\n").unwrap();
         assert_eq!(recipe.field.width_px, 96.0.into());
-        for preset in papsynth::recipe::Preset::ALL {
+        for preset in crate::recipe::Preset::ALL {
             assert_eq!(read(&preset.recipe().to_commented_toml()), Ok(preset.recipe()));
         }
     }
@@ -462,7 +463,7 @@ mod tests {
 
     /// A sound recipe with a part of it replaced.
     fn damaged(start: usize, length: usize, by: &str) -> String {
-        let text = papsynth::recipe::Recipe::default().to_toml();
+        let text = Recipe::default().to_toml();
         let start = start % text.len();
         let end = (start + length).min(text.len());
         format!("{}{by}{}", &text[..start], &text[end..])

@@ -1,7 +1,8 @@
 //! What a recipe may hold, looked up in its JSON schema: the keys of a section, the words of a field, its meaning.
 
-use papsynth::recipe::Recipe;
 use serde_json::{Map, Value};
+
+use crate::recipe::whole::Recipe;
 
 /// The schema of recipes.
 pub struct Schema {
