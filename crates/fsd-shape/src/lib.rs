@@ -2,9 +2,9 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
+mod complex;
 mod crossing;
 mod descriptors;
-mod dft;
 mod error;
 mod fit;
 mod model;

@@ -4,9 +4,9 @@ use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
 
 use crate::Error;
+use crate::complex::{multiply, unit};
 use crate::crossing::self_intersects;
 use crate::descriptors::{Descriptors, modulus};
-use crate::dft::multiply;
 use crate::fit::{order, terms};
 use crate::outline::{Point, count_as_f64};
 use crate::pca::add_scaled;
@@ -83,7 +83,7 @@ impl ShapeModel {
         for rejected in 0..TRIES {
             let mut terms = self.draw_terms(rng);
             let size = modulus(terms[harmonics + 1]);
-            let turn = crate::dft::unit(direction(rng));
+            let turn = unit(direction(rng));
             let scale = [turn[0] * radius_px / size, turn[1] * radius_px / size];
             for u in &mut terms {
                 *u = multiply(*u, scale);
