@@ -29,7 +29,7 @@ pub mod truth;
 use portable_numerics::random;
 
 pub use engine::{Engine, Inputs};
-pub use error::Error;
+pub use error::{Cause, Error, Flaw};
 pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

@@ -23,7 +23,7 @@ pub use crate::debris::{
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
-pub use check::Problem;
+pub use crate::error::Problem;
 pub use imaging::{Background, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, Picture, Rendition};
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;
