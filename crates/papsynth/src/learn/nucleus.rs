@@ -3,7 +3,6 @@
 use crate::error::{Cause, Flaw};
 use crate::model::{Donor, OUTSIDE};
 
-
 /// A point in pixels: x right, y down.
 pub type Point = [f64; 2];
 

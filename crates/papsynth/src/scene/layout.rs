@@ -6,8 +6,8 @@ use crate::error::Cause;
 use crate::random;
 use crate::recipe::Layout;
 
-use super::View;
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
+use super::view::View;
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
@@ -63,9 +63,7 @@ pub(super) fn weight_map(
                 outside + (1.0 - outside) * libm::exp(-0.5 * distance * distance)
             }))
         }
-        Layout::Map { path } => {
-            given.cloned().ok_or_else(|| not_given(path, "an image"))
-        }
+        Layout::Map { path } => given.cloned().ok_or_else(|| not_given(path, "an image")),
         Layout::Labels { path, smooth_um } => {
             let map = given.ok_or_else(|| not_given(path, "a label image"))?;
             let smooth = field.draw("layout.smooth_um", smooth_um);

@@ -126,10 +126,18 @@ mod tests {
 
     #[test]
     fn a_map_that_yields_nothing_is_an_error_that_says_so() {
-        assert!(WeightMap { width: 2, weights: vec![0.0; 4] }.sampler().unwrap_err().to_string().contains("every weight is zero"));
+        assert!(
+            WeightMap { width: 2, weights: vec![0.0; 4] }
+                .sampler()
+                .unwrap_err()
+                .to_string()
+                .contains("every weight is zero")
+        );
         assert!(WeightMap { width: 0, weights: vec![] }.sampler().is_err());
         assert!(WeightMap { width: 3, weights: vec![1.0; 4] }.sampler().is_err());
-        assert!(WeightMap { width: 2, weights: vec![1.0, f32::NAN] }.sampler().unwrap_err().to_string().contains("(1, 0)"));
+        assert!(
+            WeightMap { width: 2, weights: vec![1.0, f32::NAN] }.sampler().unwrap_err().to_string().contains("(1, 0)")
+        );
         assert!(WeightMap { width: 2, weights: vec![1.0, -1.0] }.sampler().unwrap_err().to_string().contains("-1"));
     }
 }

@@ -1,7 +1,7 @@
 //! Microscopes that were met before, with everything that was computed for them.
 
-use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::Cause;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use optics_psf::{Microscope, MicroscopeParams, PatchImager};
 
