@@ -3,12 +3,13 @@
 use crate::coordinates::add_scaled;
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, count_as_f64, resample, signed_area};
-use crate::pca::{dot, mean_and_sd, mean_of, principal_axes, sd_of};
+use crate::pca::{dot, mean_of, principal_axes, sd_of};
 use crate::roughness::Fine;
 use crate::sample::Bend;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics};
 use crate::steps::to_steps;
 use crate::{Error, ShapeModel};
+use portable_numerics::statistics::{deviation, mean};
 
 /// Fewest outlines to fit a model to: fewer have no spread.
 const FEWEST_OUTLINES: usize = 3;
@@ -100,12 +101,11 @@ impl ShapeModel {
             let shape = described.normalised();
             shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
         }
-        let (ln_radius_mean, ln_radius_sd) = mean_and_sd(&ln_radii);
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
             outlines: outlines.len(),
-            ln_radius_mean,
-            ln_radius_sd,
+            ln_radius_mean: mean(&ln_radii),
+            ln_radius_sd: deviation(&ln_radii),
             mean: mean_of(&shapes),
             components: Vec::new(),
             residual: Residual::Descriptors,

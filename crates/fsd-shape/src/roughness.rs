@@ -4,8 +4,9 @@ use crate::coordinates::{finest_coarse, order, terms};
 use crate::descriptors::Descriptors;
 use crate::model::LEAST_FOR_LOCAL;
 use crate::outline::count_as_f64;
-use crate::pca::{dot, mean_and_sd};
+use crate::pca::dot;
 use crate::statistics::ShapeStatistics;
+use portable_numerics::statistics::deviation;
 
 /// Places per harmonic at which detail is looked at.
 const PLACES_PER_HARMONIC: usize = 8;
@@ -37,7 +38,7 @@ impl Fine {
     /// Spread of the logarithm of a shape's root-mean-square detail, beyond what chance gives draws without roughness.
     pub(crate) fn roughness_sd(&self, of: &ShapeStatistics) -> f64 {
         let logs: Vec<f64> = self.energies.iter().map(|e| libm::log(*e) / 2.0).collect();
-        let (_, spread) = mean_and_sd(&logs);
+        let spread = deviation(&logs);
         // The energy of a normal draw has mean tr Σ and variance 2 tr Σ², Σ being the loadings' products and, on the
         // diagonal, the residual variances. (Tails of the scores add to this variance, but little to that of its logarithm.)
         let coarse = finest_coarse(self.harmonics);

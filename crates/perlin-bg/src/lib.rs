@@ -4,7 +4,6 @@
 mod background;
 mod error;
 mod fractal;
-mod hash;
 mod illumination;
 mod kernel;
 #[cfg(feature = "noise")]

@@ -1,6 +1,6 @@
 use crate::error::{Error, require};
-use crate::hash;
 use crate::kernel::{Profile, lattice_line, point, single};
+use portable_numerics::random::SplitMix64;
 
 /// How the four corners of a lattice cell are blended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -113,7 +113,7 @@ impl Perlin {
     /// The unit gradient at a lattice point.
     #[inline]
     pub(crate) fn gradient(&self, cell: [i64; 2]) -> [f32; 2] {
-        let hash = hash::lattice(self.key, cell) >> 32;
+        let hash = cell.iter().fold(self.key, |key, c| SplitMix64::word(key, c.cast_unsigned())) >> 32;
         // Multiply-shift maps 32 random bits evenly onto the table without a division.
         self.directions[((hash * self.directions.len() as u64) >> 32) as usize]
     }

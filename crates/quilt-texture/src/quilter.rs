@@ -1,9 +1,10 @@
+use portable_numerics::random::{below, uniform};
 use rand_core::Rng;
 
 use crate::candidates::Candidates;
 use crate::canvas::Canvas;
 use crate::distance::centrality;
-use crate::draw::{below, below_exp, exp_below, outcome_of_tries, slots_between, uniform};
+use crate::draw::{below_exp, exp_below, outcome_of_tries, slots_between};
 use crate::scan::{Laid, Template, Tolerance, scan};
 use crate::source::{COVERED, LANES};
 use crate::spectral::Spectral;

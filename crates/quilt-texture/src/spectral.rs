@@ -1,5 +1,5 @@
-use lane_fft::{ComplexPlane, PlaneScratch};
 use num_complex::Complex64;
+use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
 use crate::candidates::Candidates;
 use crate::scan::Template;

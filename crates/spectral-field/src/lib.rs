@@ -6,7 +6,6 @@ mod error;
 mod field;
 #[cfg(feature = "noise")]
 mod noise_fn;
-mod normal;
 mod params;
 mod spectrum;
 

@@ -16,6 +16,7 @@ use std::borrow::Cow;
 use dye_spectra::Amounts;
 
 use crate::debris;
+use crate::error::Cause;
 use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene, View};
 use crate::truth::Part;
@@ -72,7 +73,7 @@ pub(crate) fn make(
     scene: &Scene,
     pools: &Pools<'_>,
     objects: &[&Object],
-) -> Result<Vec<Phantom>, String> {
+) -> Result<Vec<Phantom>, Cause> {
     let cells: Vec<(&Object, &crate::scene::CellBody)> = objects
         .iter()
         .filter_map(|object| match &object.body {
@@ -86,8 +87,10 @@ pub(crate) fn make(
             debris::cover(scene, pools, object, phantom);
         }
         let mut cells = made.into_iter();
-        let mut phantom = |object: &&Object| debris::phantom(scene, pools, object).or_else(|| cells.next());
-        Ok(objects.iter().map(&mut phantom).map(Option::unwrap_or_default).collect())
+        let mut phantom = |object: &&Object| {
+            debris::phantom(scene, pools, object).or_else(|| cells.next()).expect("a phantom was made of every cell")
+        };
+        Ok(objects.iter().map(&mut phantom).collect())
     })
 }
 

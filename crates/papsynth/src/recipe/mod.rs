@@ -22,8 +22,8 @@ pub use crate::debris::{
     Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
+pub use crate::error::Problem;
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
-pub use check::Problem;
 pub use imaging::{Background, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, Picture, Rendition};
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;

@@ -1,7 +1,7 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
 use crate::debris::Ground;
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::key::{Key, Stream};
 use crate::model::Model;
 use crate::random;
@@ -47,12 +47,12 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         height: field.count("field.height_px", &recipe.field.height_px),
         pixel_um: pixel_um(recipe, &field),
     };
-    let fail = |message: String| Error::Image { index: key.index, message };
+    let fail = |cause| Error::Image { index: key.index, cause };
     let stain = FieldStain::draw(recipe, &field);
     let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
     recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects));
     if u32::try_from(objects.len()).is_err() {
-        return Err(fail(format!("{} objects are more than labels can number; ask for fewer", objects.len())));
+        return Err(fail(Cause::TooManyObjects(objects.len())));
     }
     for (id, object) in (1_u32..).zip(&mut objects) {
         object.id = id;

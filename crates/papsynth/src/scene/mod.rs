@@ -22,7 +22,6 @@ pub use crate::debris::{
     Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Kind,
     Leukocyte, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
 };
-pub(crate) use cells::unknown_class;
 pub(crate) use draw::FieldNumbers;
 pub use draw::draw;
 pub(crate) use layout::check_layout;

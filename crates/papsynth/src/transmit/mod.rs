@@ -14,6 +14,7 @@ mod overlap;
 use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, Scatter};
 use rand_core::Rng;
 
+use crate::error::Cause;
 use crate::phantom::Phantom;
 use crate::scene::{Scene, SceneIllumination, SceneOptics};
 use crate::threads::Threads;
@@ -86,7 +87,7 @@ pub(crate) struct Passage {
 
 impl LightPath {
     /// Prepares the path, and the empty slide's light in `light`.
-    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses, threads: Threads, light: &mut Light) -> Result<Self, String> {
+    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses, threads: Threads, light: &mut Light) -> Result<Self, Cause> {
         let view = slide.scene.view;
         light.empty_log10.resize(view.width * view.height, 0.0);
         background(slide.scene)?.log10_into(&mut light.empty_log10, view.width, [0, 0]);
@@ -102,7 +103,7 @@ impl LightPath {
     }
 
     /// Lets light through the phantoms.
-    pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+    pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         match self {
             Self::Gaussian(path) => path.absorb(slide, focus, light),
             Self::BrightField(path) => path.pass(slide, focus, light),
@@ -119,7 +120,7 @@ impl LightPath {
 }
 
 /// The background of a scene (Eqs. 8–10), in fractions of full scale.
-fn background(scene: &Scene) -> Result<Background, String> {
+fn background(scene: &Scene) -> Result<Background, Cause> {
     let view = scene.view;
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
@@ -139,7 +140,7 @@ fn background(scene: &Scene) -> Result<Background, String> {
         },
     };
     let key = scene.key.stream("field", 0, "background").next_u64();
-    let background = Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))?;
+    let background = Background::new(&params, view.width, view.height, key)?;
     Ok(match scene.frame {
         Some(frame) => background.on_slide(frame.origin_px),
         None => background,
@@ -165,7 +166,7 @@ enum SpreadKind {
 
 impl Spread {
     /// Of the optics of a scene, whose objects are not looked at.
-    pub(crate) fn new(scene: &Scene, lenses: &Lenses) -> Result<Self, String> {
+    pub(crate) fn new(scene: &Scene, lenses: &Lenses) -> Result<Self, Cause> {
         let empty = Slide { scene, phantoms: &[], masks: &[] };
         let kind = match &scene.optics {
             SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
@@ -192,15 +193,15 @@ impl Spread {
     }
 
     /// Pixels by which an object of that depth is spread in some plane of its scene.
-    pub(crate) fn of_object_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, String> {
+    pub(crate) fn of_object_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, Cause> {
         let mut widest = 0;
         for &plane_um in &scene.planes_um {
             let seen_at_um = scene.seen_at_um(plane_um, depth_um);
             match &self.kind {
                 SpreadKind::BrightField { groups, .. } => {
                     for light in groups.iter().flat_map(|group| &group.lights) {
-                        let margin = light.lens.imager.margin_px(-depth_um, seen_at_um - light.shift_um);
-                        widest = widest.max(margin.map_err(|e| format!("optics: {e}"))?);
+                        let margin = light.lens.imager.margin_px(depth_um, seen_at_um - light.shift_um);
+                        widest = widest.max(margin?);
                     }
                 }
                 SpreadKind::Gaussian { px_per_um, .. } => {

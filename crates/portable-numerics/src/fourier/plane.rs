@@ -1,7 +1,8 @@
 use multiversion::multiversion;
 use num_complex::Complex;
 
-use crate::{LaneFft, Lanes, Real};
+use super::lanes::{Lanes, Real};
+use super::transform::LaneFft;
 
 /// Transforms of complex images of one size, `N` rows or columns side by side.
 ///

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use multiversion::multiversion;
 
-use crate::{Lanes, Real};
+use super::lanes::{Lanes, Real};
 
 /// A forward transform of sequences of one length (Stockham's, with decimation in frequency). The inverse is the forward
 /// transform of the reversed sequence.
@@ -314,6 +314,7 @@ fn five<T: Real, const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::ZERO;
     use super::*;
     use rand_xoshiro::Xoshiro256PlusPlus;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -366,6 +367,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "another length")]
     fn a_wrong_length_is_named() {
-        LaneFft::new(4).process(&mut vec![crate::ZERO; 4], &mut vec![crate::ZERO; 3]);
+        LaneFft::new(4).process(&mut vec![ZERO; 4], &mut vec![ZERO; 3]);
     }
 }

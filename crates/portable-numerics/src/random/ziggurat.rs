@@ -8,20 +8,28 @@ const TAIL: f64 = 3.654_152_885_361_009;
 /// The area of every layer, the tail included in that of the base.
 const AREA: f64 = 0.004_928_673_233_974_655;
 
-/// Standard normal deviates by Marsaglia and Tsang's ziggurat (doi:10.18637/jss.v005.i08).
+/// Standard normal deviates in single precision by Marsaglia and Tsang's ziggurat (doi:10.18637/jss.v005.i08).
 ///
 /// Layer, sign and position come from disjoint bits of one word, which removes the correlation
 /// Doornik found in the original.
 #[derive(Debug, Clone)]
-pub(crate) struct Ziggurat {
+pub struct Ziggurat {
     /// Right ends of the layers from the base (a virtual end that counts the tail in) up to 0.
     end: [f32; LAYERS + 1],
     /// exp(-x²/2) at those ends; at the base, that of `TAIL`.
     density: [f32; LAYERS + 1],
 }
 
+impl Default for Ziggurat {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Ziggurat {
-    pub(crate) fn new() -> Self {
+    /// Computes the tables, which serve any number of draws.
+    #[must_use]
+    pub fn new() -> Self {
         let density_at = |x: f64| libm::exp(-0.5 * x * x);
         let mut end = [0.0; LAYERS + 1];
         let mut density = [1.0; LAYERS + 1];
@@ -43,10 +51,10 @@ impl Ziggurat {
         Self { end, density }
     }
 
-    /// Two deviates for one word of the generator, nearly always.
+    /// Returns two deviates for one word of the generator, nearly always.
     #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "the two halves of a word")]
-    pub(crate) fn pair<R: Rng + ?Sized>(&self, rng: &mut R) -> [f32; 2] {
+    pub fn pair<R: Rng + ?Sized>(&self, rng: &mut R) -> [f32; 2] {
         let word = rng.next_u64();
         [self.deviate(word as u32, rng), self.deviate((word >> 32) as u32, rng)]
     }
