@@ -102,12 +102,11 @@ impl ShapeModel {
             let shape = described.normalised();
             shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
         }
-        let (ln_radius_mean, ln_radius_sd) = (mean(&ln_radii), deviation(&ln_radii));
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
             outlines: outlines.len(),
-            ln_radius_mean,
-            ln_radius_sd,
+            ln_radius_mean: mean(&ln_radii),
+            ln_radius_sd: deviation(&ln_radii),
             mean: mean_of(&shapes),
             components: Vec::new(),
             residual: Residual::Descriptors,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use papsynth::model::Model;
 use papsynth::recipe::diagnose::{self, Fault, Schema};
-use papsynth::recipe::{Preset, Recipe, Swath};
+use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
 use crate::args::RecipeArgs;
