@@ -21,9 +21,9 @@ pub(crate) const HEAVY: &[Heavy] = &[
     Heavy { package: "papsynth-python", features: &[] },
     Heavy {
         package: "papsynth-parquet",
-        features: &["papsynth-dataset/parquet", "papsynth-view/parquet", "papsynth-cli/parquet"],
+        features: &["papsynth-dataset/parquet", "papsynth-web/parquet", "papsynth-cli/parquet"],
     },
-    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-view/zarr", "papsynth-cli/zarr"] },
+    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-web/zarr", "papsynth-cli/zarr"] },
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.

@@ -11,7 +11,7 @@ use crate::args::Learn;
 use crate::exit::{self, Complaint, Failure};
 use crate::setup::read_model;
 use crate::text_file;
-use papsynth_recipe::{nearest, quoted};
+use papsynth::recipe::diagnose::{nearest, quoted};
 
 /// Points of an outline that is traced from a label image: ten for each of the 40 harmonics that are fitted.
 const TRACED_POINTS: usize = 400;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Preset, Recipe};
+use papsynth::recipe::{Preset, Recipe, diagnose};
 use papsynth::scene::Scene;
 use papsynth::{Plane, Threads};
 use papsynth_dataset::Layout;
@@ -76,7 +76,7 @@ impl Engine {
     fn new(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Source { mut recipe, folder, name } = Source::read(py, recipe)?;
         let model = read_model(py, model)?;
-        let faults = papsynth_recipe::unknown_classes(&recipe, &model);
+        let faults = diagnose::unknown_classes(&recipe, &model);
         if !faults.is_empty() {
             return Err(error::recipe(py, &name, &faults));
         }
@@ -238,7 +238,7 @@ impl Source {
                 return Ok(Self { name, ..of_preset(Preset::Lbc) });
             }
             let text = toml::to_string(&table).map_err(|error| PyValueError::new_err(error.to_string()))?;
-            let recipe = papsynth_recipe::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
+            let recipe = diagnose::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
             return Ok(Self { recipe, folder: PathBuf::new(), name });
         }
         let path: PathBuf = recipe.extract().map_err(|_| {
@@ -260,7 +260,7 @@ impl Source {
         }
         let text = read(&path, LARGEST_RECIPE)?;
         let name = path.display().to_string();
-        let recipe = papsynth_recipe::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
+        let recipe = diagnose::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Ok(Self { recipe, folder, name })
     }

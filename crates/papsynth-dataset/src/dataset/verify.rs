@@ -243,7 +243,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
 /// The map that a recipe names.
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
-        recipe::Layout::Map { path } | recipe::Layout::Labels { path, .. } => Some(path),
+        recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
         _ => None,
     }
 }

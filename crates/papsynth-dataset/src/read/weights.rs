@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use papsynth::Inputs;
-use papsynth::recipe::{Layout, Recipe};
+use papsynth::recipe::{Labels, Layout, Recipe};
 use papsynth::scene::WeightMap;
 use papsynth::truth::LabelMap;
 
@@ -51,7 +51,7 @@ pub struct InputFile {
 /// If the file cannot be read, or allows no place.
 pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
     let is_grey = matches!(recipe.layout, Layout::Map { .. });
-    let (Layout::Map { path } | Layout::Labels { path, .. }) = &mut recipe.layout else {
+    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
         return Ok((Inputs::default(), None));
     };
     let found = folder.join(&path);

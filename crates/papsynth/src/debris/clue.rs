@@ -3,10 +3,8 @@
 //! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
 //! cell's row in the truth has the trait `clue`.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::check::Section;
 use super::paint::{Painting, Stroke};
 use super::site::Site;
 use crate::phantom::piece::Phantom;
@@ -14,25 +12,26 @@ use crate::phantom::pools::Look;
 use crate::phantom::tile::Tile;
 use crate::random;
 use crate::recipe::number::Number;
+use crate::recipe::section::{named, section};
 use crate::scene::numbers::FieldNumbers;
 use crate::truth::traits::Trait;
 
-/// Clue cells: cells covered with coccobacilli, and cells with patches of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ClueCells {
-    /// Share of the cells that carry a coat, 0 to 1; drawn once a field.
-    pub share: Number,
-    /// Coccobacilli per µm² where a coat is dense, 0 to 10.
-    pub density: Number,
-    /// Share of the cell that the dense patches of its coat cover, 0 to 1.
-    pub cover: Number,
-    /// How far the coat reaches beyond the cell's rim, µm, 0 to 20.
-    pub beyond_um: Number,
-    /// Width of a coccobacillus, µm, 0.1 to 5.
-    pub width_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
+section! {
+    /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
+    pub struct ClueCells {
+        /// Share of the cells that carry a coat; drawn once a field.
+        share: Number = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
+        /// Coccobacilli per µm² where a coat is dense.
+        density: Number = Number::uniform(1.5, 4.5), 0..=10;
+        /// Share of the cell that the dense patches of its coat cover.
+        cover: Number = Number::uniform(0.35, 0.95), 0..=1;
+        /// How far the coat reaches beyond the cell's rim.
+        beyond_um: Number = Number::uniform(0.8, 3.0), 0..=20, "µm";
+        /// Width of a coccobacillus.
+        width_um: Number = Number::normal(0.6, 0.04), 0.1..=5, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.045, 0.25), 0..=4;
+    }
 }
 
 /// The coat of a clue cell, its numbers drawn.
@@ -51,37 +50,10 @@ pub struct Coat {
     pub absorbance: f64,
 }
 
-impl Default for ClueCells {
-    fn default() -> Self {
-        Self {
-            share: Number::log_normal(0.004, 1.3).at_most(0.8),
-            density: Number::uniform(1.5, 4.5),
-            cover: Number::uniform(0.35, 0.95),
-            beyond_um: Number::uniform(0.8, 3.0),
-            width_um: Number::normal(0.6, 0.04),
-            absorbance: Number::log_normal(0.045, 0.25),
-        }
-    }
-}
-
 impl ClueCells {
-    /// A slide without any.
-    pub(super) fn none() -> Self {
-        Self { share: 0.0.into(), ..Self::default() }
-    }
-
-    pub(super) fn check(&self, section: &mut Section<'_>) {
-        section.share("share", &self.share);
-        section.number("density", &self.density, 0.0, 10.0);
-        section.share("cover", &self.cover);
-        section.number("beyond_um", &self.beyond_um, 0.0, 20.0);
-        section.number("width_um", &self.width_um, 0.1, 5.0);
-        section.absorbance("absorbance", &self.absorbance);
-    }
-
     /// Gives cells, by their numbers, their coats.
     pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
-        let share = field.draw("debris.clue_cells.share", &self.share);
+        let share = field.draw(named!("debris.clue_cells", self.share));
         if share <= 0.0 {
             return;
         }

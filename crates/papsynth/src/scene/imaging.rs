@@ -3,8 +3,7 @@
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
 
-use crate::recipe::camera::{Binning, PhotonNoise, Subsampling};
-use crate::recipe::imaging::{Imaging, Mixing, Rendition};
+use crate::recipe::imaging::{Mixing, Rendition, SceneMicroscope};
 use crate::recipe::specimen::Restore;
 
 /// Planes that are fused to one picture of extended focus.
@@ -116,40 +115,6 @@ pub enum SceneOptics {
     },
 }
 
-/// A bright-field microscope, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SceneMicroscope {
-    /// Numerical aperture of the objective.
-    pub na: f64,
-    /// Numerical aperture of the condenser.
-    pub condenser_na: f64,
-    /// Refractive index of the mountant.
-    pub mount_index: f64,
-    /// Refractive index between cover glass and objective.
-    pub immersion_index: f64,
-    /// How much too thick the cover glass is, µm.
-    pub cover_error_um: f64,
-    /// Spherical aberration, waves.
-    pub spherical: f64,
-    /// Coma along the rows, waves.
-    pub coma: f64,
-    /// Astigmatism between rows and columns, waves.
-    pub astigmatism: f64,
-    /// Standard deviation of further spread, µm.
-    pub extra_blur_um: f64,
-    /// Share of an empty field's light that lies evenly over the picture.
-    pub stray_light: f64,
-    /// Samples of the slide along the side of a pixel.
-    pub oversampling: usize,
-    /// Thickness of the slabs between which Abbe's way carries light, µm.
-    pub slab_um: f64,
-    /// How light is followed through the slabs.
-    pub imaging: Imaging,
-    /// Directions of light that Abbe's way follows.
-    pub directions: usize,
-}
-
 /// What happens to nuclei whose donors were images already.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -170,52 +135,4 @@ pub struct SceneDyes {
     pub bacillus: Amounts,
     /// Of specks.
     pub speckle: Amounts,
-}
-
-/// The camera, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SceneCamera {
-    /// Bits of a grey level.
-    pub bits: u32,
-    /// Electrons that the largest grey level stands for.
-    pub full_well_e: f64,
-    /// Read noise, electrons.
-    pub read_noise_e: f64,
-    /// Root of its mean square where pixels differ, else 0.
-    pub read_noise_rms_e: f64,
-    /// Grey level of a dark pixel.
-    pub offset_dn: f64,
-    /// Glare that was taken off, as a share of the light of the empty slide.
-    pub glare_removed: f64,
-    /// How photons are counted.
-    pub photon_noise: PhotonNoise,
-    /// Spread of the pixels' responses.
-    pub prnu: f64,
-    /// Spread of the pixels' offsets, electrons.
-    pub dsnu_e: f64,
-    /// Which camera of its kind it is.
-    pub serial: u64,
-    /// Exposure, seconds.
-    pub exposure_s: f64,
-    /// Dark current, electrons per second.
-    pub dark_current_e_per_s: f64,
-    /// Temperature for which it is given, °C.
-    pub dark_reference_c: f64,
-    /// Temperature of the sensor, °C.
-    pub temperature_c: f64,
-    /// Warming that doubles the dark current, K.
-    pub dark_doubling_c: f64,
-    /// Share of the charge too much that blooms.
-    pub blooming: f64,
-    /// Share of that which stays within its column.
-    pub blooming_vertical: f64,
-    /// Pixels of the sensor along the side of one of the picture.
-    pub binning_px: usize,
-    /// How they are joined.
-    pub binning: Binning,
-    /// Quality of the JPEG, or 0.
-    pub jpeg_quality: u32,
-    /// How much of the colour it leaves out.
-    pub jpeg_subsampling: Subsampling,
 }

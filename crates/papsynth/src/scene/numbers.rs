@@ -14,11 +14,11 @@ impl FieldNumbers {
         self.key.stream("field", 0, path)
     }
 
-    pub(crate) fn draw(&self, path: &str, number: &Number) -> f64 {
+    pub(crate) fn draw(&self, (path, number): (&str, &Number)) -> f64 {
         number.draw(&mut self.stream(path))
     }
 
-    pub(crate) fn count(&self, path: &str, number: &Number) -> usize {
+    pub(crate) fn count(&self, (path, number): (&str, &Number)) -> usize {
         number.draw_count(&mut self.stream(path))
     }
 }

@@ -5,8 +5,10 @@ use rand_core::Rng;
 
 use crate::key::Key;
 use crate::random;
+use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
-use crate::recipe::specimen::{DyeAmounts, Stain, TintMix};
+use crate::recipe::section::named;
+use crate::recipe::specimen::{Stain, TintMix};
 
 use super::cell::Tint;
 use super::imaging::SceneDyes;
@@ -36,29 +38,21 @@ impl<'a> FieldStain<'a> {
     }
 
     fn of(stain: &'a Stain, field: &FieldNumbers, slide: &FieldNumbers) -> Self {
-        let of_slide = |name: &str, number: &Number| number.draw(&mut slide.key.stream("slide", 0, name));
-        let of_field = |name: &str, number: &Number| field.draw(name, number);
+        let of_slide = |(name, number): (&str, &Number)| number.draw(&mut slide.key.stream("slide", 0, name));
         let mut balance = [1.0; DYES];
         let mut shift = |sd: f64, rng: &mut crate::key::Stream| {
             for factor in &mut balance {
                 *factor *= libm::exp(sd * random::normal(rng));
             }
         };
-        shift(
-            of_slide("stain.slide_balance", &stain.slide_balance),
-            &mut slide.key.stream("slide", 0, "stain.balance"),
-        );
-        shift(
-            of_field("stain.field_balance", &stain.field_balance),
-            &mut field.key.stream("field", 0, "stain.balance"),
-        );
+        shift(of_slide(named!("stain", stain.slide_balance)), &mut slide.key.stream("slide", 0, "stain.balance"));
+        shift(field.draw(named!("stain", stain.field_balance)), &mut field.key.stream("field", 0, "stain.balance"));
         Self {
             stain,
-            cytoplasm: of_slide("stain.slide_cytoplasm", &stain.slide_cytoplasm)
-                * of_field("stain.field_cytoplasm", &stain.field_cytoplasm),
-            nucleus: of_slide("stain.slide_nucleus", &stain.slide_nucleus)
-                * of_field("stain.field_nucleus", &stain.field_nucleus),
-            texture: of_field("stain.field_texture", &stain.field_texture),
+            cytoplasm: of_slide(named!("stain", stain.slide_cytoplasm))
+                * field.draw(named!("stain", stain.field_cytoplasm)),
+            nucleus: of_slide(named!("stain", stain.slide_nucleus)) * field.draw(named!("stain", stain.field_nucleus)),
+            texture: field.draw(named!("stain", stain.field_texture)),
             balance,
         }
     }

@@ -27,7 +27,8 @@ pub(super) fn image(
     let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
-    let params = AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions } };
+    let params =
+        AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
     let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
     let layers = layers(slide, optics.slab_um, light, frame)?;
     let whole = abbe.image(&layers, stage_um)?;

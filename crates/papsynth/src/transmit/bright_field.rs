@@ -199,7 +199,7 @@ impl BrightFieldPath {
                     }
                     continue;
                 };
-                let at_px = passed.window.origin.map(|at| at / self.optics.oversampling as i64);
+                let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
                 let factors = passed.bench.factors.iter().zip(&passed.absorbances);
                 for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                     light.multiply(factor, at_px);
@@ -262,7 +262,7 @@ impl BrightFieldPath {
             light.lens.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
-        let n = self.optics.oversampling;
+        let n = self.optics.oversampling as usize;
         let Some(window) = Window::around(phantom.pieces.iter().map(|piece| &piece.absorbance), n) else {
             return Ok(None);
         };

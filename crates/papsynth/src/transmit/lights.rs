@@ -52,7 +52,7 @@ pub(super) fn groups(
             ..Zernike::default()
         },
         pixel_um: scene.view.pixel_um,
-        oversampling: optics.oversampling,
+        oversampling: optics.oversampling as usize,
         // Glare is added to the finished light: a microscope is remembered whatever the glare of a field.
         stray_light: 0.0,
     };
