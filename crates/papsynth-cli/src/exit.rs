@@ -104,6 +104,11 @@ impl Failure {
         Self { exit: Exit::Interrupted, complaint: Box::new(complaint) }
     }
 
+    /// What the user asked for is wrong, and what would help.
+    pub(crate) fn wrong(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::input(Complaint::new(message).help(help))
+    }
+
     /// An error of a library; whether the system failed, so that trying again may help.
     pub(crate) fn of(error: &impl std::fmt::Display, is_io: bool) -> Self {
         let complaint = Complaint::new(error.to_string());
@@ -120,7 +125,7 @@ impl Failure {
     #[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
     pub(crate) fn left_out(feature: &str) -> Self {
         let message = format!("this subcommand needs a build of papsynth with `--features {feature}`");
-        Self::input(Complaint::new(message).help("`cargo install papsynth-cli` builds all subcommands"))
+        Self::wrong(message, "`cargo install papsynth-cli` builds all subcommands")
     }
 
     /// A file or folder that cannot be read or written: a wrong path is the user's, all else may pass.

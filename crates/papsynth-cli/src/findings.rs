@@ -4,7 +4,7 @@ use std::path::Path;
 
 use papsynth_dataset::{Finding, Mend};
 
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::words::counted;
 
 /// Findings that are printed in full; the rest is counted.
@@ -38,5 +38,5 @@ pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
     .filter(|(mend, _)| wants(*mend))
     .map(|(_, words)| words)
     .collect();
-    Err(Failure::input(Complaint::new(format!("{}: {things} wrong", dir.display())).help(mends.join("; "))))
+    Err(Failure::wrong(format!("{}: {things} wrong", dir.display()), mends.join("; ")))
 }

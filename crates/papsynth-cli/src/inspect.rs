@@ -6,7 +6,7 @@ use std::ops::Range;
 use papsynth_dataset::{Overview, inspect};
 
 use crate::args::{Inspect, check_of};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::words::{counted, size};
 
 pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     let (shards, files) = (counted(frames as u64, "shard", "shards"), counted(files as u64, "file", "files"));
     let message = format!("{}: {shards} and {files} are damaged", args.dir.display());
     let help = "the command that made the data set, with --verify, makes them again";
-    Err(Failure::input(Complaint::new(message).help(help)))
+    Err(Failure::wrong(message, help))
 }
 
 /// Lines of the lists that are printed in full; the rest is counted.

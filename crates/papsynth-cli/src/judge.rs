@@ -79,9 +79,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
     let (Some(of_real), Some(of_synthetic)) = (of_real.or(of_synthetic), of_synthetic.or(of_real)) else {
         let message = "neither folder says how large its pixels are";
-        return Err(Failure::input(
-            Complaint::new(message).help("give --pixel-um, the size of a pixel in micrometres"),
-        ));
+        return Err(Failure::wrong(message, "give --pixel-um, the size of a pixel in micrometres"));
     };
     let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
         let pixels_um = files.iter().map(|f| given.or(f.pixel_um).unwrap_or(else_um)).collect();
@@ -94,9 +92,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
 fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, Failure> {
     if files.len() < LEAST {
         let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::input(
-            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
-        ));
+        return Err(Failure::wrong(message, "fields are never split between what is learnt from and what is tried"));
     }
     Ok(files)
 }
@@ -114,10 +110,10 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
         let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
         if files.iter().all(|f| f.group.is_empty()) {
             let help = "fields have no groups there: frames.csv in that folder would name them, as frame,grade";
-            return Err(Failure::input(Complaint::new(message).help(help)));
+            return Err(Failure::wrong(message, help));
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", quoted(known.into_iter())))));
+        return Err(Failure::wrong(message, format!("there are {}", quoted(known.into_iter()))));
     }
     Ok(files)
 }
@@ -154,7 +150,7 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
             None => Ok(from),
             Some(file) => {
                 let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
-                Err(Failure::input(Complaint::new(message).help("all fields of both sides must have them")))
+                Err(Failure::wrong(message, "all fields of both sides must have them"))
             }
         },
     }

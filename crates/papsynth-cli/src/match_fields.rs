@@ -57,7 +57,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
         (false, None) => {
             let message = format!("{}: nothing says how large the pixels are", args.real.display());
             let help = "give --pixel-um, the size of a pixel in micrometres, or --find-pixel";
-            return Err(Failure::input(Complaint::new(message).help(help)));
+            return Err(Failure::wrong(message, help));
         }
     };
     let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;

@@ -18,7 +18,7 @@ pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsStr
     if let Some((word, address)) = words.iter().find_map(|word| Some((word, mistyped(word.to_str()?)?))) {
         let message = format!("{}: begins as an address of an object store and is none", word.display());
         let help = format!("write {address} for an object store, ./{} for a folder", word.display());
-        return Err(Failure::input(Complaint::new(message).help(help)));
+        return Err(Failure::wrong(message, help));
     }
     if matches!(
         verb,
@@ -30,7 +30,7 @@ pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsStr
         Some(word) => {
             let message = format!("{}: a folder or file is wanted here", Path::new(&word).display());
             let help = "generate, status, merge, verify and clean work on object stores";
-            Err(Failure::input(Complaint::new(message).help(help)))
+            Err(Failure::wrong(message, help))
         }
         None => Ok(()),
     }

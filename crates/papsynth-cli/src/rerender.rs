@@ -9,7 +9,7 @@ use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share,
 use toml::Table;
 
 use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::interrupt::Interrupt;
 use crate::setup::Setup;
 use crate::words::runs;
@@ -23,25 +23,26 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     if before.recipe.recipe.to_toml() != source_recipe(&source)? {
-        let complaint = Complaint::new(format!("{}: this program reads its recipe otherwise", args.dir.display()));
-        return Err(Failure::input(complaint.help("a data set is rendered again by the release that made it")));
+        return Err(Failure::wrong(
+            format!("{}: this program reads its recipe otherwise", args.dir.display()),
+            "a data set is rendered again by the release that made it",
+        ));
     }
     let after = load(args, seed, true)?;
     let changed = changed_sections(&before.recipe.recipe, &after.recipe.recipe);
     if let Some(section) = changed.iter().find(|section| !IMAGING.contains(&section.as_str())) {
-        let complaint =
-            Complaint::new(format!("`{section}` says what lies in a scene; rerender changes how it is imaged"));
-        return Err(Failure::input(
-            complaint.help(format!("it takes {}; for all else: papsynth generate", IMAGING.join(", "))),
+        return Err(Failure::wrong(
+            format!("`{section}` says what lies in a scene; rerender changes how it is imaged"),
+            format!("it takes {}; for all else: papsynth generate", IMAGING.join(", ")),
         ));
     }
     let (layout, _) = args.layout.layout(0);
     let interrupt = Interrupt::watch()?;
     let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
-        let complaint = Complaint::new(format!("the truth is another: {difference}"));
-        return Err(Failure::input(
-            complaint.help("a finer grid (`optics.oversampling`) draws other masks; leave it as it was"),
+        return Err(Failure::wrong(
+            format!("the truth is another: {difference}"),
+            "a finer grid (`optics.oversampling`) draws other masks; leave it as it was",
         ));
     }
     if args.quiet {

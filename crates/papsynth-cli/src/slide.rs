@@ -3,7 +3,7 @@
 use papsynth_dataset::write_png;
 
 use crate::args::{SlideTile, SlideVerb};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::Setup;
 use crate::text_file;
 
@@ -23,9 +23,9 @@ pub(crate) fn run(verb: SlideVerb) -> Result<(), Failure> {
         #[cfg(feature = "zarr")]
         SlideVerb::Finalize(args) => set::finalize(&args),
         #[cfg(not(feature = "zarr"))]
-        SlideVerb::Make(_) | SlideVerb::Finalize(_) => Err(Failure::input(
-            Complaint::new("this build cannot write slides, which are OME-Zarr".to_owned())
-                .help("build with `--features zarr`; `papsynth slide tile` makes any part of a slide as a PNG"),
+        SlideVerb::Make(_) | SlideVerb::Finalize(_) => Err(Failure::wrong(
+            "this build cannot write slides, which are OME-Zarr".to_owned(),
+            "build with `--features zarr`; `papsynth slide tile` makes any part of a slide as a PNG",
         )),
     }
 }
@@ -34,7 +34,7 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
     let pixels = u64::from(args.size[0]) * u64::from(args.size[1]);
     if pixels > MOST_PIXELS {
         let message = format!("--size {},{}: more than {MOST_PIXELS} pixels at once", args.size[0], args.size[1]);
-        return Err(Failure::input(Complaint::new(message).help("`papsynth slide make` makes pictures of any size")));
+        return Err(Failure::wrong(message, "`papsynth slide make` makes pictures of any size"));
     }
     text_file::is_png(&args.out)?;
     let setup = Setup::load(&args.engine, None)?;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use papsynth_dataset::{Check, Dataset, shards_to_make};
 
 use crate::args::{Merge, Status, check_of};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::place;
 use crate::words::{counted, runs};
 
@@ -20,8 +20,10 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
-        let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
-        return Err(Failure::input(complaint.help("only a slide, or a data set that was merged, knows it by itself")));
+        return Err(Failure::wrong(
+            "--frames is missing: how many frames there will be".to_owned(),
+            "only a slide, or a data set that was merged, knows it by itself",
+        ));
     };
     let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
@@ -56,14 +58,12 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
         let shards = counted(count(&missing), "shard is", "shards are");
         let message = format!("{dir}: {shards} missing or damaged: {}", listed(&missing));
         let help = "the command that makes the data set, with --verify, makes them, in any share; then merge again";
-        return Err(Failure::input(Complaint::new(message).help(help)));
+        return Err(Failure::wrong(message, help));
     }
     let summary = dataset.finish()?;
     if summary.frames != args.frames {
         let message = format!("{dir}: --frames {}, but {} are there", args.frames, summary.frames);
-        return Err(Failure::input(
-            Complaint::new(message).help("give the number that was meant, or take away what is too much"),
-        ));
+        return Err(Failure::wrong(message, "give the number that was meant, or take away what is too much"));
     }
     let (frames, root) = (counted(summary.frames, "frame", "frames"), summary.root);
     exit::print(&format!("{dir}: {frames}\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))

@@ -32,8 +32,10 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     let axes = args.vary.iter().map(|text| axis(text)).collect::<Result<Vec<_>, _>>()?;
     for (number, axis) in axes.iter().enumerate() {
         if axes[..number].iter().any(|before| before.field == axis.field) {
-            let complaint = Complaint::new(format!("--vary {}: it is varied already", axis.field));
-            return Err(Failure::input(complaint.help("give all its values at once: --vary FIELD=A,B,…")));
+            return Err(Failure::wrong(
+                format!("--vary {}: it is varied already", axis.field),
+                "give all its values at once: --vary FIELD=A,B,…",
+            ));
         }
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
@@ -71,7 +73,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
 fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
     let refuse = |name: &str| {
         let message = format!("{}: the folder holds something else (`{name}`) and no sweep", out.display());
-        Err(Failure::input(Complaint::new(message).help("choose another, or a new one")))
+        Err(Failure::wrong(message, "choose another, or a new one"))
     };
     let entries = match fs::read_dir(out) {
         Ok(entries) => entries,

@@ -17,7 +17,7 @@ pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), F
         return Ok(());
     }
     let message = format!("{}: there is another kind of file of this name; expected {what} or none", out.display());
-    Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
+    Err(Failure::wrong(message, "choose another name, or remove the file"))
 }
 
 /// Makes sure that files can be written to the folder `out`, each in the place of nothing but an older one of its kind.

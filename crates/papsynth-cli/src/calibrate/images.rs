@@ -17,10 +17,6 @@ const DARK: &str = "dark";
 /// Frames that make a level.
 const PAIR: usize = 2;
 
-fn refuse(message: String, help: &str) -> Failure {
-    Failure::input(Complaint::new(message).help(help))
-}
-
 /// `--stack`.
 pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result<Focus, Failure> {
     let stack = Stack::read(&args.stack, &Limits::default())?;
@@ -29,26 +25,23 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
     let params = FocusParams { nuclei, step_um: args.step_um, instrument: instrument.cloned() };
     Focus::measure(&planes, stack.width, &params).map_err(|error| {
         let name = args.stack.first().map(|path| path.display().to_string()).unwrap_or_default();
-        let (comma, help) = match &error {
+        let help = match &error {
             Error::Planes { .. } => {
-                (":", "give a TIFF of several pages, a folder, or several images: planes on both sides of focus")
+                "give a TIFF of several pages, a folder, or several images: planes on both sides of focus"
             }
-            Error::NoNucleus => (
-                ":",
-                "give planes alone, no masks among them, or name the window of a nucleus with --window X,Y,W,H, in \
-                 pixels",
-            ),
-            Error::Window { source: NoFocusInside { .. }, .. } => (
-                ",",
-                "take the planes from below focus to above it, in the order of their numbers, and nothing else: no \
-                 mask and no extended focus",
-            ),
+            Error::NoNucleus => {
+                "give planes alone, no masks among them, or name the window of a nucleus with --window X,Y,W,H, in pixels"
+            }
+            Error::Window { source: NoFocusInside { .. }, .. } => {
+                "take the planes from below focus to above it, in the order of their numbers, and nothing else: \
+                 no mask and no extended focus"
+            }
             Error::Window { .. } => {
-                (",", "--window X,Y,W,H: left and top from 0, width and height from 8 pixels, inside the image")
+                "--window X,Y,W,H: left and top from 0, width and height from 8 pixels, inside the image"
             }
             _ => return Failure::input(Complaint::new(format!("--stack {name}: {error}"))),
         };
-        refuse(format!("--stack {name}{comma} {error}"), help)
+        Failure::wrong(format!("--stack {name}: {error}"), help)
     })
 }
 
@@ -58,19 +51,18 @@ pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>
     let name = path.display();
     let [pixels] = image.planes.as_slice() else {
         let message = format!("--edge {name}: {} images; expected one", image.planes.len());
-        return Err(refuse(message, "give the image in which the edge is in focus"));
+        return Err(Failure::wrong(message, "give the image in which the edge is in focus"));
     };
     let at = args.line.map_or(EdgeAt::Found, EdgeAt::Line);
     let edge = Edge::measure(pixels, image.width, at).map_err(|error| {
-        let (comma, help) = match &error {
-            Error::NoEdge => (":", "name a straight edge with --line X0,Y0,X1,Y1, across it or along it, in pixels"),
-            error => (
-                if matches!(error, Error::Line { .. }) { "," } else { ":" },
-                "--line X0,Y0,X1,Y1: across a straight edge or along it, at least 8 pixels long, with a square of \
-                 that side around its middle inside the image",
-            ),
+        let help = match &error {
+            Error::NoEdge => "name a straight edge with --line X0,Y0,X1,Y1, across it or along it, in pixels",
+            _ => {
+                "--line X0,Y0,X1,Y1: across a straight edge or along it, at least 8 pixels long, with a square \
+                 of that side around its middle inside the image"
+            }
         };
-        refuse(format!("--edge {name}{comma} {error}"), help)
+        Failure::wrong(format!("--edge {name}: {error}"), help)
     })?;
     let profile = edge.profile(pixels, image.width);
     Ok((edge, profile))
@@ -87,7 +79,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
             Some(flats) => flats,
             none => {
                 let bits = depth(args, images.first().map_or(u16::MAX, |image| image.white), folder)?;
-                let flats = Flats::new(bits).map_err(|error| refuse(format!("--bits: {error}"), "8 to 16"))?;
+                let flats = Flats::new(bits).map_err(|error| Failure::wrong(format!("--bits: {error}"), "8 to 16"))?;
                 none.insert((flats, bits))
             }
         };
@@ -96,11 +88,12 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
             .map(|(name, image)| Frame { name, grey: &image.grey, width: image.width })
             .collect();
         flats.add(name, &frames, *light).map_err(|error| match &error {
-            Error::Sizes { .. } => refuse(error.to_string(), "all flats and darks must be of one size"),
-            Error::Bits { .. } => {
-                refuse(format!("--bits is {bits}, but {error}"), "give the bits of the camera's converter, 8 to 16")
-            }
-            Error::Level { .. } => refuse(error.to_string(), "a level is two frames or more of the same light"),
+            Error::Sizes { .. } => Failure::wrong(error.to_string(), "all flats and darks must be of one size"),
+            Error::Bits { .. } => Failure::wrong(
+                format!("--bits is {bits}, but {error}"),
+                "give the bits of the camera's converter, 8 to 16",
+            ),
+            Error::Level { .. } => Failure::wrong(error.to_string(), "a level is two frames or more of the same light"),
             _ => Failure::input(Complaint::new(error.to_string())),
         })?;
     }
@@ -113,7 +106,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
             Error::TooDark { .. } => "take flats from near dark to the brightest",
             _ => "the levels of flats must lie well above the dark, at different brightness",
         };
-        refuse(format!("--flat {}: {error}", folder.display()), help)
+        Failure::wrong(format!("--flat {}: {error}", folder.display()), help)
     })
 }
 
@@ -140,11 +133,14 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failur
         (None, Some(inside)) => inside,
         (Some(_), Some(inside)) => {
             let message = format!("--dark: the folder of --flat has dark frames of its own, {}", inside.display());
-            return Err(refuse(message, "leave out --dark, or take that folder away"));
+            return Err(Failure::wrong(message, "leave out --dark, or take that folder away"));
         }
         (None, None) => {
             let message = format!("--flat {}: {}", folder.display(), NoDark);
-            return Err(refuse(message, "give their folder with --dark, or name it `dark` inside that of --flat"));
+            return Err(Failure::wrong(
+                message,
+                "give their folder with --dark, or name it `dark` inside that of --flat",
+            ));
         }
     };
     let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: Light::Dark }];
@@ -155,7 +151,7 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failur
         let all = files(folder)?;
         if !all.len().is_multiple_of(PAIR) {
             let message = format!("--flat {}: {} files; expected pairs of the same light", folder.display(), all.len());
-            return Err(refuse(
+            return Err(Failure::wrong(
                 message,
                 "two files after one another, by name, are a pair; or make a subfolder for each exposure",
             ));
@@ -167,7 +163,7 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failur
     }
     match exposures.iter().find(|exposure| exposure.files.len() < PAIR) {
         None => Ok(exposures),
-        Some(Exposure { name, .. }) => Err(refuse(
+        Some(Exposure { name, .. }) => Err(Failure::wrong(
             format!("{name}: 1 frame; expected 2 or more"),
             "noise is measured on the differences of frames of the same light",
         )),
@@ -192,7 +188,7 @@ fn depth(args: &Calibrate, white: u16, folder: &Path) -> Result<u32, Failure> {
         None if white == u16::from(u8::MAX) => Ok(u8::BITS),
         None => {
             let message = format!("--flat {}: files of 16 bits do not tell those of the camera", folder.display());
-            Err(Failure::input(Complaint::new(message).help("give them with --bits, 8 to 16: often 12 or 14")))
+            Err(Failure::wrong(message, "give them with --bits, 8 to 16: often 12 or 14"))
         }
     }
 }

@@ -101,7 +101,7 @@ fn older(path: &Path) -> Result<Option<Calibration>, Failure> {
     };
     let refuse = |what: String| {
         let help = "choose another folder with --out, or remove the file";
-        Err(Failure::input(Complaint::new(format!("{}: {what}", path.display())).help(help)))
+        Err(Failure::wrong(format!("{}: {what}", path.display()), help))
     };
     const KNOWN: u32 = Calibration::VERSION;
     match serde_json::from_str::<Calibration>(&text) {
@@ -127,7 +127,7 @@ fn same_microscope(instrument: Option<&Instrument>, older: &Calibration, out: &P
             let message =
                 format!("{}: was measured with {option} {old}; this command has {new}", out.join(RECORD).display());
             let help = format!("give {option} {old}, or another folder with --out");
-            Err(Failure::input(Complaint::new(message).help(help)))
+            Err(Failure::wrong(message, help))
         }
     }
 }

@@ -62,7 +62,7 @@ fn sigma(slope: f64, wide_slope: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use crate::measure::maps::Maps;
-    use crate::picture::{Known, Picture};
+    use crate::picture::Picture;
 
     #[test]
     fn the_blur_of_an_edge_is_found_whatever_its_direction() {
@@ -75,15 +75,7 @@ mod tests {
                 crate::number::single(240.0 * libm::pow(10.0, -a))
             };
             let grey = (0..width * height).map(at).collect();
-            let picture = Picture {
-                name: String::new(),
-                group: String::new(),
-                grey,
-                width,
-                full_scale: 255.0,
-                nuclei: Known::Nothing,
-            };
-            let maps = Maps::new(&picture);
+            let maps = Maps::new(&Picture { grey, width, ..Picture::default() });
             let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
             assert!(sigmas.len() > 80, "{} places", sigmas.len());
             let found = crate::statistics::median(&mut sigmas);
