@@ -13,8 +13,6 @@ const COVERED: [&str; 16] = [
     "Cargo.lock",
     "crates/papsynth-cli/tests",
     "crates/papsynth-dataset",
-    "crates/papsynth-cloud",
-    "crates/papsynth-parquet",
     "crates/papsynth-python",
     "crates/papsynth-view",
     "crates/papsynth-zarr",

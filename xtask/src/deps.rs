@@ -26,8 +26,6 @@ enum Role {
     /// Knows how a kind of file is laid out, and nothing of what is in it.
     Container,
     Dataset,
-    /// Data sets somewhere else than on this machine.
-    Cloud,
     Judge,
     Match,
     /// Talks with a browser on the same machine, and knows nothing of what about.
@@ -45,7 +43,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 26] = [
+const PLACES: [(&str, Role); 24] = [
     ("lane-fft", Role::Transforms),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -58,9 +56,7 @@ const PLACES: [(&str, Role); 26] = [
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
     ("papsynth-zarr", Role::Container),
-    ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
-    ("papsynth-cloud", Role::Cloud),
     ("papsynth-judge", Role::Judge),
     ("papsynth-loopback", Role::Loopback),
     ("papsynth-study", Role::Study),
@@ -90,7 +86,6 @@ impl Role {
             // It must run where files and threads do not.
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
-            Self::Cloud => &[Self::Dataset],
             Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Engine, Self::Judge],
@@ -105,7 +100,6 @@ impl Role {
                 Self::Technique,
                 Self::Engine,
                 Self::Dataset,
-                Self::Cloud,
                 Self::Judge,
                 Self::Match,
                 Self::Loopback,
@@ -113,7 +107,7 @@ impl Role {
                 Self::View,
                 Self::Recipes,
             ],
-            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Cloud, Self::Judge, Self::Recipes],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Recipes],
         }
     }
 }
@@ -140,7 +134,7 @@ fn unusual(workspace: &Workspace) -> impl Iterator<Item = String> {
     let crates = workspace.root.join("crates");
     workspace.packages.iter().filter(move |package| package.folder.starts_with(&crates)).filter_map(|package| {
         let name = &package.name;
-        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == name);
+        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == Some(name));
         match (is_heavy, workspace.usual.contains(name)) {
             (true, true) => Some(format!("`{name}` is heavy and must not be among the default-members: Cargo.toml")),
             (false, false) => Some(format!("`{name}` must be among the default-members: Cargo.toml")),

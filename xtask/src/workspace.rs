@@ -8,22 +8,23 @@ use serde_json::Value;
 
 use crate::shell;
 
-/// A crate that takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
+/// What takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
 pub(crate) struct Heavy {
-    pub(crate) package: &'static str,
-    /// The features of other crates that bring it along.
+    /// A crate of this workspace, if it is one; else an optional dependency.
+    pub(crate) package: Option<&'static str>,
+    /// The features that bring it along.
     pub(crate) features: &'static [&'static str],
 }
 
-/// All of them; each is missing in the `default-members` of the workspace, too.
+/// All of them; the crates are missing in the `default-members` of the workspace, too.
 pub(crate) const HEAVY: &[Heavy] = &[
-    Heavy { package: "papsynth-cloud", features: &["papsynth-cli/cloud", "papsynth-python/cloud"] },
-    Heavy { package: "papsynth-python", features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/cloud", "papsynth-cli/cloud", "papsynth-python/cloud"] },
+    Heavy { package: Some("papsynth-python"), features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/parquet", "papsynth-view/parquet", "papsynth-cli/parquet"] },
     Heavy {
-        package: "papsynth-parquet",
-        features: &["papsynth-dataset/parquet", "papsynth-view/parquet", "papsynth-cli/parquet"],
+        package: Some("papsynth-zarr"),
+        features: &["papsynth-dataset/zarr", "papsynth-view/zarr", "papsynth-cli/zarr"],
     },
-    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-view/zarr", "papsynth-cli/zarr"] },
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.
@@ -94,8 +95,8 @@ impl Workspace {
     pub(crate) fn cargo_light(&self, name: &str) -> Command {
         let mut command = self.cargo();
         command.args([name, "--workspace"]);
-        for heavy in HEAVY {
-            command.args(["--exclude", heavy.package]);
+        for package in HEAVY.iter().filter_map(|heavy| heavy.package) {
+            command.args(["--exclude", package]);
         }
         command
     }
@@ -105,7 +106,7 @@ impl Workspace {
         let mut command = self.cargo();
         let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
         let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
-        packages.extend(HEAVY.iter().map(|heavy| heavy.package));
+        packages.extend(HEAVY.iter().filter_map(|heavy| heavy.package));
         packages.sort_unstable();
         packages.dedup();
         command.args([name, "--features", &heavy_features()]);
