@@ -2,17 +2,16 @@
 
 use anyhow::{Result, bail};
 
-use crate::Chore;
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::{HEAVY, Package, Workspace};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "deps",
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
-    details: "The transforms know no one here, technique crates the transforms, the engine knows techniques alone, the data set the engine and kinds of files, which know \
-              no one, the study and the viewer the data set and the server on loopback, which knows no one, the judge nobody, who reads recipes the engine, the program and the Python package all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
+    details: "The numerics know no one here, technique crates the numerics alone, the engine knows both, the data set the engine and kinds of files, which know \
+              no one, the study and the calibration the data set, the pages the data set and the study, the judge nobody, who reads recipes the engine, the program and the Python package all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -20,7 +19,8 @@ pub(crate) const CHORE: Chore = Chore {
 /// The place of a crate in the house.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Role {
-    Transforms,
+    /// What has the same bits everywhere: functions, random draws, transforms.
+    Numerics,
     Technique,
     Engine,
     /// Knows how a kind of file is laid out, and nothing of what is in it.
@@ -28,10 +28,11 @@ enum Role {
     Dataset,
     Judge,
     Match,
-    /// Talks with a browser on the same machine, and knows nothing of what about.
-    Loopback,
     Study,
-    View,
+    /// Pages in a browser on the same machine.
+    Web,
+    /// Measures microscopes and cameras.
+    Calibrate,
     /// Reads what people wrote.
     Recipes,
     Program,
@@ -44,7 +45,7 @@ enum Role {
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
 const PLACES: [(&str, Role); 24] = [
-    ("lane-fft", Role::Transforms),
+    ("portable-numerics", Role::Numerics),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
     ("cloth-verlet", Role::Technique),
@@ -58,9 +59,9 @@ const PLACES: [(&str, Role); 24] = [
     ("papsynth-zarr", Role::Container),
     ("papsynth-dataset", Role::Dataset),
     ("papsynth-judge", Role::Judge),
-    ("papsynth-loopback", Role::Loopback),
     ("papsynth-study", Role::Study),
-    ("papsynth-view", Role::View),
+    ("papsynth-calibrate", Role::Calibrate),
+    ("papsynth-web", Role::Web),
     ("papsynth-match", Role::Match),
     ("papsynth-recipe", Role::Recipes),
     ("papsynth-cli", Role::Program),
@@ -78,36 +79,39 @@ impl Role {
     /// Whom a crate in this place may depend on.
     fn may_know(self) -> &'static [Self] {
         match self {
-            // Who judges must not know what is judged, nor a kind of file what lies in it, nor a server what it serves.
-            Self::Transforms | Self::Container | Self::Judge | Self::Loopback | Self::Chores => &[],
-            // Those that compute in frequencies share the transforms.
-            Self::Technique => &[Self::Transforms],
-            Self::Engine => &[Self::Technique],
+            // Who judges must not know what is judged, nor a kind of file what lies in it.
+            Self::Numerics | Self::Container | Self::Chores => &[],
+            Self::Technique | Self::Judge => &[Self::Numerics],
+            Self::Engine => &[Self::Numerics, Self::Technique],
             // It must run where files and threads do not.
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
             Self::Recipes => &[Self::Engine],
             // It simulates with the one and measures with the other.
-            Self::Match => &[Self::Engine, Self::Judge],
+            Self::Match => &[Self::Numerics, Self::Engine, Self::Judge],
             // It shows files, whoever made them.
-            Self::Study => &[Self::Dataset, Self::Loopback],
-            // The same, and groups of truth are the engine's.
-            Self::View => &[Self::Engine, Self::Dataset, Self::Loopback],
+            Self::Study => &[Self::Numerics, Self::Dataset],
+            // It shows files and a study, and groups of truth are the engine's.
+            Self::Web => &[Self::Engine, Self::Dataset, Self::Study],
+            // It fits with techniques, finds regions as label images are read, and writes sections of recipes.
+            Self::Calibrate => &[Self::Numerics, Self::Technique, Self::Engine, Self::Dataset],
             // They time what is called from outside.
             Self::Benches => &[Self::Technique, Self::Engine, Self::Dataset],
-            // It measures microscopes and cameras, which are no business of the engine.
+            // Errors of the techniques name options of its calibration.
             Self::Program => &[
                 Self::Technique,
                 Self::Engine,
                 Self::Dataset,
                 Self::Judge,
                 Self::Match,
-                Self::Loopback,
+                Self::Calibrate,
                 Self::Study,
-                Self::View,
+                Self::Web,
                 Self::Recipes,
             ],
-            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Judge, Self::Recipes],
+            Self::Python => {
+                &[Self::Technique, Self::Engine, Self::Dataset, Self::Calibrate, Self::Judge, Self::Recipes]
+            }
         }
     }
 }
@@ -115,7 +119,7 @@ impl Role {
 /// The crates that know techniques alone, for chores that build them without the rest.
 pub(crate) fn pure_crates(workspace: &Workspace) -> impl Iterator<Item = &str> {
     let names = workspace.packages.iter().map(|package| package.name.as_str());
-    names.filter(|name| matches!(Role::of(name), Some(Role::Transforms | Role::Technique | Role::Engine)))
+    names.filter(|name| matches!(Role::of(name), Some(Role::Numerics | Role::Technique | Role::Engine)))
 }
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {

@@ -75,7 +75,7 @@ fn narrow(charge: u64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hash::SplitMix;
+    use portable_numerics::random::{Rng, SplitMix64};
 
     fn sum(charge: &[u32]) -> u64 {
         charge.iter().map(|&c| u64::from(c)).sum()
@@ -84,11 +84,11 @@ mod tests {
     #[test]
     fn charge_is_conserved_to_the_electron() {
         let (width, well) = (37, 18_000);
-        let mut words = SplitMix(20);
+        let mut words = SplitMix64::new(20);
         for vertical in [0.0, 0.3, 0.9, 1.0] {
             for anti_blooming in [0.0, 0.2, 1.0] {
                 let mut charge: Vec<u32> =
-                    (0..width * 23).map(|_| u32::try_from(words.next() >> 51).unwrap()).collect();
+                    (0..width * 23).map(|_| u32::try_from(words.next_u64() >> 51).unwrap()).collect();
                 for bright in [0, 36, 37 * 11 + 20, 37 * 12 + 20, 37 * 22, 37 * 23 - 1] {
                     charge[bright] = 16_777_216;
                 }

@@ -1,6 +1,6 @@
 //! Random words as a pure function of key and position.
 
-use crate::normal::normal_pairs;
+use portable_numerics::random::{Rng, SplitMix64, normals_of_words};
 
 /// Pixels that are worked on together: enough to fill the widest vector registers several times.
 pub(crate) const BLOCK: usize = BLOCK_STEP as usize;
@@ -34,10 +34,10 @@ pub(crate) struct RowWords {
 impl RowWords {
     #[expect(clippy::cast_possible_truncation, reason = "upper and lower halves of words")]
     pub(crate) fn new(key: u64, y: u32) -> Self {
-        let mut words = SplitMix(key ^ SplitMix(u64::from(y)).next());
-        let [a, b, c] = [words.next(), words.next(), words.next()];
+        let mut words = SplitMix64::new(key ^ SplitMix64::word(u64::from(y), 0));
+        let [a, b, c] = [0; 3].map(|_| words.next_u64());
         let streams = [(a >> 32) as u32, b as u32, (b >> 32) as u32, (c >> 32) as u32];
-        Self { start: a as u32, streams, rare: words.next() }
+        Self { start: a as u32, streams, rare: words.next_u64() }
     }
 
     /// The pixels from `x` on, hashed once for all streams.
@@ -81,14 +81,14 @@ impl Block<'_> {
     /// Two standard normal deviates for each pixel, from any two streams.
     #[inline(always)]
     pub(crate) fn normal_pairs_of(&self, radii: Stream, angles: Stream) -> [[f32; BLOCK]; 2] {
-        normal_pairs(&self.words(radii), &self.words(angles))
+        normals_of_words(&self.words(radii), &self.words(angles))
     }
 
     /// As many further words as wanted for one pixel.
     #[expect(clippy::cast_possible_truncation, reason = "an index below the block's length")]
-    pub(crate) fn rare(&self, i: usize) -> SplitMix {
+    pub(crate) fn rare(&self, i: usize) -> SplitMix64 {
         let x = self.x.wrapping_add(i as u32);
-        SplitMix(SplitMix(self.row.rare ^ u64::from(x)).next())
+        SplitMix64::new(SplitMix64::word(self.row.rare ^ u64::from(x), 0))
     }
 }
 
@@ -101,26 +101,6 @@ fn mix(mut x: u32) -> u32 {
     x ^ (x >> 15)
 }
 
-/// Steele, Lea and Flood's SplitMix64 (doi:10.1145/2714064.2660195).
-#[derive(Debug, Clone)]
-pub(crate) struct SplitMix(pub(crate) u64);
-
-impl SplitMix {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform, strictly between 0 and 1.
-    pub(crate) fn uniform(&mut self) -> f64 {
-        const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-        ((self.next() >> 11) as f64 + 0.5) * STEP
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,14 +109,14 @@ mod tests {
     #[test]
     fn every_bit_moves_every_bit() {
         let word = |key: u64, y: u32, x: u32, s: Stream| RowWords::new(key, y).block(x).words(s)[0];
-        let small = |words: &mut SplitMix| u32::try_from(words.next() >> 48).unwrap();
+        let small = |words: &mut SplitMix64| u32::try_from(words.next_u64() >> 48).unwrap();
         let samples = 4000;
         for stream in [Stream::Radius, Stream::Angle, Stream::Chance, Stream::Fine] {
             for bit in [0, 1, 2, 5, 10, 17, 31] {
                 let mut flips = [[0_u32; 32]; 3];
-                let mut inputs = SplitMix(7);
+                let mut inputs = SplitMix64::new(7);
                 for _ in 0..samples {
-                    let (key, y, x) = (inputs.next(), small(&mut inputs), small(&mut inputs));
+                    let (key, y, x) = (inputs.next_u64(), small(&mut inputs), small(&mut inputs));
                     let here = word(key, y, x, stream);
                     let moved = [
                         word(key ^ (1 << bit), y, x, stream),
@@ -165,7 +145,7 @@ mod tests {
         for (i, word) in whole.into_iter().enumerate() {
             let alone = row.block((u32::MAX - 20).wrapping_add(u32::try_from(i).unwrap()));
             assert_eq!(alone.words(Stream::Radius)[0], word);
-            assert_eq!(alone.rare(0).next(), row.block(u32::MAX - 20).rare(i).next());
+            assert_eq!(alone.rare(0).next_u64(), row.block(u32::MAX - 20).rare(i).next_u64());
         }
     }
 }

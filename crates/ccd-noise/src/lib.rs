@@ -9,7 +9,6 @@ mod error;
 mod field;
 mod hash;
 mod jpeg;
-mod normal;
 mod params;
 mod pattern;
 mod poisson;

@@ -1,7 +1,9 @@
 //! What makes the pixels of one camera differ: a pure function of its serial number and the place.
 
+use portable_numerics::random::SplitMix64;
+
 use crate::CameraParams;
-use crate::hash::{BLOCK, RowWords, SplitMix, Stream};
+use crate::hash::{BLOCK, RowWords, Stream};
 
 /// The fixed pattern of a camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +41,7 @@ impl Pattern {
         let spread = params.read_noise.spread() as f32;
         let uneven = params.prnu > 0.0 || params.dsnu_e > 0.0 || spread > 0.0;
         uneven.then(|| Self {
-            key: SplitMix(params.serial ^ CAMERAS).next(),
+            key: SplitMix64::word(params.serial ^ CAMERAS, 0),
             prnu: params.prnu as f32,
             dsnu: params.dsnu_e as f32,
             read_noise,

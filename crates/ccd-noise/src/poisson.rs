@@ -1,6 +1,9 @@
 //! Poisson deviates: whole blocks without a branch, and an exact finish for the few that need it.
 
-use crate::hash::{BLOCK, Block, SplitMix, Stream};
+use portable_numerics::elementary::exp_f64;
+use portable_numerics::random::{SplitMix64, open_uniform, open_unit};
+
+use crate::hash::{BLOCK, Block, Stream};
 
 /// Below this mean a deviate is found by summing probabilities, above it from a normal deviate.
 /// Both are exact; here they take about the same time.
@@ -70,7 +73,7 @@ fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32
         for i in 0..FEW {
             mean[i] = f64::from(means[at + i]);
             uniform[i] = (f64::from(high[at + i]) + (f64::from(low[at + i]) + 0.5) * STEP) * STEP;
-            term[i] = exp(-mean[i]);
+            term[i] = exp_f64(-mean[i]);
         }
         let mut sum = term;
         let mut count = [0_u64; FEW];
@@ -95,25 +98,6 @@ fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32
     counts
 }
 
-/// eˣ for |x| < 700, relative error below 1e-14.
-#[inline(always)]
-fn exp(x: f64) -> f64 {
-    /// 1.5 · 2⁵²: adding it rounds to an integer, which the lowest bits then hold.
-    const ROUND: f64 = 6_755_399_441_055_744.0;
-    let shifted = ROUND + x * core::f64::consts::LOG2_E;
-    let power = shifted - ROUND;
-    let rest = (x - power * 0.693_147_180_369_123_8) - power * 1.908_214_929_270_587_7e-10;
-    // Taylor, as rest is at most ln 2 / 2: even and odd powers side by side.
-    let square = rest * rest;
-    let (mut even, mut odd) = (1.0 / 479_001_600.0, 1.0 / 39_916_800.0);
-    for (a, b) in [(3_628_800.0, 362_880.0), (40_320.0, 5_040.0), (720.0, 120.0), (24.0, 6.0), (2.0, 1.0)] {
-        even = even * square + 1.0 / a;
-        odd = odd * square + 1.0 / b;
-    }
-    let e = (even * square + 1.0) + odd * rest;
-    e * f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
-}
-
 /// Ahrens and Dieter's PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate but for
 /// the lack of skewness. Where K falls short of µ it is given up with a probability of nearly
 /// (µ - K)³/6µ², 0.13/√µ on the whole, for a deviate from what is missing above µ.
@@ -135,7 +119,7 @@ fn from_normals(
         counts[i] = whole + step;
         let short = part - step;
         // The squeeze: certain to be kept, for K >= µ in any case.
-        let kept = short * short * short <= 6.0 * mean * mean * uniform(chances[i]);
+        let kept = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
         open[i] = u32::from(!(kept & (counts[i] >= 0.0)));
     }
     for at in (0..BLOCK).step_by(16) {
@@ -144,17 +128,11 @@ fn from_normals(
         }
         for i in at..at + 16 {
             if open[i] != 0 && means[i] >= SUMMED_BELOW {
-                counts[i] = finish(means[i], counts[i], uniform(chances[i]), block.rare(i));
+                counts[i] = finish(means[i], counts[i], open_unit(chances[i]), block.rare(i));
             }
         }
     }
     counts
-}
-
-#[inline(always)]
-fn uniform(word: u32) -> f32 {
-    const STEP: f32 = 1.0 / 4_294_967_296.0;
-    (word as f32 + 0.5) * STEP
 }
 
 /// What the squeeze left open, for one pixel: the quotient test, and if `count` fails it, a deviate
@@ -162,7 +140,7 @@ fn uniform(word: u32) -> f32 {
 #[cold]
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "counts are exact in single precision")]
-fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix) -> f32 {
+fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
     let law = Law::new(mean);
     let count = f64::from(count);
     if count >= 0.0 && 1.0 - f64::from(chance) <= law.ratio(count) {
@@ -170,8 +148,8 @@ fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix) -> f32 {
     }
     // Under a double exponential centred where the excess is greatest.
     loop {
-        let height = words.uniform();
-        let side = 2.0 * words.uniform() - 1.0;
+        let height = open_uniform(&mut words);
+        let side = 2.0 * open_uniform(&mut words) - 1.0;
         let from_centre = -libm::log(height);
         let t = EXCESS_CENTRE + if side < 0.0 { -from_centre } else { from_centre };
         if t <= EXCESS_START {
@@ -189,7 +167,7 @@ fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix) -> f32 {
 const EXCESS_START: f64 = -0.6744;
 /// Where the excess is greatest, in standard deviations.
 const EXCESS_CENTRE: f64 = 1.8;
-/// The greatest value of µ · excess / exp(-|t - centre|).
+/// The greatest value of µ · excess / exp_f64(-|t - centre|).
 const EXCESS_BOUND: f64 = 0.1069;
 
 /// The distribution wanted and that of the proposals, for one mean of 10 or more.
@@ -207,7 +185,7 @@ impl Law {
     /// The probability that ⌊µ + √µ·z⌋ = k for a normal z.
     fn proposed(&self, count: f64) -> f64 {
         let x = self.middle(count);
-        let density = exp(-0.5 * x * x) / (core::f64::consts::TAU * self.mean).sqrt();
+        let density = exp_f64(-0.5 * x * x) / (core::f64::consts::TAU * self.mean).sqrt();
         density * self.bin(x)
     }
 
@@ -217,7 +195,7 @@ impl Law {
         let normal = 0.5 * x * x;
         if count < 10.0 {
             let factorial = (1..=10).map(f64::from).take_while(|&k| k <= count).product::<f64>();
-            let poisson = exp(count * libm::log(self.mean) - self.mean + normal) / factorial;
+            let poisson = exp_f64(count * libm::log(self.mean) - self.mean + normal) / factorial;
             return poisson * (core::f64::consts::TAU * self.mean).sqrt() / self.bin(x);
         }
         // Stirling's series; from 10 on it is exact to 6e-11.
@@ -226,7 +204,7 @@ impl Law {
         let stirling = inverse * (1.0 / 12.0 - square * (1.0 / 360.0 - square * (1.0 / 1260.0)));
         let short = self.mean - count;
         let exponent = count * libm::log1p(short * inverse) - short - stirling + normal;
-        exp(exponent) * (self.mean * inverse).sqrt() / self.bin(x)
+        exp_f64(exponent) * (self.mean * inverse).sqrt() / self.bin(x)
     }
 
     /// The middle of the bin of proposals that stand for a count, in standard deviations.
@@ -294,14 +272,6 @@ mod tests {
                     assert!(excess <= bound, "{mean}: {k}");
                 }
             }
-        }
-    }
-
-    #[test]
-    fn exp_is_exp() {
-        for i in -20_000..20_000 {
-            let x = f64::from(i) * 0.02;
-            assert!((exp(x) / libm::exp(x) - 1.0).abs() < 1e-14, "{x}");
         }
     }
 }

@@ -1,9 +1,10 @@
 //! The flat sheet before it is pressed, and the outline's way from there to its shape.
 
-use crate::lanes::Start;
+use crate::batch::Start;
 use crate::mesh::{Disc, cross};
 use crate::outline::{Outline, moments};
 use crate::{ClothParams, Point, Rest, Rng, Solver};
+use portable_numerics::random::uniform;
 use std::f64::consts::{PI, TAU};
 
 /// Stretches of the outline that press inwards more than the rest does.
@@ -22,13 +23,6 @@ const SMOOTH: [f64; 3] = [0.05, 0.033, 0.025];
 /// Least area of a triangle of the flat sheet, as part of the same triangle of the disc scaled to the sheet.
 const LEAST_TRIANGLE: f64 = 0.1;
 
-/// An even random number in 0..1 with 53 bits.
-fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
-    let bits = (rng.next_u64() >> 11) as f64;
-    bits / 9_007_199_254_740_992.0
-}
-
 /// Points that the outline of a sheet has while it moves.
 pub(crate) fn outline_points(disc: &Disc, params: &ClothParams) -> usize {
     match params.solver {
@@ -45,7 +39,7 @@ pub(crate) fn start<R: Rng + ?Sized>(
     params: &ClothParams,
     rng: &mut R,
 ) -> (Start, f64) {
-    let offset = unit(rng);
+    let offset = uniform(rng);
     let target = outline.resampled(outline_points(disc, params), offset);
     let (rest, from) = match params.rest {
         Rest::Disc => round(disc, &target, outline, excess, params),
@@ -58,7 +52,7 @@ pub(crate) fn start<R: Rng + ?Sized>(
         Solver::Verlet(p) => (p.lift, 0),
         Solver::Xpbd(p) => (p.lift, disc.rim),
     };
-    let heights = (0..rest.len()).map(|v| if v < held { 0.0 } else { lift * unit(rng) }).collect();
+    let heights = (0..rest.len()).map(|v| if v < held { 0.0 } else { lift * uniform(rng) }).collect();
     (Start { rest, heights, outline: [from, target] }, offset)
 }
 
@@ -138,7 +132,7 @@ fn grown<R: Rng + ?Sized>(target: &[Point], excess: f64, rng: &mut R) -> Vec<Poi
         .collect();
     let normals = smoothed(&normals, SMOOTH[1]);
     let pushes: [[f64; 3]; PUSHES] = std::array::from_fn(|_| {
-        [unit(rng), PUSH_WIDTH.0 + PUSH_WIDTH.1 * unit(rng), PUSH_DEPTH.0 + PUSH_DEPTH.1 * unit(rng)]
+        [uniform(rng), PUSH_WIDTH.0 + PUSH_WIDTH.1 * uniform(rng), PUSH_DEPTH.0 + PUSH_DEPTH.1 * uniform(rng)]
     });
     let push = |k: usize| -> Point {
         let n = normals[k];

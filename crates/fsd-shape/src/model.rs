@@ -1,16 +1,15 @@
 //! New outlines drawn from the statistics of old ones.
 
+use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
 
 use crate::Error;
+use crate::coordinates::{add_scaled, finest_coarse, order, terms};
 use crate::crossing::self_intersects;
 use crate::descriptors::{Descriptors, modulus};
 use crate::dft::multiply;
-use crate::fit::{order, terms};
 use crate::outline::{Point, count_as_f64};
-use crate::pca::add_scaled;
-use crate::roughness::{LEAST_FOR_LOCAL, finest_coarse};
-use crate::sample::{Bend, Normals, uniform};
+use crate::sample::Bend;
 use crate::statistics::{Residual, ShapeStatistics};
 use crate::steps::from_steps;
 
@@ -23,6 +22,9 @@ const FEWEST_CHECKS: usize = 64;
 /// Harmonics of the modulation of roughness, as a share of the curve's: at an eighth (5 of 40) the patches of rough and smooth outline
 /// are as long as real ones.
 const MODULATION_SHARE: usize = 8;
+
+/// Fewest harmonics at which roughness can vary along the outline.
+pub(crate) const LEAST_FOR_LOCAL: usize = 16;
 
 /// A population of shapes, from which new ones are drawn.
 ///
@@ -63,8 +65,7 @@ impl ShapeModel {
 
     /// A radius |u₁| in px, log-normal as in the outlines fitted.
     pub fn draw_radius<R: Rng + ?Sized>(&self, rng: &mut R) -> f64 {
-        let normal = Normals::new(rng).draw();
-        libm::exp(self.statistics.ln_radius_mean + self.statistics.ln_radius_sd * normal)
+        libm::exp(self.statistics.ln_radius_mean + self.statistics.ln_radius_sd * normal(rng))
     }
 
     /// A new shape of radius |u₁| = `radius_px`, in a random rotation.
@@ -83,7 +84,7 @@ impl ShapeModel {
         for rejected in 0..TRIES {
             let mut terms = self.draw_terms(rng);
             let size = modulus(terms[harmonics + 1]);
-            let turn = crate::dft::unit(core::f64::consts::TAU * uniform(rng));
+            let turn = crate::dft::unit(direction(rng));
             let scale = [turn[0] * radius_px / size, turn[1] * radius_px / size];
             for u in &mut terms {
                 *u = multiply(*u, scale);

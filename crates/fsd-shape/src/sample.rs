@@ -1,40 +1,4 @@
-//! Random numbers: uniform, normal, and normal bent to a given skewness and kurtosis.
-
-use rand_core::Rng;
-
-/// Uniform in 0..1, 53 bits.
-pub(crate) fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-    (rng.next_u64() >> 11) as f64 * STEP
-}
-
-/// Standard normals in pairs by Marsaglia's polar method (doi:10.1137/1006063).
-pub(crate) struct Normals<'a, R: Rng + ?Sized> {
-    rng: &'a mut R,
-    spare: Option<f64>,
-}
-
-impl<'a, R: Rng + ?Sized> Normals<'a, R> {
-    pub(crate) fn new(rng: &'a mut R) -> Self {
-        Self { rng, spare: None }
-    }
-
-    pub(crate) fn draw(&mut self) -> f64 {
-        if let Some(spare) = self.spare.take() {
-            return spare;
-        }
-        loop {
-            let x = 2.0 * uniform(self.rng) - 1.0;
-            let y = 2.0 * uniform(self.rng) - 1.0;
-            let s = x * x + y * y;
-            if s > 0.0 && s < 1.0 {
-                let scale = (-2.0 * libm::log(s) / s).sqrt();
-                self.spare = Some(scale * y);
-                return scale * x;
-            }
-        }
-    }
-}
+//! Normal numbers bent to a given skewness and kurtosis.
 
 /// Fleishman's polynomial −c + bz + cz² + dz³ of a standard normal z: mean 0, variance 1, and the skewness and excess
 /// kurtosis asked for (doi:10.1007/BF02293811).
@@ -129,6 +93,7 @@ fn solve(m: [[f64; 3]; 3], y: [f64; 3]) -> Option<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portable_numerics::random::Normals;
     use rand_core::SeedableRng;
     use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -138,30 +103,6 @@ mod tests {
         let central = |k: usize| values.iter().map(|v| [v - mean; 4][..k].iter().product::<f64>()).sum::<f64>() / n;
         let var = central(2);
         [mean, var, central(3) / (var * var.sqrt()), central(4) / (var * var) - 3.0]
-    }
-
-    #[test]
-    fn normals_have_normal_moments() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x40A1);
-        let mut normals = Normals::new(&mut rng);
-        let values: Vec<f64> = (0..200_000).map(|_| normals.draw()).collect();
-        let [mean, var, skew, kurtosis] = moments(&values);
-        let n = values.len() as f64;
-        // Standard errors of the four moments of a normal sample; bound 4.
-        assert!(mean.abs() < 4.0 * (1.0 / n).sqrt());
-        assert!((var - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
-        assert!(skew.abs() < 4.0 * (6.0 / n).sqrt());
-        assert!(kurtosis.abs() < 4.0 * (24.0 / n).sqrt());
-    }
-
-    #[test]
-    fn uniforms_fill_the_unit_interval() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0F0);
-        let values: Vec<f64> = (0..100_000).map(|_| uniform(&mut rng)).collect();
-        assert!(values.iter().all(|v| (0.0..1.0).contains(v)));
-        let [mean, var, ..] = moments(&values);
-        assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / 1e5_f64).sqrt());
-        assert!((var - 1.0 / 12.0).abs() < 4.0 * (1.0 / 180.0 / 1e5_f64).sqrt());
     }
 
     #[test]

@@ -16,7 +16,7 @@ const SIDE: usize = 192;
 const PANEL: usize = SIDE / 2;
 
 const DEPTHS_UM: [f64; 4] = [0.0, 1.0, 2.0, 4.0];
-const SPECK_UM: [f64; 4] = [-3.0, -1.0, 1.0, 3.0];
+const SPECK_UM: [f64; 4] = [3.0, 1.0, -1.0, -3.0];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "target/bright_field.png".to_owned());

@@ -1,7 +1,7 @@
 use core::f64::consts::PI;
 
-use lane_fft::{ComplexPlane, PlaneScratch};
 use num_complex::Complex64;
+use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
 use crate::error::{Error, require_count};
 use crate::grid::{LONGEST_SIDE, signed};
@@ -152,7 +152,7 @@ impl Abbe {
             assert_eq!(layer.amplitude().len(), samples, "a layer has other samples than the grid");
         }
         let mut layers: Vec<&Layer> = layers.iter().collect();
-        layers.sort_by(|a, b| b.depth_um().total_cmp(&a.depth_um()));
+        layers.sort_by(|a, b| a.depth_um().total_cmp(&b.depth_um()));
         let mut image = vec![0.0; samples];
         let Some(first) = layers.first() else {
             image.fill(1.0);

@@ -20,8 +20,8 @@ pub struct BrightFieldParams {
     pub height: usize,
     /// What lies outside. Default 64 samples of empty slide, ours.
     pub padding: Padding,
-    /// Depths of the slabs below the focal plane of the stage at rest, each −1000 to 1000 µm, as
-    /// for [`Microscope::transfer`]. Default one at 0, ours.
+    /// Depths of the slabs about the focal plane of the stage at rest, positive towards the objective, each −1000 to
+    /// 1000 µm, as for [`Microscope::transfer`]. Default one at 0, ours.
     pub depths_um: Vec<f64>,
     /// Travels of the stage at which pictures are taken, each −1000 to 1000 µm. Default one at 0,
     /// ours.

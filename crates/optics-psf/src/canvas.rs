@@ -1,7 +1,7 @@
 use multiversion::multiversion;
+use portable_numerics::elementary::exp_f32;
 
 use crate::Microscope;
-use crate::exp::exp;
 use crate::filter::{Block, Filter, Lattice, Part};
 use crate::lane_plane::{LanePlane, LaneScratch, LaneSupport, STRIPE};
 use crate::lanes::{LANES, LanePlans, Lanes, ZERO};
@@ -395,7 +395,7 @@ fn transmit<const FIRST: bool>(product: &mut [f32], width: usize, left: usize, l
 fn delay(product: &mut [f32], width: usize, left: usize, phases: &[Lanes], factor: f32) {
     for (row, phases) in product.chunks_exact_mut(width).zip(phases) {
         for (product, v) in row[left..].iter_mut().zip(phases.as_flattened()) {
-            *product *= exp(factor * v);
+            *product *= exp_f32(factor * v);
         }
     }
 }
@@ -406,6 +406,14 @@ pub(crate) fn amplitude(line: &mut [f32]) {
     for v in line {
         // (1 − T)/(1 + √T) keeps the digits of little absorption.
         *v /= 1.0 + (1.0 - *v).max(0.0).sqrt();
+    }
+}
+
+/// From absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11).
+#[multiversion(targets = "simd")]
+pub(crate) fn absorbed(values: &mut [f32]) {
+    for value in values {
+        *value = 1.0 - exp_f32(-*value * core::f32::consts::LN_10);
     }
 }
 
@@ -478,5 +486,16 @@ mod tests {
                 assert!(error < 5e-4, "{na} {condenser_na} {depth}: {error}");
             }
         }
+    }
+
+    #[test]
+    fn absorbed_shares_are_those_of_the_library_function() {
+        let absorbance: Vec<f32> = (0..6000).map(|i| i as f32 * 0.001).collect();
+        let mut shares = absorbance.clone();
+        absorbed(&mut shares);
+        for (a, share) in absorbance.iter().zip(&shares) {
+            assert!((f64::from(*share) - (1.0 - libm::exp10(-f64::from(*a)))).abs() < 3e-7, "{a}");
+        }
+        assert_eq!(shares[0], 0.0);
     }
 }

@@ -38,7 +38,8 @@ impl Ladder {
 
     /// The transfer function at a depth and travel of the stage, of whatever was asked for before.
     pub(crate) fn transfer(&self, depth_um: f64, stage_um: f64) -> Transfer {
-        let position = depth_um / self.step_um;
+        // Rungs are counted away from the objective.
+        let position = -depth_um / self.step_um;
         let below = position.floor();
         let t = position - below;
         #[expect(clippy::cast_possible_truncation, reason = "depths are at most 1000 µm")]
@@ -65,7 +66,7 @@ impl Ladder {
         };
         let make = |(number, known): (i64, Option<Arc<Transfer>>)| {
             known.unwrap_or_else(|| {
-                let transfer = Arc::new(Transfer::new(&self.microscope, number as f64 * self.step_um, stage_um));
+                let transfer = Arc::new(Transfer::new(&self.microscope, -(number as f64) * self.step_um, stage_um));
                 let mut made = lock();
                 if made.len() * transfer.numbers() >= MOST_NUMBERS {
                     made.clear();

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
-use lane_fft::transposed;
 use multiversion::multiversion;
+use portable_numerics::fourier::transposed;
 
 use crate::grid::signed;
 use crate::lanes::{LANES, LaneFft, LanePlans, Lanes, ZERO};
@@ -218,7 +218,7 @@ impl LanePlane {
     }
 }
 
-type Square = lane_fft::Square<f32, LANES>;
+type Square = portable_numerics::fourier::Square<f32, LANES>;
 
 /// Not by `map`, which is a function of its own, without vectors.
 #[inline(always)]

@@ -1,12 +1,12 @@
 //! Sequences side by side, as they are transformed.
 
-pub(crate) use lane_fft::{LaneFft, ZERO};
+pub(crate) use portable_numerics::fourier::{LaneFft, ZERO};
 
 /// Sequences side by side: a cache line of single precision.
 pub(crate) const LANES: usize = 16;
 
 /// A complex number of each sequence: real parts, imaginary parts. Or two runs of real numbers, one after the other.
-pub(crate) type Lanes = lane_fft::Lanes<f32, LANES>;
+pub(crate) type Lanes = portable_numerics::fourier::Lanes<f32, LANES>;
 
 /// Transforms of all lengths that were asked for.
-pub(crate) type LanePlans = lane_fft::Plans<f32>;
+pub(crate) type LanePlans = portable_numerics::fourier::Plans<f32>;

@@ -10,8 +10,8 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// A layer of complex amplitudes, real and imaginary part, `depth_um` below the focal plane
-    /// (negative above it) when the stage has not moved.
+    /// A layer of complex amplitudes, real and imaginary part, at a depth about the focal plane when the stage has not
+    /// moved, positive towards the objective.
     ///
     /// # Errors
     ///
@@ -49,7 +49,7 @@ impl Layer {
         Ok(layer)
     }
 
-    /// How far below the focal plane, µm.
+    /// Depth about the focal plane, µm, positive towards the objective.
     #[must_use]
     pub fn depth_um(&self) -> f64 {
         self.depth_um

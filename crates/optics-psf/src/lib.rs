@@ -7,7 +7,6 @@ pub mod calibrate;
 mod canvas;
 mod curve;
 mod error;
-mod exp;
 mod filter;
 mod fir;
 mod focus;

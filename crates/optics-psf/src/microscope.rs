@@ -134,10 +134,10 @@ impl Microscope {
 
     /// How the microscope transfers detail: see [`Transfer`].
     ///
-    /// `depth_um` is how far the detail lies below the focal plane of the stage at rest, in the
-    /// mountant, away from the objective; `stage_um` how far the stage was then lowered from the objective,
-    /// in the immersion medium. Both blur, and they are not the same: to focus on what lies d
-    /// deeper, the stage is raised by about d / `mount_index` if the lens is dry.
+    /// `depth_um` is the depth of the detail about the focal plane of the stage at rest, in the mountant, positive
+    /// towards the objective; `stage_um` how far the stage was then lowered from the objective, in the immersion medium.
+    /// Both blur, and they are not the same: to focus on what lies d nearer to the objective, the stage is lowered by
+    /// about d / `mount_index` if the lens is dry.
     ///
     /// # Errors
     ///
@@ -149,7 +149,7 @@ impl Microscope {
     /// The error of the wavefront at a point of the pupil, in waves, for the middle of the band.
     /// The point is a direction: its numerical apertures along x and y, together at most `na`.
     ///
-    /// W = depth·γ_n + stage·γ_1 + Gibson and Lanni's cover glass + Zernike, with
+    /// W = −depth·γ_n + stage·γ_1 + Gibson and Lanni's cover glass + Zernike, with
     /// γ_n(f) = √((n/λ)² − f²), each zero in the centre; `depth_um` and `stage_um` as for
     /// [`Microscope::transfer`].
     #[must_use]
@@ -171,9 +171,9 @@ impl Microscope {
         pupil.steepest(pupil.condenser).max(pupil.cone_radius())
     }
 
-    /// How far something at that depth is from focus, µm of mountant; below it is positive.
+    /// How far something at that depth is from focus, µm of mountant; positive below the plane in focus.
     pub(crate) fn defocus_um(&self, depth_um: f64, stage_um: f64) -> f64 {
-        depth_um + stage_um * self.params.mount_index / self.params.immersion_index
+        stage_um * self.params.mount_index / self.params.immersion_index - depth_um
     }
 
     /// Wavelengths of the band, µm, and their weights, which sum to 1.

@@ -25,15 +25,16 @@ pub(crate) struct Pupil {
 }
 
 impl Pupil {
-    /// `depth_um`: how far the object lies below the focal plane, in the mountant; `stage_um`: how
-    /// far the stage was lowered from the lens.
+    /// `depth_um`: depth of the object about the focal plane, in the mountant, positive towards the objective; `stage_um`:
+    /// how far the stage was lowered from the lens.
     pub(crate) fn new(params: &MicroscopeParams, wavelength_um: f64, depth_um: f64, stage_um: f64) -> Self {
         let way = |length, index| Way::new(length, index, wavelength_um);
         // Gibson and Lanni, DOI 10.1364/JOSAA.8.001601: δ (γ_g − (n_i/n_g) γ_i), the glass and the
         // immersion it displaces when paraxial rays are focused again.
         let cover = params.cover_error_um;
         let media = [
-            way(depth_um, params.mount_index),
+            // The only place where the sign turns: light's way through the mountant is longer from below the focal plane.
+            way(-depth_um, params.mount_index),
             way(stage_um, params.immersion_index),
             way(cover, COVER_INDEX),
             way(-cover * params.immersion_index / COVER_INDEX, params.immersion_index),

@@ -1,6 +1,5 @@
 use crate::BrightField;
-use crate::canvas::{Memory, Samples, Spectra, absorbed_of, amplitude, is_lit};
-use crate::exp::absorbed;
+use crate::canvas::{Memory, Samples, Spectra, absorbed, absorbed_of, amplitude, is_lit};
 use crate::filter::{Filter, Lattice};
 use crate::lanes::Lanes;
 use crate::light::{lift, mean_of_pixels};

@@ -1,11 +1,12 @@
 //! The paper's comparison of nuclear textures.
 
+use portable_numerics::random::shuffle;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use crate::number::{nearest, whole};
-use crate::statistics::{deviation, mean, median, of_sorted, quantile, shuffle};
+use crate::statistics::{deviation, mean, median, of_sorted, quantile};
 use crate::table::Table;
 
 /// Grey levels of a histogram.
@@ -209,12 +210,7 @@ fn halves<'a>(tables: &[&'a Table], rng: &mut Xoshiro256PlusPlus) -> [Vec<&'a Ta
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::below;
-
-    fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
-        // The sum of twelve uniform numbers.
-        (0..12).map(|_| below(1 << 30, rng) as f64 / f64::from(1 << 30)).sum::<f64>() - 6.0
-    }
+    use portable_numerics::random::normal;
 
     #[test]
     fn moments_and_entropy_of_two_levels_are_known() {

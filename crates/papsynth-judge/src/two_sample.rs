@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use portable_numerics::random::{below, shuffle};
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::forest::{Forest, Rows};
 use crate::number::single;
-use crate::statistics::{auc, below, deviation, mean, median, of_sorted, shuffle, weighted_auc};
+use crate::statistics::{auc, deviation, mean, median, of_sorted, weighted_auc};
 use crate::table::{Family, Feature, Table};
 
 /// How the classifier is tried.

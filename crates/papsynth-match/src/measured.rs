@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use crate::error::Error;
 use crate::interval::{of_deviation, of_mean};
 use crate::noise::{Empty, pattern};
-use crate::number::{deviation, mean, quantile};
 use crate::parameter::Parameter;
 use crate::recipe::{LEVELS, Spreads};
 use crate::regression::Estimate;
 use crate::view::View;
+use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// A slide darker than this, of 255, is none.
 const DARK: f64 = 20.0;

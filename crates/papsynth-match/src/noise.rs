@@ -1,6 +1,8 @@
 //! Noise beyond that of the empty slide: how it goes with light, what of it is the same in all fields, how uneven light is.
 
-use crate::number::{mean, quantile, single};
+use portable_numerics::statistics::{deviation, mean, quantile};
+
+use crate::number::single;
 use crate::small::blur;
 
 /// Side of the blocks that noise is compared in, pixels.
@@ -204,7 +206,7 @@ pub(crate) fn pattern(fields: &[Vec<f32>]) -> Option<[f64; 2]> {
     }
     let pairs = products.len();
     // Pairs share fields: as many are independent as there are fields.
-    let sd = if pairs > 1 { crate::number::deviation(&products) } else { mean(&products).abs() };
+    let sd = if pairs > 1 { deviation(&products) } else { mean(&products).abs() };
     (pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()])
 }
 

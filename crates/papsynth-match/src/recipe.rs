@@ -451,7 +451,7 @@ pub(crate) fn spread(number: &Number) -> f64 {
             Law::Uniform(a, b) => relative((b - a) / 12.0_f64.sqrt()),
             Law::Normal(_, sd) => relative(*sd),
             Law::LogNormal(_, log_sd) => *log_sd,
-            Law::Choice(values) => relative(crate::number::deviation(values)),
+            Law::Choice(values) => relative(portable_numerics::statistics::deviation(values)),
         },
     }
 }

@@ -73,7 +73,7 @@ impl Forward {
 /// Root of the mean square of distances, far ones in proportion.
 pub(crate) fn distance(apart: &[f64]) -> f64 {
     let known: Vec<f64> = apart.iter().filter(|z| z.is_finite()).map(|z| robust(*z)).collect();
-    crate::number::mean(&known).sqrt()
+    portable_numerics::statistics::mean(&known).sqrt()
 }
 
 fn robust(z: f64) -> f64 {

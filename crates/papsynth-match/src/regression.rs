@@ -9,8 +9,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::number::{deviation, mean};
 use crate::ridge::{FOLDS, Features, Ridge};
+use portable_numerics::statistics::{deviation, mean};
 
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -265,12 +265,13 @@ impl Reach {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_core::{Rng, SeedableRng};
+    use portable_numerics::random::uniform;
+    use rand_core::SeedableRng;
 
     /// Statistics that bend, disturbed, of two parameters, and a third that shows in none.
     fn rows(seed: u64, count: usize) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut one = || (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let mut one = || uniform(&mut rng);
         let places: Vec<Vec<f64>> = (0..count).map(|_| vec![one(), one(), one()]).collect();
         let statistics = places
             .iter()

@@ -58,7 +58,7 @@ impl Features {
 
     /// The ridge through values whose error on unseen rows is least.
     pub(crate) fn best(&self, y: &[f64]) -> Ridge {
-        let mean = crate::number::mean(y);
+        let mean = portable_numerics::statistics::mean(y);
         let centred = DVector::from_iterator(y.len(), y.iter().map(|v| v - mean));
         let turned = self.turned.tr_mul(&centred);
         let mut best = Ridge { mean, factors: vec![0.0; self.back.nrows()], unseen: Vec::new(), error: f64::MAX };
@@ -115,7 +115,7 @@ mod tests {
             let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..p).map(|j| at(i, j)).collect()).collect();
             let y: Vec<f64> = rows.iter().enumerate().map(|(i, r)| r[0] + f64::from(u8::from(i % 3 == 0))).collect();
             let found = Features::new(&rows).best(&y);
-            let mean = crate::number::mean(&y);
+            let mean = portable_numerics::statistics::mean(&y);
             let scale = rows.iter().flatten().map(|v| v * v).sum::<f64>() / n as f64;
             // The slow way, with each penalty, a fold left out and the mean kept.
             let factors = |penalty: f64, kept: &dyn Fn(usize) -> bool| {

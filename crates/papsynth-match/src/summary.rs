@@ -3,9 +3,9 @@
 use papsynth_judge::{Field, Picture, Statistics, Table};
 
 use crate::error::Error;
-use crate::number::{deviation, mean, quantile};
 use crate::view::View;
 use crate::{noise, small};
+use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// How a number enters.
 #[derive(Clone, Copy)]

@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use papsynth::key::Key;
-use rand_core::{Rng, SeedableRng};
+use portable_numerics::random::{shuffle, uniform};
+use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
@@ -174,32 +175,19 @@ fn latin(rows: usize, columns: usize, seed: u64) -> Vec<Vec<f64>> {
     let mut out = vec![vec![0.0; columns]; rows];
     for column in 0..columns {
         let mut order: Vec<usize> = (0..rows).collect();
-        for i in (1..rows).rev() {
-            order.swap(i, below(i + 1, &mut rng));
-        }
+        shuffle(&mut order, &mut rng);
         for (row, stratum) in out.iter_mut().zip(order) {
-            row[column] = (stratum as f64 + unit(&mut rng)) / rows as f64;
+            row[column] = (stratum as f64 + uniform(&mut rng)) / rows as f64;
         }
     }
     out
-}
-
-fn below<R: Rng + ?Sized>(bound: usize, rng: &mut R) -> usize {
-    usize::try_from((u128::from(rng.next_u64()) * bound as u128) >> 64).unwrap_or(0)
-}
-
-/// 0 to 1, one excluded.
-fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    /// 2⁻⁵³: as many bits as a number holds.
-    const STEP: f64 = 1.0 / 9_007_199_254_740_992.0;
-    (rng.next_u64() >> 11) as f64 * STEP
 }
 
 /// Unseen recipes for trials: places drawn evenly from the ranges of all parameters.
 #[must_use]
 pub fn unseen(count: usize, seed: u64) -> Vec<[f64; PARAMETERS.len()]> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    (0..count).map(|_| std::array::from_fn(|_| unit(&mut rng))).collect()
+    (0..count).map(|_| std::array::from_fn(|_| uniform(&mut rng))).collect()
 }
 
 #[cfg(test)]

@@ -406,7 +406,7 @@ fn gaussian<'py>(py: Python<'py>, image: Given<'py>, sigma_px: f64) -> PyResult<
 /// absorbance : array_like
 ///     (rows, columns), decadic, two samples a pixel.
 /// defocus_um : float
-///     How far below the plane in focus it lies.
+///     Depth about the plane in focus, positive towards the objective.
 /// na, condenser_na : float
 ///     Numerical apertures.
 ///
@@ -431,8 +431,7 @@ fn bright_field<'py>(
     let made = py.detach(|| {
         let params = optics_psf::MicroscopeParams { na, condenser_na, ..Default::default() };
         let microscope = optics_psf::Microscope::new(&params)?;
-        let params =
-            optics_psf::BrightFieldParams { width, height, depths_um: vec![-defocus_um], ..Default::default() };
+        let params = optics_psf::BrightFieldParams { width, height, depths_um: vec![defocus_um], ..Default::default() };
         let field = optics_psf::BrightField::new(&microscope, &params)?;
         let mut specimen = field.specimen();
         field.set_absorbance(&mut specimen, 0, &values);

@@ -1,10 +1,10 @@
 //! What a study asks: its parameters, and the order of its trials.
 
+use portable_numerics::random::{below, shuffle};
 use rand_core::Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::key::{below, shuffle};
 
 /// Longest name of a subject, bytes: it becomes the name of a folder.
 const LONGEST_NAME: usize = 64;

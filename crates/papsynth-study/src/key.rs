@@ -4,19 +4,6 @@ use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use sha2::{Digest, Sha256};
 
-/// Fisher and Yates.
-pub(crate) fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
-    for last in (1..items.len()).rev() {
-        items.swap(last, below(last + 1, rng));
-    }
-}
-
-/// A whole number from 0 up to but without `bound`, which is at least 1. Its bias is below 2⁻³² for bounds below 2³².
-pub(crate) fn below<R: Rng + ?Sized>(bound: usize, rng: &mut R) -> usize {
-    let product = u128::from(rng.next_u64()) * bound as u128;
-    usize::try_from(product >> u64::BITS).unwrap_or(0)
-}
-
 /// Uniform in (0, 1].
 pub(crate) fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     /// Bits of an f64's fraction.
@@ -91,14 +78,5 @@ mod tests {
         ] {
             assert_ne!(first, other);
         }
-    }
-
-    #[test]
-    fn numbers_below_a_bound_are_even() {
-        let (mut rng, mut seen) = (Xoshiro256PlusPlus::seed_from_u64(5), [0_u32; 6]);
-        (0..60_000).for_each(|_| seen[below(6, &mut rng)] += 1);
-        // Each 10000 ± 4.5 standard errors.
-        assert!(seen.iter().all(|&n| (f64::from(n) - 1e4).abs() < 4.5 * (6e4_f64 * 5.0 / 36.0).sqrt()), "{seen:?}");
-        assert!((0..1000).map(|_| unit(&mut rng)).all(|u| 0.0 < u && u <= 1.0));
     }
 }

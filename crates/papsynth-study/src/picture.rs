@@ -1,11 +1,11 @@
 //! A field as grey levels, and where in it a patch may be taken.
 
 use papsynth_dataset::read::{LevelImage, Stack};
+use portable_numerics::random::below;
 use rand_core::Rng;
 
 use crate::error::Error;
 use crate::fields::{Field, bytes, limits};
-use crate::key::below;
 
 /// Rows and columns at the border of a field that no patch holds, on either side: where planes were combined, or an image
 /// was put straight, they may be black.

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use portable_numerics::random::shuffle;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::design::{Grey, Side, Stage, StudyParams, order};
 use crate::error::Error;
 use crate::fields::{Field, Root, bytes, limits};
-use crate::key::{Key, hex, shuffle};
+use crate::key::{Key, hex};
 use crate::parameters::{Objects, Parameters, varied};
 use crate::patch;
 use crate::picture::{Picture, Places, Raw};

@@ -291,7 +291,8 @@ mod tests {
 
     #[test]
     fn the_interval_of_d_prime_covers() {
-        use rand_core::{Rng, SeedableRng};
+        use portable_numerics::random::uniform;
+        use rand_core::SeedableRng;
         // Observers of a known d′ = 1: 95 % of 2000 intervals, within 4 standard errors.
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(11);
         let [real, synthetic] = [0.691_462_461, 0.308_537_539];
@@ -300,7 +301,7 @@ mod tests {
             let mut counts = Counts::default();
             for trial in 0..118 {
                 let is_real = trial % 2 == 0;
-                let u = (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+                let u = uniform(&mut rng);
                 counts.count(is_real, u < if is_real { real } else { synthetic });
             }
             let Interval { low, high } = counts.detection(Task::YesNo).d_prime_interval;

@@ -4,6 +4,7 @@ use ccd_noise::{Blooming, Camera, CameraParams, Jpeg, JpegParams, ReadNoise, Sat
 use dye_spectra::{Colour, ColourParams, Lamp};
 use multiversion::multiversion;
 
+use crate::error::Cause;
 use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
 use crate::rendition::Srgb;
 use crate::scene::{Scene, SceneCamera, SceneLight};
@@ -72,11 +73,8 @@ impl Developing {
     }
 }
 
-/// How the dyes of a scene become colours.
-pub(crate) fn colour(scene: &Scene) -> Result<Colour, String> {
-    let SceneLight::Colour { lamp_k, mixing, .. } = scene.light else {
-        return Err("the light has no colour".to_owned());
-    };
+/// How dyes become colours in the light of a lamp.
+pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
     let params = ColourParams {
         lamp: Lamp::Halogen { temperature_k: lamp_k },
         mixing: match mixing {
@@ -85,11 +83,11 @@ pub(crate) fn colour(scene: &Scene) -> Result<Colour, String> {
         },
         ..ColourParams::default()
     };
-    Colour::new(&params).map_err(|e| format!("light: {e}"))
+    Ok(Colour::new(&params)?)
 }
 
 impl Detector {
-    pub(crate) fn new(scene: &Scene) -> Result<Self, String> {
+    pub(crate) fn new(scene: &Scene) -> Result<Self, Cause> {
         let camera = scene.camera;
         let jpeg = (camera.jpeg_quality > 0).then(|| jpeg(&camera)).transpose()?;
         // What is fused is rounded once more afterwards.
@@ -99,8 +97,8 @@ impl Detector {
                 let channels = vec![Channel::new(&camera, unfused, 1.0)?];
                 Ok(Self { channels, bits: unfused, srgb: None, jpeg })
             }
-            SceneLight::Colour { rendition, .. } => {
-                let colour = colour(scene)?;
+            SceneLight::Colour { rendition, lamp_k, mixing, .. } => {
+                let colour = colour(lamp_k, mixing)?;
                 let (bits, handed_over) = match rendition {
                     Rendition::Raw => (unfused, unfused),
                     Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits),
@@ -235,7 +233,7 @@ impl Detector {
 
 impl Channel {
     /// `share` is the light of the channel relative to the brightest one's.
-    fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, String> {
+    fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, Cause> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
         let (range_dn, glare) = (largest - offset_dn, camera.glare_removed);
@@ -274,13 +272,13 @@ impl Channel {
             (_, Binning::Charge) => params.binned(ccd_noise::Binning::Charge { side }),
             (_, Binning::Digital) => params.binned(ccd_noise::Binning::Digital { side }),
         };
-        let camera = binned.and_then(|params| Camera::new(&params)).map_err(|e| format!("camera: {e}"))?;
+        let camera = binned.and_then(|params| Camera::new(&params))?;
         let full_scale_e = range_dn / (1.0 - glare) * camera.electrons_per_dn();
         Ok(Self { camera, full_scale_e, glare })
     }
 }
 
-fn jpeg(camera: &SceneCamera) -> Result<Jpeg, String> {
+fn jpeg(camera: &SceneCamera) -> Result<Jpeg, Cause> {
     let params = JpegParams {
         quality: camera.jpeg_quality,
         subsampling: match camera.jpeg_subsampling {
@@ -290,7 +288,7 @@ fn jpeg(camera: &SceneCamera) -> Result<Jpeg, String> {
         },
         bit_depth: camera.bits,
     };
-    Jpeg::new(&params).map_err(|e| format!("camera: {e}"))
+    Ok(Jpeg::new(&params)?)
 }
 
 /// Values of several channels, side by side.

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::frame::{Finished, Frame, Plane};
 use crate::key::Key;
 use crate::model::Model;
@@ -46,7 +46,7 @@ impl Engine {
         if !problems.is_empty() {
             return Err(Error::Recipe(problems));
         }
-        model.check().map_err(Error::Model)?;
+        model.check()?;
         scene::check_layout(&recipe.layout, inputs.weight_map.as_ref()).map_err(Error::Layout)?;
         let watch = Watch(inputs.profile.clone());
         let studio = Studio::new(recipe, model, watch).map_err(Error::Model)?;
@@ -99,7 +99,7 @@ impl Engine {
         mut sink: impl FnMut(&Plane) -> Result<(), E>,
     ) -> Result<Finished, E> {
         let index = scene.key.index;
-        let fail = |message| E::from(Error::Image { index, message });
+        let fail = |cause| E::from(Error::Image { index, cause });
         let mut rendering = self.rendering(scene, threads).map_err(fail)?;
         for plane in 0..rendering.planes() {
             sink(rendering.plane(plane).map_err(fail)?)?;
@@ -118,7 +118,7 @@ impl Engine {
     }
 
     /// A scene on its way, in the memory of finished ones.
-    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, String> {
+    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, Cause> {
         let desk = self.desks().pop().unwrap_or_default();
         Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
     }

@@ -9,15 +9,14 @@ mod debris;
 mod detect;
 mod engine;
 mod error;
-mod exp10;
 mod frame;
 mod fuse;
 pub mod key;
+#[cfg(feature = "learn")]
 pub mod learn;
 pub mod model;
 mod phantom;
 pub mod profile;
-mod random;
 pub mod recipe;
 mod render;
 mod rendition;
@@ -28,8 +27,10 @@ mod threads;
 mod transmit;
 pub mod truth;
 
+use portable_numerics::random;
+
 pub use engine::{Engine, Inputs};
-pub use error::Error;
+pub use error::{Cause, Error, Flaw};
 pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

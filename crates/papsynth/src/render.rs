@@ -3,6 +3,7 @@
 use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
+use crate::error::Cause;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::{self, Phantom, Studio};
@@ -49,7 +50,7 @@ impl Rendering {
         scene: Scene,
         threads: Threads,
         mut desk: Desk,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Cause> {
         let watch = studio.watch.clone();
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
@@ -77,7 +78,7 @@ impl Rendering {
     }
 
     /// Images one plane. Planes are asked for in order, each once.
-    pub(crate) fn plane(&mut self, index: usize) -> Result<&Plane, String> {
+    pub(crate) fn plane(&mut self, index: usize) -> Result<&Plane, Cause> {
         let stage_um = self.scene.planes_um[index];
         let Desk { mut light, mut plane, mut developing, ids } = core::mem::take(&mut self.desk);
         let watch = self.watch.clone();
@@ -96,7 +97,7 @@ impl Rendering {
         Ok(&self.desk.plane)
     }
 
-    fn pass(&self, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+    fn pass(&self, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         let slide = Slide { scene: &self.scene, phantoms: &self.phantoms, masks: &self.masks };
         self.path.pass(slide, focus, light)
     }
@@ -127,7 +128,7 @@ impl Rendering {
     }
 
     /// The all-in-focus image and the truth, and the memory for the next image.
-    pub(crate) fn finish(mut self) -> Result<(Finished, Desk), String> {
+    pub(crate) fn finish(mut self) -> Result<(Finished, Desk), Cause> {
         let watch = self.watch.clone();
         let several = self.planes() > 1;
         let all_in_focus = if several { watch.time(Stage::Light, || self.all_in_focus())? } else { Vec::new() };
@@ -182,7 +183,7 @@ impl Rendering {
         self.desk
     }
 
-    fn all_in_focus(&mut self) -> Result<Vec<f32>, String> {
+    fn all_in_focus(&mut self) -> Result<Vec<f32>, Cause> {
         let (mut light, mut developing) =
             (core::mem::take(&mut self.desk.light), core::mem::take(&mut self.desk.developing));
         self.pass(FocusAt::Everywhere, &mut light)?;
@@ -261,8 +262,8 @@ impl Rendering {
         let grid_um = self.scene.grid().pixel_um;
         let kind = object.body.kind();
         let tint = match &object.body {
-            Body::Cell(body) if piece.part != Part::Nucleus => body.tint.name(),
-            _ => "",
+            Body::Cell(body) if piece.part != Part::Nucleus => Some(body.tint),
+            _ => None,
         };
         let (class, stain) = match &object.body {
             Body::Cell(body) if piece.part == Part::Nucleus => (body.class.as_str(), body.nucleus.absorbance),
@@ -275,7 +276,7 @@ impl Rendering {
             kind,
             class: class.to_owned(),
             bethesda: object.bethesda.clone(),
-            traits: phantom.traits.join(";"),
+            traits: phantom.traits.iter().copied().collect(),
             cluster: object.cluster,
             centre_um: self.scene.place_um(object),
             depth_um: object.depth_um,

@@ -5,7 +5,8 @@ use std::borrow::Cow;
 
 use optics_psf::{Border, Gaussian, Scratch};
 
-use crate::phantom::Phantom;
+use crate::error::Cause;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, lay};
 use crate::recipe::Restore;
 use crate::scene::Scene;
@@ -24,7 +25,7 @@ pub(crate) struct Feathered {
 
 impl Feathered {
     /// Nothing if there are no such nuclei, or none is to be restored.
-    pub(crate) fn new(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Self>, String> {
+    pub(crate) fn new(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Self>, Cause> {
         let (view, n) = (scene.view, scene.oversampling());
         if scene.restoration.restore == Restore::Off {
             return Ok(None);
@@ -34,7 +35,7 @@ impl Feathered {
         if imaged.is_empty() {
             return Ok(None);
         }
-        let feather = Gaussian::new(scene.restoration.feather_um / view.pixel_um).map_err(|e| e.to_string())?;
+        let feather = Gaussian::new(scene.restoration.feather_um / view.pixel_um)?;
         let mut feathered = Self { spans: Vec::new(), starts: Vec::new(), shares: Vec::new() };
         let (mut slab, mut shares, mut scratch) = (Vec::new(), Vec::new(), Scratch::default());
         for first in (0..view.height).step_by(BAND) {

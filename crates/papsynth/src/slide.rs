@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use crate::engine::Engine;
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::recipe::{Imaging, Optics, Problem};
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
@@ -183,15 +183,15 @@ impl<'a> Slide<'a> {
     pub fn objects(&self, origin_px: [u32; 2], size_px: [u32; 2]) -> Result<Vec<Object>, Error> {
         let low = origin_px.map(i64::from);
         let high = [0, 1].map(|axis| low[axis] + i64::from(size_px[axis]));
-        self.reaching(low, high).map_err(|message| self.fail(message))
+        self.reaching(low, high).map_err(|cause| self.fail(cause))
     }
 
-    fn fail(&self, message: String) -> Error {
-        Error::Image { index: self.number, message }
+    fn fail(&self, cause: Cause) -> Error {
+        Error::Image { index: self.number, cause }
     }
 
     /// The objects that reach into a rectangle of the slide, from `low` up to `high`, their plots counted from `low`.
-    fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, String> {
+    fn reaching(&self, low: [i64; 2], high: [i64; 2]) -> Result<Vec<Object>, Cause> {
         let pixel_um = self.pixel_um();
         let most_um = self.engine.recipe().scan.reach_um;
         let halo = (most_um / pixel_um).ceil() as i64;
@@ -209,7 +209,8 @@ impl<'a> Slide<'a> {
                     let spread_px = self.spread.of_object_px(&self.empty, object.depth_um)?;
                     let reach_px = reach_px + spread_px as f64;
                     if reach_px > halo as f64 {
-                        return Err(too_far(object, reach_px * pixel_um, most_um));
+                        let (kind, reach_um) = (object.body.kind().name(), reach_px * pixel_um);
+                        return Err(Cause::TooFar { kind, reach_um, most_um });
                     }
                     let at_px = [0, 1].map(|axis| at[axis] * PLOT_PX - low[axis]);
                     let meets = (0..2).all(|axis| {
@@ -233,13 +234,12 @@ impl<'a> Slide<'a> {
     pub fn frame(&self, at: [u32; 2], threads: Threads) -> Result<SlidePart, Error> {
         let frames = self.frames();
         if at[0] >= frames[0] || at[1] >= frames[1] {
-            let message = format!("frame {at:?} is not on the slide, which has {} x {}", frames[0], frames[1]);
-            return Err(self.fail(message));
+            return Err(self.fail(Cause::NoFrame(at, frames)));
         }
-        self.expose(at, threads, true).map_err(|message| self.fail(message))
+        self.expose(at, threads, true).map_err(|cause| self.fail(cause))
     }
 
-    fn expose(&self, at: [u32; 2], threads: Threads, noise_free: bool) -> Result<SlidePart, String> {
+    fn expose(&self, at: [u32; 2], threads: Threads, noise_free: bool) -> Result<SlidePart, Cause> {
         let side = self.side_px();
         let origin_px = at.map(|at| at * side);
         let border = self.border_px;
@@ -309,10 +309,7 @@ impl<'a> Slide<'a> {
             size_px[axis] > 0 && origin_px[axis].checked_add(size_px[axis]).is_some_and(|end| end <= slide_px[axis])
         });
         if !inside {
-            return Err(self.fail(format!(
-                "{} x {} pixels from {origin_px:?} on leave the slide of {} x {}",
-                size_px[0], size_px[1], slide_px[0], slide_px[1]
-            )));
+            return Err(self.fail(Cause::OffSlide { origin_px, size_px, slide_px }));
         }
         let side = self.side_px();
         let frames = |axis: usize| origin_px[axis] / side..=(origin_px[axis] + size_px[axis] - 1) / side;
@@ -322,7 +319,7 @@ impl<'a> Slide<'a> {
         for frames in frames.chunks(threads::count(threads)) {
             let inner = if frames.len() > 1 { Threads::One } else { threads };
             for frame in threads::map(threads, frames, |&at| self.expose(at, inner, noise_free)) {
-                part.lay(&frame.map_err(|message| self.fail(message))?, self.channels());
+                part.lay(&frame.map_err(|cause| self.fail(cause))?, self.channels());
             }
         }
         let pixel_um = self.pixel_um();
@@ -335,14 +332,6 @@ impl<'a> Slide<'a> {
         part.objects.sort_by_key(|object| (object.id, object.part));
         Ok(part)
     }
-}
-
-fn too_far(object: &Object, reach_um: f64, most_um: f64) -> String {
-    format!(
-        "a {} reaches {reach_um:.0} µm at its place and depth, farther than `scan.reach_um` = {most_um}: raise that, or make it \
-         smaller or nearer to focus",
-        object.body.kind().name()
-    )
 }
 
 impl SlidePart {

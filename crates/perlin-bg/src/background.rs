@@ -1,11 +1,11 @@
 use crate::error::{Error, require};
 use crate::fractal::{Fractal, FractalParams, FractalRows};
-use crate::hash;
 use crate::illumination::{Illumination, Shade};
 use crate::kernel::{self, single};
 use crate::perlin::{Fade, PerlinParams};
 use crate::rows::{Window, for_each_row};
 use crate::unit::{UnitRange, unit_scale};
+use portable_numerics::random::{SplitMix64, unit};
 
 /// Parameters of [`Background`].
 #[derive(Debug, Clone, PartialEq)]
@@ -115,7 +115,7 @@ impl Background {
             at: [0; 2],
             window: Window {
                 // Keeps the corner pixel, where all fields would be zero, off the lattice.
-                origin: [0, 1].map(|axis| hash::unit(hash::derive(!key, axis))),
+                origin: [0, 1].map(|axis| unit(SplitMix64::word(!key, axis))),
                 ..Window::with_cell_px(scatter.cell_px)
             },
         };

@@ -1,8 +1,8 @@
 use crate::error::{Error, require};
-use crate::hash;
 use crate::kernel::{self, single};
 use crate::perlin::{Perlin, PerlinParams};
 use crate::rows::{Rows, Window, for_each_row};
+use portable_numerics::random::{SplitMix64, unit};
 
 /// Parameters of [`Fractal`].
 #[derive(Debug, Clone, PartialEq)]
@@ -62,11 +62,11 @@ impl Fractal {
         let coarsest = Layer { noise: Perlin::new(base, key)?, frequency: 1.0, shift: [0.0, 0.0], amplitude: 1.0 };
         let layers: Vec<Layer> = core::iter::successors(Some((0, coarsest)), |(octave, layer)| {
             let octave = octave + 1;
-            let key = hash::derive(key, octave);
+            let key = SplitMix64::word(key, octave);
             let finer = Layer {
                 noise: layer.noise.with_key(key),
                 frequency: layer.frequency * lacunarity,
-                shift: [0, 1].map(|axis| hash::unit(hash::derive(key, axis))),
+                shift: [0, 1].map(|axis| unit(SplitMix64::word(key, axis))),
                 amplitude: layer.amplitude * persistence,
             };
             Some((octave, finer))

@@ -1,7 +1,8 @@
 use multiversion::multiversion;
+use portable_numerics::random::uniform;
 use rand_core::Rng;
 
-use crate::scan::LANES;
+use crate::source::LANES;
 
 /// What a number of random tries would choose, from the costs and weights of all candidates.
 ///
@@ -110,27 +111,10 @@ pub(crate) fn below_exp(u: f64, x: f64) -> bool {
     u < 1.0 - x - SLACK || (u * above < 1.0 + SLACK && u < libm::exp(-x))
 }
 
-/// A uniform number in 0..1.
-pub(crate) fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    /// 2^-53.
-    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
-    #[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
-    {
-        (rng.next_u64() >> 11) as f64 * STEP
-    }
-}
-
-/// A uniform whole number below `n`, by multiplication: uneven by less than n / 2^64.
-pub(crate) fn below<R: Rng + ?Sized>(n: usize, rng: &mut R) -> usize {
-    #[expect(clippy::cast_possible_truncation, reason = "below n")]
-    {
-        ((u128::from(rng.next_u64()) * n as u128) >> 64) as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use portable_numerics::random::below;
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
     const SEED: u64 = 0xd2a3;
@@ -204,15 +188,5 @@ mod tests {
             assert!(error < if i <= 200 { 2e-6 } else { 5e-4 }, "{i}: {error}");
         }
         assert_eq!(xs[800..], [0.0, 0.0]);
-    }
-
-    #[test]
-    fn whole_numbers_below_are_even() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xbe10);
-        let mut counts = [0.0; 7];
-        (0..70_000).for_each(|_| counts[below(7, &mut rng)] += 1.0);
-        let chi_square: f64 = counts.map(|n| (n - 1e4) * (n - 1e4) / 1e4).iter().sum();
-        // 0.1 % of the distribution with 6 degrees of freedom.
-        assert!(chi_square < 22.5, "{chi_square}");
     }
 }

@@ -1,10 +1,10 @@
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2, TAU};
 
-use lane_fft::{LaneFft, ZERO, transposed};
 use multiversion::multiversion;
+use portable_numerics::fourier::{self, LaneFft, ZERO, transposed};
+use portable_numerics::random::Ziggurat;
 use rand_core::Rng;
 
-use crate::normal::Ziggurat;
 use crate::{Error, FieldParams};
 
 /// Amplitudes below this part of the largest are zero: they are lost in the rounding of the FFT,
@@ -18,7 +18,7 @@ const LANES: usize = 16;
 const ROWS: usize = 2 * LANES;
 
 /// A complex number of each lane.
-type Lanes = lane_fft::Lanes<f32, LANES>;
+type Lanes = fourier::Lanes<f32, LANES>;
 
 /// Gaussian random fields of one size and spectrum: planned once, drawn often.
 ///

@@ -1,7 +1,5 @@
 //! Points, vectors and polygons.
 
-use rand_core::Rng;
-
 /// A point [x, y], x right and y down, in pixels or any other unit.
 pub type Point = [f64; 2];
 
@@ -57,17 +55,4 @@ impl Moments {
         }
         moments
     }
-}
-
-/// A number in [0, 1) with 53 random bits.
-pub(crate) fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    const SCALE: f64 = 1.0 / (1u64 << 53) as f64;
-    (rng.next_u64() >> 11) as f64 * SCALE
-}
-
-/// A whole number below `bound`.
-pub(crate) fn below<R: Rng + ?Sized>(rng: &mut R, bound: usize) -> usize {
-    // Multiply-shift: the bias is below bound / 2^64.
-    let scaled = (u128::from(rng.next_u64()) * bound as u128) >> 64;
-    usize::try_from(scaled).expect("smaller than bound")
 }

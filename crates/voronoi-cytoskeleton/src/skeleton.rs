@@ -1,12 +1,13 @@
 use crate::build::build;
 use crate::diagram::Diagram;
 use crate::error::{Error, require};
-use crate::geometry::{Point, below, unit};
+use crate::geometry::Point;
 use crate::lloyd::relaxed;
 use crate::outline::Outline;
 use crate::river::{Landscape, Net, River};
 use crate::torus::Torus;
 use crate::window::Window;
+use portable_numerics::random::{below, chance};
 use rand_core::Rng;
 
 /// Parameters of [`Skeleton`].
@@ -137,8 +138,8 @@ impl Skeleton {
         let mut springs = landscape.springs(self.params.start_above);
         let mut rivers = Vec::new();
         for _ in 0..self.params.rivers.min(springs.len()) {
-            let spring = springs.swap_remove(below(rng, springs.len()));
-            let mut branches = || unit(rng) < self.params.branch_probability;
+            let spring = springs.swap_remove(below(springs.len(), rng));
+            let mut branches = || chance(self.params.branch_probability, rng);
             landscape.run(spring, &mut branches, &mut rivers);
         }
         rivers

@@ -1,9 +1,10 @@
 use crate::build::build;
 use crate::error::{Error, require};
-use crate::geometry::{Point, dot, length, sub, unit};
+use crate::geometry::{Point, dot, length, sub};
 use crate::lloyd::relaxed;
 use crate::river::{DEGREE, Net};
 use crate::window::Window;
+use portable_numerics::random::uniform;
 use rand_core::Rng;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -35,7 +36,7 @@ impl Torus {
     pub fn new<R: Rng + ?Sized>(sites: usize, lloyd_passes: usize, rng: &mut R) -> Result<Self, Error> {
         require("sites", sites as f64, (100..=1_000_000).contains(&sites), "between 100 and 1000000")?;
         require("lloyd_passes", lloyd_passes as f64, lloyd_passes <= 10_000, "at most 10000")?;
-        let mut places: Vec<Point> = (0..sites).map(|_| [unit(rng), unit(rng)]).collect();
+        let mut places: Vec<Point> = (0..sites).map(|_| [uniform(rng), uniform(rng)]).collect();
         let margin = MARGIN / (sites as f64).sqrt();
         let window = Window::rectangle([-margin; 2], [1.0 + margin; 2])?;
         for _ in 0..lloyd_passes {
@@ -111,7 +112,7 @@ impl Torus {
         if length(half) + self.longest * period > period / 2.0 {
             return None;
         }
-        let origin = [unit(rng), unit(rng)];
+        let origin = [uniform(rng), uniform(rng)];
         let [x, y] = direction(rng).map(|c| c * period);
         let hand = if rng.next_u64() >> 63 == 0 { 1.0 } else { -1.0 };
         // From the middle of the window, which lies at the origin.
@@ -180,7 +181,7 @@ fn repeated(sites: &[Point], margin: f64) -> (Vec<Point>, Vec<usize>) {
 /// A direction drawn uniformly: of points in a square those in the disc.
 fn direction<R: Rng + ?Sized>(rng: &mut R) -> Point {
     loop {
-        let [x, y] = [0; 2].map(|_| 2.0 * unit(rng) - 1.0);
+        let [x, y] = [0; 2].map(|_| 2.0 * uniform(rng) - 1.0);
         let square = dot([x, y], [x, y]);
         if square > 1e-6 && square <= 1.0 {
             return [x / square.sqrt(), y / square.sqrt()];

@@ -1,5 +1,6 @@
 use crate::error::{Error, require_coordinates};
-use crate::geometry::{Moments, Point, along, cross, dot, length, sub, unit};
+use crate::geometry::{Moments, Point, along, cross, dot, length, sub};
+use portable_numerics::random::uniform;
 use rand_core::Rng;
 
 /// The convex polygon that a diagram fills.
@@ -95,7 +96,7 @@ impl Window {
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> Point {
         let apex = self.corners[0];
         // A triangle of the fan around the first corner, by its area, then a point in it.
-        let mut rest = unit(rng) * self.area;
+        let mut rest = uniform(rng) * self.area;
         let fan = self.corners[1..].windows(2);
         let mut triangle = [apex; 2];
         for pair in fan {
@@ -105,7 +106,7 @@ impl Window {
                 break;
             }
         }
-        let (mut u, mut v) = (unit(rng), unit(rng));
+        let (mut u, mut v) = (uniform(rng), uniform(rng));
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }

@@ -21,7 +21,8 @@ fn full_lattice_is_the_reference_and_few_points_converge_to_it() {
         let Some(absorbance) = array(&format!("ref_{object}_absorbance")) else { return };
         for z in [0, 2, 5, -3] {
             let Some(reference) = array(&format!("ref_abbe_{object}_nac{name}_z{z:+}")) else { return };
-            let image = |source| abbe(condenser_na, source).image(&[absorbing(z.into(), &absorbance)], 0.0).unwrap();
+            let image =
+                |source| abbe(condenser_na, source).image(&[absorbing(-f64::from(z), &absorbance)], 0.0).unwrap();
             let error = worst(&image(FULL), &reference);
             assert!(error < 1e-9, "{object} {name} {z}: {error}");
             let few = |points| relative(&image(Source::Vogel { points }), &reference);
@@ -35,8 +36,8 @@ fn two_layers_are_the_reference() {
     let (Some(disk), Some(asym)) = (array("ref_disk_absorbance"), array("ref_asym_absorbance")) else { return };
     let Some(reference) = array("ref_multislice2_nac060") else { return };
     let below: Vec<f64> = shifted(&disk, -10, 6).iter().map(|a| 0.6 * a).collect();
-    // The arrays count z along the light, from the focal plane on.
-    let layers = [absorbing(-3.0, &shifted(&asym, 8, -4)), absorbing(2.0, &below)];
+    // The arrays count z away from the objective, from the focal plane on.
+    let layers = [absorbing(3.0, &shifted(&asym, 8, -4)), absorbing(-2.0, &below)];
     let image = abbe(0.6, Source::Lattice { stride: 2 }).image(&layers, 0.0).unwrap();
     assert!(worst(&image, &reference) < 1e-9, "{}", worst(&image, &reference));
 }
@@ -50,10 +51,10 @@ fn objects_that_refract_are_the_reference() {
             let root = libm::exp10(-0.5 * a);
             [root * libm::cos(*p), root * libm::sin(*p)]
         });
-        let layer = Layer::new(z.into(), amplitude.collect()).unwrap();
+        let layer = Layer::new(-f64::from(z), amplitude.collect()).unwrap();
         let image = abbe(0.6, FULL).image(&[layer], 0.0).unwrap();
         assert!(worst(&image, &reference) < 1e-9, "{z}: {}", worst(&image, &reference));
-        let layer = Layer::refracting(z.into(), &single(&absorbance), &single(&phase)).unwrap();
+        let layer = Layer::refracting(-f64::from(z), &single(&absorbance), &single(&phase)).unwrap();
         let image = abbe(0.6, FULL).image(&[layer], 0.0).unwrap();
         assert!(worst(&image, &reference) < 1e-6, "{z}: {}", worst(&image, &reference));
     }

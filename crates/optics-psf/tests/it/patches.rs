@@ -198,7 +198,7 @@ fn what_margins_cut_off_is_below_a_thousandth_of_the_contrast() {
     for (condenser_na, cover_error_um) in [(0.3, 0.0), (0.41, 0.0), (0.6, 0.0), (0.9, 0.0), (0.5, 10.0)] {
         let imager = imager(&MicroscopeParams { condenser_na, cover_error_um, ..MicroscopeParams::default() });
         for (width, transmittance) in [disc(12, 0.6), disc(64, 0.5), disc(160, 0.1)] {
-            for depth_um in [0.0, 0.6, 1.3, -2.5, 5.0, 8.0] {
+            for depth_um in [0.0, -0.6, -1.3, 2.5, -5.0, -8.0] {
                 let focus = imager.focus(depth_um, 0.0).unwrap();
                 let thing =
                     Thing { transmittance: transmittance.clone(), phase: Vec::new(), width, at_px: [0, 0], depth_um };
@@ -398,7 +398,7 @@ fn margins_and_lattices_are_functions_of_the_distance_from_focus() {
     margins.dedup();
     assert!(margins[0] == 12 && margins.len() <= 6, "{margins:?}");
     assert_eq!(focus(2.0, 0.0).margin_px(), focus(-2.0, 0.0).margin_px());
-    assert!((focus(1.0, -1.0).defocus_um() - (1.0 - 1.515)).abs() < 1e-12);
+    assert!((focus(-1.0, -1.0).defocus_um() - (1.0 - 1.515)).abs() < 1e-12);
     assert_eq!((focus(0.0, 0.0).lattice(), focus(6.0, 0.0).lattice()), (Lattice::Object, Lattice::Camera));
 }
 

@@ -19,7 +19,7 @@ fn agrees_with_the_reference_table() {
     let mut column = 1;
     for condenser_na in [0.3, 0.6, 0.9, 0.95] {
         for depth in [0.0, 1.0, 3.0, 6.0] {
-            let transfer = transfer(condenser_na, depth);
+            let transfer = transfer(condenser_na, -depth);
             for row in &rows {
                 let f = [row[0], 0.0];
                 let (a, p) = (transfer.absorption(f), transfer.phase(f));
@@ -59,7 +59,7 @@ fn full_aperture_in_focus_is_incoherent() {
 
 #[test]
 fn narrow_aperture_is_coherent() {
-    let transfer = transfer(1e-4, 3.0);
+    let transfer = transfer(1e-4, -3.0);
     let gamma = |f: f64| ((1.515 / 0.57) * (1.515 / 0.57) - f * f).sqrt();
     // At the entries of the table: between them a fringe is cut by the chord.
     for i in 0..390 {
@@ -98,8 +98,8 @@ fn a_travel_in_air_focuses_what_lies_deeper() {
     // Paraxially a depth d in index n is undone by lowering the stage by −d/n.
     let params = MicroscopeParams { na: 0.2, condenser_na: 0.15, ..MicroscopeParams::default() };
     let microscope = Microscope::new(&params).unwrap();
-    let focused = microscope.transfer(40.0, -40.0 / 1.515).unwrap();
-    let (rest, defocused) = (microscope.transfer(0.0, 0.0).unwrap(), microscope.transfer(40.0, 0.0).unwrap());
+    let focused = microscope.transfer(-40.0, -40.0 / 1.515).unwrap();
+    let (rest, defocused) = (microscope.transfer(0.0, 0.0).unwrap(), microscope.transfer(-40.0, 0.0).unwrap());
     for i in 0..20 {
         let f = [0.03 * f64::from(i), 0.0];
         assert!((focused.absorption(f)[0] - rest.absorption(f)[0]).abs() < 1e-2);

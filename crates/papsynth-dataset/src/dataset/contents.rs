@@ -8,11 +8,13 @@
 use std::fmt::{self, Formatter};
 use std::path::Path;
 
+use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
 
 use super::record::ShardRecord;
 use super::set::Dataset;
 use crate::error::{Error, Problem};
+use crate::files::Folder;
 use crate::formats::{Field, Format, LIMITS, TarFile, Written, huggingface, names, tar};
 use crate::read;
 use crate::truth::{Document, FrameSummary, Geometry, Image, Info, Split, table};
@@ -71,6 +73,9 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
         let field = Field::new(&geometry, frame, &truth, &own, &[]);
         let written = Written::new(folder, layout, &field);
         layout.formats.iter().try_for_each(|format| format.check(&written, tar.as_mut()))?;
+        if layout.scenes {
+            scene(folder, frame, record.identity.seed)?;
+        }
         rows.extend(table(&truth, frame.index, number == 0));
         let count = own.annotations.len() as u64;
         let there = document.annotations.iter().filter(|annotation| annotation.image() == frame.index);
@@ -103,6 +108,18 @@ fn held_by_their_hashes(dataset: &Dataset, record: &ShardRecord) -> Result<(), E
     match due.iter().find(|name| record.files.iter().all(|file| file.path != **name)) {
         Some(name) => Err(Error::input(&dataset.folder.path(name))(Problem::Missing { wanted: "file" })),
         None => Ok(()),
+    }
+}
+
+/// Whether the scene of a frame can be read and is that of the frame.
+fn scene(folder: &Folder, frame: &FrameSummary, seed: u64) -> Result<(), Error> {
+    let path = folder.inside(&names::scene(frame.index))?;
+    let broken = |message: String| Error::input(&path)(Problem::Broken { format: "JSON", message });
+    let text = String::from_utf8(read::bytes(&path, LIMITS.max_file_bytes)?).map_err(|e| broken(e.to_string()))?;
+    let scene = Scene::from_json(&text).map_err(|e| broken(e.to_string()))?;
+    match Geometry::of(&scene) == Geometry::of_summary(frame, seed) {
+        true => Ok(()),
+        false => differs(&path, format!("it is not the scene of image {}", frame.index)),
     }
 }
 

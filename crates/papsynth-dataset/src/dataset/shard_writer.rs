@@ -142,6 +142,10 @@ impl<'a> ShardWriter<'a> {
             Form::Single => Vec::new(),
             Form::Stack => finished.sharp(),
         };
+        if self.dataset.layout.scenes {
+            let name = names::scene(finished.scene.key.index);
+            self.files.write(&name, finished.scene.to_json().as_bytes())?;
+        }
         self.end_with(&finished.truth, sharp)
     }
 

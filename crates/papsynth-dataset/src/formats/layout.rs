@@ -26,6 +26,9 @@ pub struct Layout {
     /// Whether the table of objects is also written as Parquet, with masks; wants the feature `parquet`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub objects_parquet: bool,
+    /// Whether the scene of every frame is written, as JSON.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub scenes: bool,
 }
 
 impl Default for Layout {
@@ -46,7 +49,7 @@ impl Layout {
         formats.dedup();
         let many = formats.iter().any(|format| format.is_sharded());
         let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
-        Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: HAS_PARQUET }
+        Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: HAS_PARQUET, scenes: false }
     }
 
     /// Why a range of frames cannot be made, if it cannot: it begins within a shard.
@@ -98,6 +101,7 @@ impl fmt::Display for Layout {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.formats.iter().map(|format| format.name()).collect();
         let table = if self.objects_parquet { ", objects also as Parquet" } else { "" };
-        write!(f, "{} with {} a shard, {}{table}", names.join(","), self.frames_per_shard, self.flatten.name())
+        let scenes = if self.scenes { ", with scenes" } else { "" };
+        write!(f, "{} with {} a shard, {}{table}{scenes}", names.join(","), self.frames_per_shard, self.flatten.name())
     }
 }

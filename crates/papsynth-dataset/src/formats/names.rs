@@ -69,6 +69,11 @@ pub(crate) fn record(shard: u64) -> String {
     format!("{SHARDS}/{shard:06}.json")
 }
 
+/// Where the scene of a frame lies.
+pub(crate) fn scene(index: u64) -> String {
+    format!("scenes/{index:06}.json")
+}
+
 /// The number of the shard whose record has this file name.
 pub(crate) fn number_of_record(file_name: &str) -> Option<u64> {
     let digits = file_name.strip_suffix(".json")?;

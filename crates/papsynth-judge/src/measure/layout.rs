@@ -52,7 +52,8 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::statistics::{below, deviation, mean};
+    use crate::statistics::{deviation, mean};
+    use portable_numerics::random::below;
 
     fn random(count: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
         (0..count).map(|_| [below(128_000, rng) as f64 / 100.0, below(96_000, rng) as f64 / 100.0]).collect()

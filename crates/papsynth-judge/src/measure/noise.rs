@@ -65,7 +65,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::statistics::below;
+    use portable_numerics::random::below;
 
     #[test]
     fn variance_and_correlation_of_noise_are_found() {

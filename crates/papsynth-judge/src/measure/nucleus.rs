@@ -2,11 +2,13 @@
 
 use std::f64::consts::{PI, TAU};
 
+use portable_numerics::statistics::correlation;
+
 use super::maps::Maps;
 use crate::moments::Histogram;
 use crate::number::{nearest, whole};
 use crate::region::{Region, distance_inside};
-use crate::statistics::{correlation, deviation, mean, median, of_sorted};
+use crate::statistics::{deviation, mean, median, of_sorted};
 use crate::table::{Family, Row};
 
 /// The rim, which is blurred, is left out of the core: pixels.

@@ -93,7 +93,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::statistics::below;
+    use portable_numerics::random::below;
 
     #[test]
     fn white_noise_is_flat_and_has_its_variance() {

@@ -7,14 +7,11 @@ mod nucleus;
 
 use fsd_shape::{ShapeModel, ShapeModelParams, Spread};
 
-use crate::error::Error;
+use crate::error::{Cause, Error};
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
 
 use nucleus::Measured;
-pub use nucleus::NucleusImage;
-
-/// A point in pixels: x right, y down.
-pub type Point = [f64; 2];
+pub use nucleus::{NucleusImage, Point};
 
 /// What a class is learned from. Whatever is empty is kept as the base model has it.
 #[derive(Debug, Clone, Copy, Default)]
@@ -68,12 +65,14 @@ const DIGITS: usize = 5;
 /// If the material is too little or cannot be used, or the class to take after is not in the base model: it says which
 /// image or outline, and why.
 pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, Error> {
-    let fail = |message: String| Error::Learn { class: params.class.clone(), message };
+    learned(base, material, params).map_err(|cause| Error::Learn { class: params.class.clone(), cause })
+}
+
+fn learned(base: &Model, material: &Material, params: &LearnParams) -> Result<Model, Cause> {
     if !(params.pixel_um.is_finite() && (0.05..=4.0).contains(&params.pixel_um)) {
-        return Err(fail(format!("pixel size {} µm is outside 0.05 to 4", params.pixel_um)));
+        return Err(Cause::PixelSize(params.pixel_um));
     }
-    let like = base.classes.get(&params.like).ok_or_else(|| fail(crate::scene::unknown_class(&params.like, base)))?;
-    let mut class = like.clone();
+    let mut class = base.class(&params.like)?.clone();
     let mut provenance = Vec::new();
     let mut note = |what: &str, count: usize| {
         provenance.push(Provenance {
@@ -88,31 +87,29 @@ pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<
         class.bethesda.clone_from(&params.bethesda);
     }
     if !material.cytoplasm_outlines.is_empty() {
-        let (shapes, radius) =
-            shapes(material.cytoplasm_outlines, CYTOPLASM_HARMONICS, params.pixel_um, "cell").map_err(fail)?;
+        let (shapes, radius) = shapes(material.cytoplasm_outlines, CYTOPLASM_HARMONICS, params.pixel_um, "cell")?;
         class.cytoplasm.shapes = shapes;
         class.cytoplasm.radius_um = radius;
         note("outlines of cells", material.cytoplasm_outlines.len());
     }
-    let measured =
-        material.nuclei.iter().map(|nucleus| nucleus.measure()).collect::<Result<Vec<Measured>, _>>().map_err(fail)?;
+    let measured: Vec<Measured> = material.nuclei.iter().map(NucleusImage::measure).collect::<Result<_, _>>()?;
     let traced: Vec<Vec<Point>> = measured.iter().map(|m| m.outline.clone()).collect();
     let outlines = if material.nucleus_outlines.is_empty() { &traced } else { material.nucleus_outlines };
     if !outlines.is_empty() {
-        let (shapes, radius) = shapes(outlines, NUCLEUS_HARMONICS, params.pixel_um, "nucleus").map_err(fail)?;
+        let (shapes, radius) = shapes(outlines, NUCLEUS_HARMONICS, params.pixel_um, "nucleus")?;
         class.nucleus.shapes = shapes;
         class.nucleus.radius_um = radius;
         note("outlines of nuclei", outlines.len());
     }
     if !measured.is_empty() {
-        learn_texture(&mut class, &measured, params).map_err(fail)?;
+        learn_texture(&mut class, &measured, params);
         note("images of nuclei", measured.len());
     }
     let mut model = base.clone();
     model.provenance.retain(|p| p.class != params.class);
     model.provenance.extend(provenance);
     model.classes.insert(params.class.clone(), class);
-    model.check().map_err(fail)?;
+    model.checked()?;
     Ok(model)
 }
 
@@ -120,23 +117,27 @@ pub fn learn(base: &Model, material: &Material, params: &LearnParams) -> Result<
 ///
 /// # Errors
 /// If the mask is empty, has several components or cannot be an image: it says which.
-pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, String> {
-    let outline = fsd_shape::trace(mask, width, crate::truth::COVERED).map_err(|e| e.to_string())?;
-    Ok(fsd_shape::resample(&outline, points))
+pub fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, Cause> {
+    Ok(nucleus::outline(mask, width, points)?)
 }
 
 /// Statistics of outlines in both ways, and of their size.
-fn shapes(outlines: &[Vec<Point>], harmonics: usize, pixel_um: f64, what: &str) -> Result<(Shapes, LogNormal), String> {
+fn shapes(
+    outlines: &[Vec<Point>],
+    harmonics: usize,
+    pixel_um: f64,
+    what: &'static str,
+) -> Result<(Shapes, LogNormal), Cause> {
     if outlines.len() < FEWEST {
-        return Err(format!("{} outlines of the {what} are too few; expected at least {FEWEST}", outlines.len()));
+        return Err(Cause::TooFewOutlines { found: outlines.len(), what, least: FEWEST });
     }
     if let Some(index) = outlines.iter().position(|outline| fsd_shape::self_intersects(outline)) {
-        return Err(format!("outline {index} of the {what} crosses itself; expected simple closed curves"));
+        return Err(Cause::CrossedOutline(index, what));
     }
     let fit = |spread: Spread| {
         let params = ShapeModelParams { harmonics, spread };
-        let model = ShapeModel::fit(outlines, &params).map_err(|e| format!("outlines of the {what}: {e}"))?;
-        model.statistics().rounded(DIGITS).map_err(|e| format!("outlines of the {what}: {e}"))
+        let model = ShapeModel::fit(outlines, &params);
+        model.and_then(|model| model.statistics().rounded(DIGITS)).map_err(|error| Cause::Outlines(what, error))
     };
     let correlated = fit(ShapeModelParams::default().spread)?;
     let radius = LogNormal {
@@ -146,7 +147,7 @@ fn shapes(outlines: &[Vec<Point>], harmonics: usize, pixel_um: f64, what: &str) 
     Ok((Shapes { correlated, independent: fit(Spread::Independent)? }, radius))
 }
 
-fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnParams) -> Result<(), String> {
+fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnParams) {
     let nucleus = &mut class.nucleus;
     nucleus.absorbance = normal(measured.iter().map(|m| m.mean));
     let chromatin = &mut nucleus.chromatin;
@@ -162,7 +163,6 @@ fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnPar
         Donors::NumbersOnly => Vec::new(),
         Donors::Keep => measured.iter().map(|m| m.donor(params.pixel_um)).collect::<Vec<Donor>>(),
     };
-    Ok(())
 }
 
 fn normal(values: impl Iterator<Item = f64> + Clone) -> Normal {

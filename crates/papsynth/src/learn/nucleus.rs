@@ -1,8 +1,10 @@
 //! What one image of a nucleus shows.
 
+use crate::error::{Cause, Flaw};
 use crate::model::{Donor, OUTSIDE};
 
-use super::Point;
+/// A point in pixels: x right, y down.
+pub type Point = [f64; 2];
 
 /// The image of a nucleus, with its mask.
 #[derive(Debug, Clone)]
@@ -36,7 +38,11 @@ pub(super) struct Measured {
 
 impl NucleusImage {
     /// Measures absorbance inside the mask against the surroundings of the nucleus (Eq. 11): A = −log₁₀(I₁/I₀).
-    pub(super) fn measure(&self) -> Result<Measured, String> {
+    pub(super) fn measure(&self) -> Result<Measured, Cause> {
+        self.measured().map_err(|flaw| Cause::Nucleus { name: self.name.clone(), flaw })
+    }
+
+    fn measured(&self) -> Result<Measured, Flaw> {
         /// Points of a traced outline.
         const POINTS: usize = 64;
         /// The rim of the nucleus reaches so far beyond its mask that the surroundings begin after it, px …
@@ -47,31 +53,25 @@ impl NucleusImage {
         const FEWEST: usize = 12;
         /// Mean absorbance below which nothing can be told from noise.
         const FAINTEST: f64 = 0.01;
-        let fail = |message: String| format!("{}: {message}", self.name);
         if self.width == 0 || self.light.len() != self.mask.len() || !self.light.len().is_multiple_of(self.width) {
-            return Err(fail(format!(
-                "its image has {} pixels, its mask {}; expected as many, in rows of {}",
-                self.light.len(),
-                self.mask.len(),
-                self.width
-            )));
+            return Err(Flaw::Size { pixels: self.light.len(), mask: self.mask.len(), width: self.width });
         }
         if let Some(bad) = self.light.iter().position(|v| !v.is_finite() || *v < 0.0) {
-            return Err(fail(format!("pixel ({}, {}) is {}", bad % self.width, bad / self.width, self.light[bad])));
+            return Err(Flaw::Pixel(bad % self.width, bad / self.width, self.light[bad]));
         }
-        let outline = super::outline(&self.mask, self.width, POINTS).map_err(|e| fail(format!("its mask: {e}")))?;
+        let outline = outline(&self.mask, self.width, POINTS).map_err(Flaw::Mask)?;
         let distance = self.distances(&outline);
         let mut around: Vec<f64> = (0..self.light.len())
             .filter(|&i| self.mask[i] < 0.5 && (GAP..REACH).contains(&distance[i]))
             .map(|i| f64::from(self.light[i]))
             .collect();
         if around.len() < FEWEST {
-            return Err(fail(format!("only {} pixels surround its mask; expected a wider crop", around.len())));
+            return Err(Flaw::Crop(around.len()));
         }
         around.sort_by(f64::total_cmp);
         let surroundings = around[around.len() / 2];
         if surroundings <= 0.0 {
-            return Err(fail("its surroundings are black".to_owned()));
+            return Err(Flaw::Black);
         }
         // Eq. 11: A = −log₁₀(I₁/I₀) against the surroundings; black pixels count as half a step of the darkest light seen.
         let floor = surroundings / 512.0;
@@ -84,13 +84,11 @@ impl NucleusImage {
         let inside: Vec<f64> = absorbance.iter().copied().filter(|a| !a.is_nan()).collect();
         let count = inside.len() as f64;
         if inside.len() < FEWEST {
-            return Err(fail(format!("its mask has {} pixels; expected at least {FEWEST}", inside.len())));
+            return Err(Flaw::SmallMask(inside.len(), FEWEST));
         }
         let mean = inside.iter().sum::<f64>() / count;
         if mean < FAINTEST {
-            return Err(fail(format!(
-                "its mean absorbance is {mean:.4}, at least {FAINTEST} is expected: a nucleus is darker than its surroundings"
-            )));
+            return Err(Flaw::Faint(mean, FAINTEST));
         }
         let moment = |power: i32| inside.iter().map(|a| libm::pow(a - mean, f64::from(power))).sum::<f64>() / count;
         let sd = moment(2).sqrt();
@@ -109,6 +107,11 @@ impl NucleusImage {
             })
             .collect()
     }
+}
+
+/// The outline of a mask by so many points at equal distances along it.
+pub(super) fn outline(mask: &[f32], width: usize, points: usize) -> Result<Vec<Point>, fsd_shape::Error> {
+    Ok(fsd_shape::resample(&fsd_shape::trace(mask, width, crate::truth::COVERED)?, points))
 }
 
 /// Mean absorbance in steps of the distance from the rim; the overall mean where a step has no pixel.

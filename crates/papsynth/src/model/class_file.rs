@@ -1,35 +1,79 @@
-//! Class files: classes told by the numbers in which they differ from others.
+//! The model that ships, and class files: classes told by the numbers in which they differ from others.
 
 use serde_json::{Map, Value};
 
 use super::{CellClass, MODEL_VERSION, Model, Provenance};
+use crate::error::{Cause, Error};
+
+/// The classes that are told from those of the model that ships, by the numbers in which they differ.
+const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
+
+/// The text of the model that ships.
+const BUILTIN: &str = include_str!("../../model/default.json");
+
+impl Model {
+    /// The model that ships: numbers alone, measured on real cells.
+    ///
+    /// # Panics
+    /// Never: the file is part of the crate and its tests read it.
+    #[must_use]
+    pub fn builtin() -> Self {
+        let learned = Self::from_json(BUILTIN).expect("the model that ships is sound");
+        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the classes that ship are sound"))
+    }
+
+    /// This model and the classes of a text, which take the place of classes of the same names.
+    ///
+    /// The text is a model as `papsynth learn` writes it, or a class file: TOML whose classes may each say which class they
+    /// are `like`, and after that only the numbers in which they differ.
+    ///
+    /// ```
+    /// # use papsynth::model::Model;
+    /// let text = r#"
+    ///     version = 1
+    ///     [classes.spindle]
+    ///     like = "intermediate"
+    ///     bethesda = "HSIL"
+    ///     cytoplasm.form = { elongation = { mean = 0.6, sd = 0.05 } }
+    /// "#;
+    /// let model = Model::builtin().with(text)?;
+    /// assert_eq!(model.classes["spindle"].nucleus, model.classes["intermediate"].nucleus);
+    /// # Ok::<(), papsynth::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As those of [`from_json`](Self::from_json), or if a class is like one that is not there.
+    pub fn with(&self, text: &str) -> Result<Self, Error> {
+        merged(self, text).and_then(|model| model.checked().map(|()| model)).map_err(Error::Model)
+    }
+}
 
 /// A model and the classes of a text.
-pub(super) fn merged(base: &Model, text: &str) -> Result<Model, String> {
+fn merged(base: &Model, text: &str) -> Result<Model, Cause> {
     let value: Value = if text.trim_start().starts_with('{') {
-        serde_json::from_str(text).map_err(|e| format!("this is no model of papsynth: {e}"))?
+        serde_json::from_str(text).map_err(Cause::NotAModel)?
     } else {
-        toml::from_str(text).map_err(|e| format!("this is no class file of papsynth: {e}"))?
+        toml::from_str(text).map_err(Cause::NotAClassFile)?
     };
-    let Value::Object(mut file) = value else { return Err("this is no model of papsynth: it is no table".to_owned()) };
+    let Value::Object(mut file) = value else { return Err(Cause::NotATable) };
     let version = file.remove("version");
     if version.as_ref().and_then(Value::as_u64) != Some(u64::from(MODEL_VERSION)) {
         let found = version.map_or_else(|| "missing".to_owned(), |v| v.to_string());
-        return Err(format!("its version is {found}; this program reads version {MODEL_VERSION}"));
+        return Err(Cause::ModelVersion(found, MODEL_VERSION));
     }
     let mut model = base.clone();
     if let Some(provenance) = file.remove("provenance") {
-        let entries: Vec<Provenance> = serde_json::from_value(provenance).map_err(|e| format!("provenance: {e}"))?;
+        let entries: Vec<Provenance> = serde_json::from_value(provenance).map_err(Cause::Provenance)?;
         model.provenance.retain(|old| !entries.contains(old));
         model.provenance.extend(entries);
     }
     let classes = match file.remove("classes") {
         Some(Value::Object(classes)) => classes,
-        Some(_) => return Err("classes: expected a table of classes by name".to_owned()),
+        Some(_) => return Err(Cause::ClassesNotATable),
         None => Map::new(),
     };
     if let Some(unknown) = file.keys().next() {
-        return Err(format!("`{unknown}` is not known here; expected version, provenance, classes"));
+        return Err(Cause::UnknownField(unknown.clone()));
     }
     let mut waiting = classes;
     // A class may be like one of the same file, wherever that stands.
@@ -40,12 +84,12 @@ pub(super) fn merged(base: &Model, text: &str) -> Result<Model, String> {
             .map(|(name, _)| name.clone())
             .collect();
         if ready.is_empty() {
-            let names: Vec<&str> = waiting.keys().map(String::as_str).collect();
-            return Err(format!("classes {} are like each other in a circle", names.join(", ")));
+            return Err(Cause::ClassCircle(waiting.keys().cloned().collect()));
         }
         for name in ready {
             let Some(class) = waiting.remove(&name) else { continue };
-            let class = resolved(&model, class).map_err(|problem| format!("classes.{name}: {problem}"))?;
+            let class = resolved(&model, class)
+                .map_err(|cause| Cause::Class { class: name.clone(), cause: Box::new(cause) })?;
             model.classes.insert(name, class);
         }
     }
@@ -57,18 +101,17 @@ fn like(class: &Value) -> Option<&str> {
     class.get("like").and_then(Value::as_str)
 }
 
-fn resolved(model: &Model, mut class: Value) -> Result<CellClass, String> {
+fn resolved(model: &Model, mut class: Value) -> Result<CellClass, Cause> {
     let whole = match like(&class).map(str::to_owned) {
         None => class,
         Some(of) => {
-            let base = model.classes.get(&of).ok_or_else(|| crate::scene::unknown_class(&of, model))?;
-            let mut whole = serde_json::to_value(base).map_err(|e| e.to_string())?;
+            let mut whole = serde_json::to_value(model.class(&of)?)?;
             class.as_object_mut().map(|fields| fields.remove("like"));
             overlay(&mut whole, class);
             whole
         }
     };
-    serde_json::from_value(whole).map_err(|e| e.to_string())
+    Ok(serde_json::from_value(whole)?)
 }
 
 /// Puts the values of one table over those of another, table by table.

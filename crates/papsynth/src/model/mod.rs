@@ -11,16 +11,10 @@ use std::collections::BTreeMap;
 use fsd_shape::ShapeStatistics;
 use serde::{Deserialize, Serialize};
 
-use crate::error::Error;
+use crate::error::{Cause, Error};
 
 /// The version of models that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
-
-/// The classes that are told from those of the model that ships, by the numbers in which they differ.
-const BUILTIN_CLASSES: [&str; 2] = [include_str!("../../model/cervix.toml"), include_str!("../../model/oral.toml")];
-
-/// The text of the model that ships.
-const BUILTIN: &str = include_str!("../../model/default.json");
 
 /// A model: what cells of each class are like.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -132,7 +126,7 @@ impl Form {
         *self == Self::default()
     }
 
-    fn check(&self, path: &str) -> Result<(), String> {
+    fn check(&self, path: &str) -> Result<(), Cause> {
         if let Some(elongation) = &self.elongation {
             elongation.check(&format!("{path}.elongation"), 0.0, 0.9)?;
         }
@@ -241,43 +235,6 @@ pub struct Donor {
 pub const OUTSIDE: i16 = i16::MIN;
 
 impl Model {
-    /// The model that ships: numbers alone, measured on real cells.
-    ///
-    /// # Panics
-    /// Never: the file is part of the crate and its tests read it.
-    #[must_use]
-    pub fn builtin() -> Self {
-        let learned = Self::from_json(BUILTIN).expect("the model that ships is sound");
-        BUILTIN_CLASSES.iter().fold(learned, |model, text| model.with(text).expect("the classes that ship are sound"))
-    }
-
-    /// This model and the classes of a text, which take the place of classes of the same names.
-    ///
-    /// The text is a model as `papsynth learn` writes it, or a class file: TOML whose classes may each say which class they
-    /// are `like`, and after that only the numbers in which they differ.
-    ///
-    /// ```
-    /// # use papsynth::model::Model;
-    /// let text = r#"
-    ///     version = 1
-    ///     [classes.spindle]
-    ///     like = "intermediate"
-    ///     bethesda = "HSIL"
-    ///     cytoplasm.form = { elongation = { mean = 0.6, sd = 0.05 } }
-    /// "#;
-    /// let model = Model::builtin().with(text)?;
-    /// assert_eq!(model.classes["spindle"].nucleus, model.classes["intermediate"].nucleus);
-    /// # Ok::<(), papsynth::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As those of [`from_json`](Self::from_json), or if a class is like one that is not there.
-    pub fn with(&self, text: &str) -> Result<Self, Error> {
-        let model = class_file::merged(self, text).map_err(Error::Model)?;
-        model.check().map_err(Error::Model)?;
-        Ok(model)
-    }
-
     /// Reads a model from its text.
     ///
     /// # Errors
@@ -287,23 +244,24 @@ impl Model {
         struct Version {
             version: u32,
         }
-        let found = serde_json::from_str::<Version>(text)
-            .map_err(|e| Error::Model(format!("this is no model of papsynth: {e}")))?;
-        if found.version != MODEL_VERSION {
-            return Err(Error::Model(format!(
-                "its version is {}; this program reads version {MODEL_VERSION}",
-                found.version
-            )));
-        }
-        let model: Self = serde_json::from_str(text).map_err(|e| Error::Model(e.to_string()))?;
-        model.check().map_err(Error::Model)?;
-        Ok(model)
+        let read = || {
+            let found = serde_json::from_str::<Version>(text).map_err(Cause::NotAModel)?.version;
+            if found != MODEL_VERSION {
+                return Err(Cause::ModelVersion(found.to_string(), MODEL_VERSION));
+            }
+            let model: Self = serde_json::from_str(text)?;
+            model.checked().map(|()| model)
+        };
+        read().map_err(Error::Model)
     }
 
     /// The text of the model.
+    ///
+    /// # Panics
+    /// Never: strings, numbers and lists can be written as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        let mut text = serde_json::to_string(self).unwrap_or_default();
+        let mut text = serde_json::to_string(self).expect("every model can be written as JSON");
         text.push('\n');
         text
     }
@@ -312,106 +270,115 @@ impl Model {
     ///
     /// # Errors
     /// The first number that cannot be, by its path, with what would be accepted.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), Error> {
+        self.checked().map_err(Error::Model)
+    }
+
+    pub(crate) fn checked(&self) -> Result<(), Cause> {
         for (name, class) in &self.classes {
             if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
-                return Err(format!("classes: `{name}` is no name; expected letters, digits, `-` and `_`"));
+                return Err(Cause::ClassName(name.clone()));
             }
-            class.check().map_err(|problem| format!("classes.{name}.{problem}"))?;
+            class.check(&format!("classes.{name}"))?;
         }
         Ok(())
+    }
+
+    /// A class by its name.
+    pub(crate) fn class(&self, name: &str) -> Result<&CellClass, Cause> {
+        let known = || self.classes.keys().cloned().collect();
+        self.classes.get(name).ok_or_else(|| Cause::UnknownClass(name.to_owned(), known()))
     }
 }
 
 impl CellClass {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, path: &str) -> Result<(), Cause> {
+        let at = |field: &str| format!("{path}.{field}");
         let (cytoplasm, nucleus) = (&self.cytoplasm, &self.nucleus);
-        cytoplasm.radius_um.check("cytoplasm.radius_um", 0.5, 500.0)?;
-        cytoplasm.absorbance.check("cytoplasm.absorbance", 1e-4, 4.0)?;
-        profile("cytoplasm.rim_to_centre", &cytoplasm.rim_to_centre)?;
-        cytoplasm.form.check("cytoplasm.form")?;
-        nucleus.form.check("nucleus.form")?;
-        within("nucleus.nucleoli", nucleus.nucleoli, 0.0, 10.0)?;
-        within("cytoplasm.pliability", cytoplasm.pliability, 0.0, 1.0)?;
+        cytoplasm.radius_um.check(&at("cytoplasm.radius_um"), 0.5, 500.0)?;
+        cytoplasm.absorbance.check(&at("cytoplasm.absorbance"), 1e-4, 4.0)?;
+        profile(&at("cytoplasm.rim_to_centre"), &cytoplasm.rim_to_centre)?;
+        cytoplasm.form.check(&at("cytoplasm.form"))?;
+        nucleus.form.check(&at("nucleus.form"))?;
+        within(&at("nucleus.nucleoli"), nucleus.nucleoli, 0.0, 10.0)?;
+        within(&at("cytoplasm.pliability"), cytoplasm.pliability, 0.0, 1.0)?;
         if let Some(halo) = &cytoplasm.halo {
-            within("cytoplasm.halo.probability", halo.probability, 0.0, 1.0)?;
-            halo.radius.check("cytoplasm.halo.radius", 1.0, 10.0)?;
-            halo.clearing.check("cytoplasm.halo.clearing", 0.0, 1.0)?;
-            halo.rim.check("cytoplasm.halo.rim", 0.0, 4.0)?;
+            within(&at("cytoplasm.halo.probability"), halo.probability, 0.0, 1.0)?;
+            halo.radius.check(&at("cytoplasm.halo.radius"), 1.0, 10.0)?;
+            halo.clearing.check(&at("cytoplasm.halo.clearing"), 0.0, 1.0)?;
+            halo.rim.check(&at("cytoplasm.halo.rim"), 0.0, 4.0)?;
         }
-        cytoplasm.shapes.check("cytoplasm.shapes")?;
-        nucleus.radius_um.check("nucleus.radius_um", 0.2, 200.0)?;
-        within("nucleus.size_correlation", nucleus.size_correlation, -1.0, 1.0)?;
-        nucleus.off_centre.check("nucleus.off_centre", 0.0, 1.0)?;
-        within("nucleus.polarity", nucleus.polarity, 0.0, 1.0)?;
-        nucleus.absorbance.check("nucleus.absorbance", 0.0, 4.0)?;
+        cytoplasm.shapes.check(&at("cytoplasm.shapes"))?;
+        nucleus.radius_um.check(&at("nucleus.radius_um"), 0.2, 200.0)?;
+        within(&at("nucleus.size_correlation"), nucleus.size_correlation, -1.0, 1.0)?;
+        nucleus.off_centre.check(&at("nucleus.off_centre"), 0.0, 1.0)?;
+        within(&at("nucleus.polarity"), nucleus.polarity, 0.0, 1.0)?;
+        nucleus.absorbance.check(&at("nucleus.absorbance"), 0.0, 4.0)?;
         let chromatin = &nucleus.chromatin;
-        within("nucleus.chromatin.nu", chromatin.nu, 0.05, 20.0)?;
-        within("nucleus.chromatin.length_um", chromatin.length_um, 0.01, 50.0)?;
-        chromatin.sd.check("nucleus.chromatin.sd", 0.0, 4.0)?;
-        within("nucleus.chromatin.skewness", chromatin.skewness, -3.0, 3.0)?;
-        profile("nucleus.chromatin.rim_to_centre", &chromatin.rim_to_centre)?;
-        nucleus.shapes.check("nucleus.shapes")?;
+        within(&at("nucleus.chromatin.nu"), chromatin.nu, 0.05, 20.0)?;
+        within(&at("nucleus.chromatin.length_um"), chromatin.length_um, 0.01, 50.0)?;
+        chromatin.sd.check(&at("nucleus.chromatin.sd"), 0.0, 4.0)?;
+        within(&at("nucleus.chromatin.skewness"), chromatin.skewness, -3.0, 3.0)?;
+        profile(&at("nucleus.chromatin.rim_to_centre"), &chromatin.rim_to_centre)?;
+        nucleus.shapes.check(&at("nucleus.shapes"))?;
         for (index, donor) in nucleus.donors.iter().enumerate() {
-            donor.check().map_err(|problem| format!("nucleus.donors[{index}].{problem}"))?;
+            donor.check(at(&format!("nucleus.donors[{index}]")))?;
         }
         Ok(())
     }
 }
 
 impl Shapes {
-    fn check(&self, path: &str) -> Result<(), String> {
+    fn check(&self, path: &str) -> Result<(), Cause> {
         for (name, statistics) in [("correlated", &self.correlated), ("independent", &self.independent)] {
-            fsd_shape::ShapeModel::from_statistics(statistics.clone()).map_err(|e| format!("{path}.{name}: {e}"))?;
+            let sound = fsd_shape::ShapeModel::from_statistics(statistics.clone());
+            sound.map_err(|error| Cause::Shapes(format!("{path}.{name}"), error))?;
         }
         Ok(())
     }
 }
 
 impl Donor {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, field: String) -> Result<(), Cause> {
         /// Widest donor: a nucleus of 100 µm at 0.05 µm a pixel, and then some.
         const WIDEST: usize = 4096;
-        within("pixel_um", self.pixel_um, 0.05, 4.0)?;
-        if self.width == 0 || self.width > WIDEST || !self.absorbance_milli.len().is_multiple_of(self.width) {
-            return Err(format!(
-                "width: {} does not divide its {} pixels into rows",
-                self.width,
-                self.absorbance_milli.len()
-            ));
+        within(&format!("{field}.pixel_um"), self.pixel_um, 0.05, 4.0)?;
+        let pixels = self.absorbance_milli.len();
+        if self.width == 0 || self.width > WIDEST || !pixels.is_multiple_of(self.width) {
+            return Err(Cause::DonorSize { field, width: self.width, pixels });
         }
         if self.absorbance_milli.iter().all(|&v| v == OUTSIDE) {
-            return Err("absorbance_milli: no pixel lies inside the nucleus".to_owned());
+            return Err(Cause::EmptyDonor(field));
         }
         Ok(())
     }
 }
 
 impl LogNormal {
-    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), String> {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
         within(&format!("{path}.median"), self.median, low, high)?;
         within(&format!("{path}.log_sd"), self.log_sd, 0.0, 3.0)
     }
 }
 
 impl Normal {
-    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), String> {
+    fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
         within(&format!("{path}.mean"), self.mean, low, high)?;
         within(&format!("{path}.sd"), self.sd, 0.0, high)
     }
 }
 
-fn within(path: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+fn within(path: &str, value: f64, low: f64, high: f64) -> Result<(), Cause> {
     if value.is_finite() && (low..=high).contains(&value) {
         Ok(())
     } else {
-        Err(format!("{path}: {value} is outside {low} to {high}"))
+        Err(Cause::OutOfRange { field: path.to_owned(), value, low, high })
     }
 }
 
-fn profile(path: &str, values: &[f64]) -> Result<(), String> {
+fn profile(path: &str, values: &[f64]) -> Result<(), Cause> {
     if values.is_empty() {
-        return Err(format!("{path}: it is empty; expected at least one number"));
+        return Err(Cause::EmptyProfile(path.to_owned()));
     }
     values.iter().try_for_each(|value| within(path, *value, 0.0, 100.0))
 }

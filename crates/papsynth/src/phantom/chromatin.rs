@@ -5,6 +5,7 @@ use quilt_texture::{QuiltParams, Quilter, Source};
 use spectral_field::{FieldParams, Padding, SpectralField, Spectrum};
 
 use super::tile::{Point, Tile};
+use crate::error::Cause;
 use crate::key::{Key, Stream};
 use crate::model::{ChromatinStatistics, Donor, NucleusStatistics, OUTSIDE};
 use crate::random;
@@ -41,16 +42,14 @@ struct FieldSource {
 
 impl Donors {
     /// The donors of a class: learned ones where there are some, else made from the spectrum.
-    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, String> {
+    pub(crate) fn new(name: &str, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Self, Cause> {
         let field = FieldSource::new(&nucleus.chromatin)?;
         let imaged = !nucleus.donors.is_empty();
         let (sources, pixel_um) = match nucleus.donors.first() {
             Some(first) => {
                 let same = nucleus.donors.iter().all(|d| (d.pixel_um - first.pixel_um).abs() < 1e-6);
                 if !same {
-                    return Err(format!(
-                        "classes.{name}.nucleus.donors: their pixels differ in size; expected one size"
-                    ));
+                    return Err(Cause::DonorPixels(name.to_owned()));
                 }
                 (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
@@ -71,10 +70,10 @@ impl Donors {
         donors: usize,
         params: &QuiltParams,
         rng: &mut Stream,
-    ) -> Result<Vec<f32>, String> {
+    ) -> Result<Vec<f32>, Cause> {
         let chosen: Vec<&Source> =
             choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
-        let quilter = Quilter::new(&chosen, params).map_err(|e| e.to_string())?;
+        let quilter = Quilter::new(&chosen, params)?;
         let grid = Grid::new(coverage, pixel_um / self.pixel_um);
         let texture = quilter.synthesise(&grid.mask, grid.width, rng);
         let mut pixels = grid.sample(&texture.pixels, coverage);
@@ -103,12 +102,12 @@ fn choose(count: usize, wanted: usize, rng: &mut Stream) -> Vec<usize> {
     (0..wanted.min(count)).map(|_| left.swap_remove(random::below(left.len(), rng))).collect()
 }
 
-fn learned(donor: &Donor) -> Result<Source, String> {
+fn learned(donor: &Donor) -> Result<Source, Cause> {
     let mask: Vec<f32> = donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { 1.0 }).collect();
     let mut pixels: Vec<f32> =
         donor.absorbance_milli.iter().map(|&v| if v == OUTSIDE { 0.0 } else { f32::from(v) / 1000.0 }).collect();
     standardise(&mut pixels, &mask);
-    Source::new(&pixels, &mask, donor.width).map_err(|e| format!("nucleus.donors: {e}"))
+    Source::new(&pixels, &mask, donor.width).map_err(Cause::Donor)
 }
 
 /// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
@@ -118,30 +117,30 @@ fn made(
     nucleus: &NucleusStatistics,
     shapes: &ShapeModel,
     field: &FieldSource,
-) -> Result<Source, String> {
+) -> Result<Source, Cause> {
     // Donors belong to the model, not to an image: their key is the same for every data set.
     let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
     let radius =
         nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
     /// Smallest donor worth taking patches from, px.
     const SMALLEST: f64 = 9.0;
-    let drawn = shapes.draw(radius.max(SMALLEST), &mut rng).map_err(|e| e.to_string())?;
+    let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
     let outline: Vec<Point> = drawn.descriptors.outline(64);
     let mut coverage = Tile::around(&outline, 1.0);
     coverage.cover(&outline);
     let mut pixels = field.texture(&coverage.values, coverage.width, &mut rng);
     standardise(&mut pixels, &coverage.values);
-    Source::new(&pixels, &coverage.values, coverage.width).map_err(|e| e.to_string())
+    Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
 }
 
 impl FieldSource {
-    fn new(chromatin: &ChromatinStatistics) -> Result<Self, String> {
+    fn new(chromatin: &ChromatinStatistics) -> Result<Self, Cause> {
         /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
         const SIDE: usize = 128;
         let spectrum = Spectrum::Matern { nu: chromatin.nu, length_px: chromatin.length_um / MADE_PIXEL_UM };
         let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
         Ok(Self {
-            field: SpectralField::new(&params).map_err(|e| e.to_string())?,
+            field: SpectralField::new(&params)?,
             skewness: chromatin.skewness,
             profile: chromatin.rim_to_centre.clone(),
         })

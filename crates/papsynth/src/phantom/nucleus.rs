@@ -3,14 +3,17 @@
 use optics_psf::{Border, Gaussian, Method};
 
 use super::chromatin::standardise;
+use super::form;
+use super::piece::Piece;
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
-use super::{Piece, form};
+use crate::error::Cause;
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::{CellBody, NucleusBody, Object, Scene};
-use crate::truth::Part;
+use crate::scene::cell::{CellBody, NucleusBody};
+use crate::scene::field::{Object, Scene};
+use crate::truth::part::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
 const POINTS: usize = 64;
@@ -37,13 +40,13 @@ pub(super) fn make(
     scene: &Scene,
     object: &Object,
     body: &CellBody,
-) -> Result<Piece, String> {
+) -> Result<Piece, Cause> {
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
     let cell_centre = scene.grid().to_px(object.centre_um);
     let mut shape_rng = scene.stream("cell", object, "nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
-    let drawn = class.nucleus.draw(radius_px, &mut shape_rng).map_err(|e| e.to_string())?;
+    let drawn = class.nucleus.draw(radius_px, &mut shape_rng)?;
     let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
@@ -52,7 +55,7 @@ pub(super) fn make(
     let centre = [cell_centre[0] + dx, cell_centre[1] + dy];
     let outline: Vec<Point> = outline.iter().map(|p| placed(*p, nucleus.rotation_deg.to_radians(), centre)).collect();
 
-    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_LOST).map_err(|e| e.to_string())?;
+    let edge = Gaussian::truncated(nucleus.edge_um / pixel_um, Method::Direct, EDGE_LOST)?;
     let mut coverage = Tile::around(&outline, 2.0 + edge.radius() as f64);
     coverage.cover(&outline);
     let mut inner = coverage.blank();
@@ -70,7 +73,7 @@ pub(super) fn make(
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
         let own = &mut scene.stream("cell", object, "nucleus.clumps");
-        clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own)?;
+        clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own);
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
     // An imaged donor shows the rim of its own nucleus.
@@ -108,22 +111,15 @@ pub(super) fn make(
 }
 
 /// Makes a part of a texture's variance coarse.
-fn clump(
-    texture: &mut [f32],
-    coverage: &Tile,
-    share: f64,
-    pixel_um: f64,
-    rng: &mut crate::key::Stream,
-) -> Result<(), String> {
+fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut crate::key::Stream) {
     /// Standard deviation of what white noise is smoothed by, µm.
     const CLUMP_UM: f64 = 0.7;
-    let smooth = Gaussian::new(CLUMP_UM / pixel_um).map_err(|e| e.to_string())?;
+    let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least a hundredth of a µm wide");
     let white: Vec<f32> = coverage.values.iter().map(|_| random::normal(rng) as f32).collect();
     let mut coarse = smooth.blur(&white, coverage.width, Border::Reflect);
     standardise(&mut coarse, &coverage.values);
     let [fine, rough] = [1.0 - share, share].map(|part| part.sqrt() as f32);
     texture.iter_mut().zip(&coarse).for_each(|(value, coarse)| *value = fine * *value + rough * coarse);
-    Ok(())
 }
 
 /// Thickness of a nucleus relative to its mean: a plate of even thickness and an ellipsoid mixed, thicker towards one side.

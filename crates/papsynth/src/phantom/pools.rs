@@ -67,16 +67,16 @@ pub(crate) struct Look {
 const BETWEEN: f64 = 0.211_324_865_405_187_1;
 
 impl PoolMaker {
-    pub(crate) fn new() -> Result<Self, String> {
+    pub(crate) fn new() -> Self {
         let maker = |spectrum| {
             let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
-            SpectralField::new(&params).map_err(|e| e.to_string())
+            SpectralField::new(&params).expect("pools of this size can be planned")
         };
-        Ok(Self {
-            clouds: maker(Spectrum::Gaussian { sigma_px: CLOUD_SIGMA })?,
-            flecks: maker(Spectrum::BROWNIAN)?,
-            grain: maker(Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH })?,
-        })
+        Self {
+            clouds: maker(Spectrum::Gaussian { sigma_px: CLOUD_SIGMA }),
+            flecks: maker(Spectrum::BROWNIAN),
+            grain: maker(Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH }),
+        }
     }
 
     /// The pools of an image.

@@ -11,12 +11,12 @@ use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
 use super::chromatin::Donors;
 use super::pools::PoolMaker;
 use super::tile::Point;
+use crate::error::Cause;
 use crate::key::{Key, Stream};
 use crate::model::{CellClass, Model, Shapes};
 use crate::profile::Watch;
 use crate::random;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
-use crate::scene::unknown_class;
 
 /// Everything that phantoms are made with.
 #[derive(Debug)]
@@ -57,62 +57,59 @@ pub(crate) struct ClassStudio {
 }
 
 impl Studio {
-    pub(crate) fn new(recipe: &Recipe, model: &Model, watch: Watch) -> Result<Self, String> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, watch: Watch) -> Result<Self, Cause> {
         let mut classes = BTreeMap::new();
         for name in recipe.cells.keys() {
-            let class = model.classes.get(name).ok_or_else(|| unknown_class(name, model))?;
-            classes.insert(name.clone(), ClassStudio::new(name, class, recipe)?);
+            classes.insert(name.clone(), ClassStudio::new(name, model.class(name)?, recipe)?);
         }
         Ok(Self {
             recipe: recipe.clone(),
             classes,
-            cloth: cloth(recipe)?,
-            cytoskeletons: Cytoskeletons::new()?,
-            pools: PoolMaker::new()?,
+            cloth: cloth(recipe),
+            cytoskeletons: Cytoskeletons::new(),
+            pools: PoolMaker::new(),
             watch,
         })
     }
 }
 
 impl Cytoskeletons {
-    fn new() -> Result<Self, String> {
+    fn new() -> Self {
         let params = SkeletonParams::default();
-        let skeleton = Skeleton::new(&params).map_err(|e| e.to_string())?;
-        Ok(Self { skeleton, lloyd_passes: params.lloyd_passes, tori: Default::default() })
+        let skeleton = Skeleton::new(&params).expect("the defaults are valid");
+        Self { skeleton, lloyd_passes: params.lloyd_passes, tori: Default::default() }
     }
 
     /// The rivers of one cell in its outline.
-    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<River>, String> {
+    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<River>, Cause> {
         let number = random::below(TORI, rng);
-        let torus = match self.tori[number].get() {
-            Some(torus) => torus,
-            None => {
-                let mut own = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
-                let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut own).map_err(|e| e.to_string())?;
-                self.tori[number].get_or_init(|| torus)
-            }
-        };
-        self.skeleton.grow_from(torus, outline, rng).map_err(|e| e.to_string())
+        let torus = self.tori[number].get_or_init(|| {
+            let mut own = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
+            let torus = Torus::new(TORUS_SITES, self.lloyd_passes, &mut own);
+            torus.expect("a diagram of so many sites can be made")
+        });
+        Ok(self.skeleton.grow_from(torus, outline, rng)?)
     }
 }
 
-fn cloth(recipe: &Recipe) -> Result<Option<Cloth>, String> {
+fn cloth(recipe: &Recipe) -> Option<Cloth> {
     let params = match recipe.cytoplasm.sheet {
-        Sheet::Flat => return Ok(None),
+        Sheet::Flat => return None,
         Sheet::Verlet => ClothParams::paper(),
         Sheet::Xpbd => ClothParams::default(),
     };
-    Cloth::new(&params).map(Some).map_err(|e| format!("cytoplasm: {e}"))
+    Some(Cloth::new(&params).expect("the cloths that ship are valid"))
 }
 
 impl ClassStudio {
-    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, String> {
+    fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, Cause> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
             let statistics = match spread {
                 ShapeSpread::Correlated => &shapes.correlated,
                 ShapeSpread::Independent => &shapes.independent,
             };
-            ShapeModel::from_statistics(statistics.clone()).map_err(|e| format!("classes.{name}: {e}"))
+            ShapeModel::from_statistics(statistics.clone())
+                .map_err(|error| Cause::Shapes(format!("classes.{name}"), error))
         };
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;

@@ -57,7 +57,8 @@ pub(crate) fn textured(
     absorbance: f64,
     key: u64,
 ) {
-    let Ok(noise) = Fractal::new(&FractalParams { octaves, ..FractalParams::default() }, key) else { return };
+    let params = FractalParams { octaves, ..FractalParams::default() };
+    let noise = Fractal::new(&params, key).expect("a few octaves of noise are valid");
     let step = 1.0 / cell_px;
     let window = Window { origin: [-centre[0] * step, -centre[1] * step], step, first: tile.origin };
     let mut factor = vec![1.0; tile.values.len()];

@@ -4,14 +4,14 @@
 //! [`Model`](crate::model::Model). Lengths are in micrometres, angles in degrees, probabilities from 0 to 1,
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
-mod camera;
+pub(crate) mod camera;
 mod check;
-mod imaging;
-mod number;
+pub(crate) mod imaging;
+pub(crate) mod number;
 mod presets;
 mod print;
 mod scan;
-mod specimen;
+pub(crate) mod specimen;
 
 use std::collections::BTreeMap;
 
@@ -22,8 +22,8 @@ pub use crate::debris::{
     Bacilli, BareNuclei, Bubbles, Candidas, ClueCells, Cocci, Crystals, Debris, Dirt, Dust, Fibres, Leukocytes, Mucus,
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
+pub use crate::error::Problem;
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
-pub use check::Problem;
 pub use imaging::{Background, Field, Focus, Illumination, Imaging, Light, Mixing, Optics, Picture, Rendition};
 pub use number::{Law, Number, REACH_SD};
 pub use presets::Preset;

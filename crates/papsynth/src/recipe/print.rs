@@ -10,13 +10,13 @@ use super::Recipe;
 const COMMENT_WIDTH: usize = 110;
 
 pub(super) fn plain_toml(recipe: &Recipe) -> String {
-    toml::to_string(recipe).unwrap_or_default()
+    toml::to_string(recipe).expect("every recipe can be written as TOML")
 }
 
 /// Every field with its meaning above it.
 pub(super) fn commented_toml(recipe: &Recipe) -> String {
     let schema = Recipe::schema();
-    let value = serde_json::to_value(recipe).unwrap_or_default();
+    let value = serde_json::to_value(recipe).expect("every recipe can be written as JSON");
     let mut out = String::from(
         "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
          # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
@@ -46,7 +46,7 @@ fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Val
 
 /// The name of a field as TOML wants it: as it stands, or in quotes.
 fn key(name: &str) -> String {
-    let line = toml::to_string(&BTreeMap::from([(name, 0)])).unwrap_or_default();
+    let line = toml::to_string(&BTreeMap::from([(name, 0)])).expect("every name can be a key of TOML");
     line.strip_suffix(" = 0\n").unwrap_or(name).to_owned()
 }
 

@@ -2,17 +2,22 @@
 
 use rand_core::Rng;
 
+use crate::error::Cause;
 use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
 use crate::recipe::{CellMix, Number, Recipe};
 
+use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::draw::FieldNumbers;
+use super::field::Object;
 use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Body, CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Object, View, WeightMap};
+use super::view::View;
+use super::weight::WeightMap;
+use crate::debris::Body;
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(
@@ -22,7 +27,7 @@ pub(super) fn draw_cells(
     view: View,
     field: &FieldNumbers,
     stain: &FieldStain<'_>,
-) -> Result<Vec<Object>, String> {
+) -> Result<Vec<Object>, Cause> {
     let counts: Vec<usize> =
         recipe.cells.iter().map(|(class, mix)| field.count(&format!("cells.{class}.count"), &mix.count)).collect();
     let total = counts.iter().sum();
@@ -38,11 +43,11 @@ pub(super) fn draw_cells(
         field.draw("slide.relief_um", &recipe.slide.relief_um),
         field.draw("slide.median_um", &recipe.slide.median_um),
         field.key.stream("field", 0, "slide.relief").next_u64(),
-    )?;
+    );
     let mut cells = Vec::with_capacity(total);
     let mut groups_begun = 0;
     for ((name, mix), count) in recipe.cells.iter().zip(counts) {
-        let kind = Class { name, mix, class: class_of(name, model)? };
+        let kind = Class { name, mix, class: model.class(name)? };
         let mut groups = Groups::new(&mix.group, groups_begun);
         for _ in 0..count {
             let number = cells.len() as u64;
@@ -63,11 +68,6 @@ pub(super) struct Class<'a> {
     pub(super) name: &'a str,
     pub(super) mix: &'a CellMix,
     pub(super) class: &'a CellClass,
-}
-
-/// The class of a model, or what is wrong with its name.
-pub(super) fn class_of<'a>(name: &str, model: &'a Model) -> Result<&'a CellClass, String> {
-    model.classes.get(name).ok_or_else(|| unknown_class(name, model))
 }
 
 /// A cell that has no place yet.
@@ -119,12 +119,6 @@ fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
     let any = libm::atan2(off_centre[1], off_centre[0]);
     let angle = rotation_deg.to_radians() + (1.0 - polarity) * any;
     [distance * libm::cos(angle), distance * libm::sin(angle)]
-}
-
-/// The message for a class that a model does not have.
-pub(crate) fn unknown_class(name: &str, model: &Model) -> String {
-    let known: Vec<&str> = model.classes.keys().map(String::as_str).collect();
-    format!("the model has no class `{name}`; it has {}", known.join(", "))
 }
 
 fn draw_body(

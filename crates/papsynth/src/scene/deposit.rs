@@ -3,7 +3,7 @@
 use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
 use crate::recipe::Deposit as Section;
 
 /// Densest patch, relative to the mean.
@@ -22,19 +22,19 @@ pub(super) struct Deposit {
 }
 
 impl Deposit {
-    pub(super) fn draw(section: &Section, slide: &FieldNumbers) -> Result<Self, String> {
+    pub(super) fn draw(section: &Section, slide: &FieldNumbers) -> Self {
         let draw = |name: &str, number| slide.draw(&format!("scan.deposit.{name}"), number);
         let key = slide.key.stream("slide", 0, "scan.deposit.patches").next_u64();
         let params = FractalParams { octaves: 3, ..FractalParams::default() };
-        Ok(Self {
+        Self {
             centre_um: [draw("x_um", &section.x_um), draw("y_um", &section.y_um)],
             radius_um: draw("radius_um", &section.radius_um),
             edge_um: draw("edge_um", &section.edge_um),
             unevenness: draw("unevenness", &section.unevenness),
             patch_um: draw("patch_um", &section.patch_um),
             outside: draw("outside", &section.outside),
-            patches: Fractal::new(&params, key).map_err(|e| format!("scan.deposit: {e}"))?,
-        })
+            patches: Fractal::new(&params, key).expect("three octaves of noise are valid"),
+        }
     }
 
     /// Its middle, µm.

@@ -14,20 +14,14 @@ pub(crate) struct Relief {
 impl Relief {
     /// A relief of `depth_um` over a field of `size_um`, from Perlin noise with cells of `relief_um` behind a median
     /// filter of `median_um`.
-    pub(crate) fn new(
-        size_um: [f64; 2],
-        depth_um: f64,
-        relief_um: f64,
-        median_um: f64,
-        key: u64,
-    ) -> Result<Self, String> {
+    pub(crate) fn new(size_um: [f64; 2], depth_um: f64, relief_um: f64, median_um: f64, key: u64) -> Self {
         /// Samples to a cell of the noise: enough for linear interpolation between them.
         const SAMPLES: f64 = 8.0;
         let pitch_um = relief_um / SAMPLES;
         let samples = |length: f64| crate::random::count((length / pitch_um).ceil()) + 2;
         let (width, height) = (samples(size_um[0]), samples(size_um[1]));
-        let noise =
-            Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key).map_err(|e| e.to_string())?;
+        let params = FractalParams { octaves: 2, ..FractalParams::default() };
+        let noise = Fractal::new(&params, key).expect("two octaves of noise are valid");
         let mut raw = Vec::with_capacity(width * height);
         for y in 0..height {
             for x in 0..width {
@@ -41,7 +35,7 @@ impl Relief {
         for depth in &mut depths {
             *depth = (*depth - 0.5 * (low + high)) * scale;
         }
-        Ok(Self { width, height, pitch_um, depths })
+        Self { width, height, pitch_um, depths }
     }
 
     /// Depth at a place, µm.
@@ -85,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_relief_spans_its_depth_and_is_centred() {
-        let relief = Relief::new([300.0, 200.0], 5.0, 60.0, 15.0, 42).unwrap();
+        let relief = Relief::new([300.0, 200.0], 5.0, 60.0, 15.0, 42);
         let (low, high) = relief.depths.iter().fold((0.0_f64, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
         assert!((low + 2.5).abs() < 1e-9 && (high - 2.5).abs() < 1e-9, "{low} {high}");
         for step in 0..100 {

@@ -67,30 +67,32 @@ impl<'a> Groups<'a> {
     }
 
     /// The place of the next cell; `free` gives that of one which begins a group. What a group does is drawn from the stream of its first cell.
-    pub(super) fn next(
+    pub(super) fn next<E>(
         &mut self,
         radius_um: f64,
-        mut free: impl FnMut(&mut Stream) -> Result<[f64; 2], String>,
+        mut free: impl FnMut(&mut Stream) -> Result<[f64; 2], E>,
         rng: &mut Stream,
-    ) -> Result<Place, String> {
+    ) -> Result<Place, E> {
         if self.group.form == GroupForm::Alone {
             return Ok(Place { centre_um: free(rng)?, rotation_deg: f64::NAN, group: 0 });
         }
-        if self.is_full() {
-            let origin_um = free(rng)?;
-            let size = self.group.size.draw_count(rng).max(1);
-            let direction = random::direction(rng);
-            self.begun += 1;
-            self.now = Some(Started {
-                origin_um,
-                direction,
-                bend: random::between(-BEND, BEND, rng) / size as f64,
-                distance_um: 2.0 * radius_um * self.group.distance.draw(rng),
-                size,
-                cells: Vec::new(),
-            });
-        }
-        let Some(group) = &mut self.now else { return Err("a group of cells was not begun".to_owned()) };
+        let group = match self.now.take().filter(|group| group.cells.len() < group.size) {
+            Some(group) => self.now.insert(group),
+            None => {
+                let origin_um = free(rng)?;
+                let size = self.group.size.draw_count(rng).max(1);
+                let direction = random::direction(rng);
+                self.begun += 1;
+                self.now.insert(Started {
+                    origin_um,
+                    direction,
+                    bend: random::between(-BEND, BEND, rng) / size as f64,
+                    distance_um: 2.0 * radius_um * self.group.distance.draw(rng),
+                    size,
+                    cells: Vec::new(),
+                })
+            }
+        };
         let (centre_um, rotation_deg) = match self.group.form {
             GroupForm::Palisade => group.in_a_row(rng),
             GroupForm::Honeycomb => (group.in_a_layer(rng), random::between(0.0, 360.0, rng)),

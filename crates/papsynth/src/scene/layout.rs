@@ -2,11 +2,12 @@
 
 use rand_core::Rng;
 
+use crate::error::Cause;
 use crate::random;
 use crate::recipe::Layout;
 
-use super::View;
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
+use super::view::View;
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
@@ -28,7 +29,7 @@ pub(super) fn weight_map(
     given: Option<&WeightMap>,
     view: View,
     field: &FieldNumbers,
-) -> Result<WeightMap, String> {
+) -> Result<WeightMap, Cause> {
     let [width_um, height_um] = view.size_um();
     let pixels = |length: f64| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS);
     let (width, height) = (pixels(width_um), pixels(height_um));
@@ -62,12 +63,9 @@ pub(super) fn weight_map(
                 outside + (1.0 - outside) * libm::exp(-0.5 * distance * distance)
             }))
         }
-        Layout::Map { path } => {
-            given.cloned().ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))
-        }
+        Layout::Map { path } => given.cloned().ok_or_else(|| not_given(path, "an image")),
         Layout::Labels { path, smooth_um } => {
-            let map =
-                given.ok_or_else(|| format!("`layout.path` = \"{path}\" names a label image that was not given"))?;
+            let map = given.ok_or_else(|| not_given(path, "a label image"))?;
             let smooth = field.draw("layout.smooth_um", smooth_um);
             smoothed(map, smooth * map.width as f64 / width_um)
         }
@@ -103,16 +101,20 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 }
 
 /// What is wrong with what a layout names, before anything is drawn.
-pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), String> {
+pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
     let (Layout::Map { path } | Layout::Labels { path, .. }) = layout else { return Ok(()) };
-    let map = given.ok_or_else(|| format!("`layout.path` = \"{path}\" names an image that was not given"))?;
-    map.sampler().map(|_| ()).map_err(|message| format!("\"{path}\": {message}"))
+    let map = given.ok_or_else(|| not_given(path, "an image"))?;
+    map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
+}
+
+fn not_given(path: &str, what: &'static str) -> Cause {
+    Cause::NotGiven { path: path.to_owned(), what }
 }
 
 /// A map blurred by a Gaussian, since a cell's middle may lie beside a given label.
-fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, String> {
+fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
     map.sampler()?;
-    let kernel = optics_psf::Gaussian::new(sigma_px).map_err(|e| format!("layout.smooth_um: {e}"))?;
+    let kernel = optics_psf::Gaussian::new(sigma_px).map_err(Cause::Smoothing)?;
     Ok(WeightMap { width: map.width, weights: kernel.blur(&map.weights, map.width, optics_psf::Border::Reflect) })
 }
 
@@ -128,7 +130,7 @@ pub(super) struct Places {
 
 impl Places {
     /// Prepares to place `count` cells, or says why they will not fit: before the search starts.
-    pub(super) fn new(map: &WeightMap, count: usize, spacing_um: f64, view: View) -> Result<Self, String> {
+    pub(super) fn new(map: &WeightMap, count: usize, spacing_um: f64, view: View) -> Result<Self, Cause> {
         let sampler = map.sampler()?;
         let size_um = view.size_um();
         let area = size_um[0] * size_um[1] * sampler.possible_share();
@@ -137,23 +139,17 @@ impl Places {
         let margin = 1.0 + spacing_um / area.sqrt();
         let room = JAMMED * area * margin * margin / disc;
         if count > 1 && disc > 0.0 && count as f64 > room {
-            return Err(format!(
-                "{count} cells at least {spacing_um} µm apart do not fit where the layout lets them lie ({area:.0} µm²): \
-                 at most about {room:.0} do; ask for fewer `cells`, a smaller `slide.spacing_um` or a larger field"
-            ));
+            return Err(Cause::NoRoom { count, spacing_um, area_um2: area, room });
         }
         let tries = sampler.expected_tries() * count as f64;
         if tries > MOST_TRIES {
-            return Err(format!(
-                "the weight map is so uneven that {count} cells would take about {tries:.0e} tries; \
-                 expected at most {MOST_TRIES:.0e}: raise its dark parts, or ask for fewer `cells`"
-            ));
+            return Err(Cause::TooUneven { count, tries, most: MOST_TRIES });
         }
         Ok(Self { sampler, size_um, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
     }
 
     /// The next place, µm.
-    pub(super) fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<[f64; 2], String> {
+    pub(super) fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<[f64; 2], Cause> {
         /// Accepted candidates that may turn out too near to others before the search is given up.
         const CROWDED: usize = 20_000;
         let mut crowded = 0;
@@ -168,12 +164,7 @@ impl Places {
             }
             crowded += 1;
         }
-        Err(format!(
-            "after {} cells no place is left that is {} µm from all others; ask for fewer `cells`, a smaller \
-             `slide.spacing_um` or a larger field",
-            self.taken.len(),
-            self.spacing_um
-        ))
+        Err(Cause::Crowded { placed: self.taken.len(), spacing_um: self.spacing_um })
     }
 
     fn square(&self, place: [f64; 2]) -> (i64, i64) {

@@ -5,18 +5,23 @@
 //! So any part of a slide can be drawn alone, and a slide is part of every larger one.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
-use super::cells::{Class, Drawn, class_of};
+use super::cells::{Class, Drawn};
 use super::deposit::{DENSEST, Deposit};
-use super::draw::{FieldNumbers, empty, pixel_um};
+use super::draw::{empty, pixel_um};
+use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Object, Plot, Scene, View};
-use crate::debris::{Ground, Sieve};
+use super::strew::strew;
+use super::view::View;
+use crate::debris::ground::Sieve;
+use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
@@ -111,9 +116,9 @@ impl<T> Memory<T> {
 
 impl Population {
     /// The population of a slide whose own key is given, and the slide without anything on it.
-    pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), String> {
+    pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
-        let stain = FieldStain::of_slide(recipe, &slide);
+        let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
         let view = View { width: 0, height: 0, pixel_um };
         let scene = empty(recipe, view, &slide, &stain);
@@ -127,13 +132,13 @@ impl Population {
             pixel_um,
             share: (PLOT_PX * PLOT_PX) as f64 / field_px,
             spacing_um: slide.draw("slide.spacing_um", &recipe.slide.spacing_um),
-            deposit: Deposit::draw(&recipe.scan.deposit, &slide)?,
+            deposit: Deposit::draw(&recipe.scan.deposit, &slide),
             scatter: Scatter::Anywhere,
             relief: Relief::new(
                 slide.draw("slide.depth_um", &recipe.slide.depth_um),
                 slide.draw("slide.relief_um", &recipe.slide.relief_um),
                 relief_key,
-            )?,
+            ),
             sown: Memory::default(),
             plots: Memory::default(),
         };
@@ -151,7 +156,7 @@ impl Population {
     }
 
     /// How the layout lets cells lie on a slide.
-    fn scatter(&self, slide: &FieldNumbers) -> Result<Scatter, String> {
+    fn scatter(&self, slide: &FieldNumbers) -> Result<Scatter, Cause> {
         /// Most plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
         /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
@@ -160,16 +165,13 @@ impl Population {
         let Layout::Clusters { count, radius_um, outside } = &self.recipe.layout else {
             return match self.recipe.layout {
                 Layout::Uniform {} => Ok(Scatter::Anywhere),
-                _ => Err("layout.kind: slides know `uniform` and `clusters`; others describe one field".to_owned()),
+                _ => Err(Cause::LayoutOfField),
             };
         };
         let largest = radius_um.bounds()[1];
         let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
         if reach > FARTHEST {
-            return Err(format!(
-                "layout.radius_um: up to {largest} is too wide for a slide of such pixels; expected at most {:.0}",
-                FARTHEST as f64 * self.side_um() / CLUSTER_REACH
-            ));
+            return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
         let outside = slide.draw("layout.outside", outside);
         let (count, radius_um) = (count.clone(), radius_um.clone());
@@ -216,10 +218,10 @@ impl Population {
     }
 
     /// The cells of a plot, but for those that lie too near to one of another plot.
-    fn sow(&self, at: [i64; 2]) -> Result<Vec<Object>, String> {
+    fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(&self.scatter, at);
         let (outside, mean) = match self.scatter {
             Scatter::Anywhere => (1.0, 1.0),
@@ -232,7 +234,8 @@ impl Population {
         let mut first: Vec<[f64; 2]> = Vec::new();
         let (mut tried, mut begun) = (0_u64, 0);
         for (name, mix) in &self.recipe.cells {
-            let kind = Class { name, mix, class: class_of(name, &self.model)? };
+            // The engine was made with this model and recipe.
+            let kind = Class { name, mix, class: &self.model.classes[name] };
             let path = format!("cells.{name}.count");
             let alone = mix.group.form == GroupForm::Alone;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
@@ -256,7 +259,7 @@ impl Population {
                     let number = if member == 0 { number } else { number << 16 | 1 << 56 | member };
                     let cell = Drawn::new(&self.recipe, kind, &stain, field.key, number);
                     let mut place_rng = field.key.stream("cell", number, "place");
-                    let place = groups.next(cell.body.radius_um, |_| Ok(origin), &mut place_rng)?;
+                    let Ok(place) = groups.next(cell.body.radius_um, |_| Ok::<_, Infallible>(origin), &mut place_rng);
                     let depth_um = self.relief.at(global(place.centre_um));
                     cells.push(cell.lie(kind, number, &place, depth_um));
                     member += 1;
@@ -267,30 +270,31 @@ impl Population {
                 begun = groups.begun();
             }
         }
-        Ok(cells)
+        cells
     }
 
-    fn sown(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, String> {
-        self.sown.get(at, || self.sow(at))
+    fn sown(&self, at: [i64; 2]) -> Arc<Vec<Object>> {
+        let Ok(sown) = self.sown.get(at, || Ok::<_, Infallible>(self.sow(at)));
+        sown
     }
 
     /// Everything whose middle was drawn in a plot, in the order of its ids; places are counted from the plot's corner.
-    pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, String> {
+    pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, Cause> {
         self.plots.get(at, || self.draw(at))
     }
 
-    fn draw(&self, at: [i64; 2]) -> Result<Vec<Object>, String> {
+    fn draw(&self, at: [i64; 2]) -> Result<Vec<Object>, Cause> {
         let number = number(at);
         let field = FieldNumbers { key: self.key.plot(number) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
-        let mut objects = self.sown(at)?.as_ref().clone();
+        let mut objects = self.sown(at).as_ref().clone();
         // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
         let mut taken = Vec::new();
         for [x, y] in [[-1, -1], [0, -1], [1, -1], [-1, 0]] {
             let corner = [x, y].map(|step: i64| step as f64 * side_um);
-            let others = self.sown([at[0] + x, at[1] + y])?;
+            let others = self.sown([at[0] + x, at[1] + y]);
             let places = others.iter().map(|other| [0, 1].map(|axis| other.centre_um[axis] + corner[axis]));
             taken.extend(places.filter(|place| place.iter().all(|v| *v > -self.spacing_um)));
         }
@@ -305,13 +309,10 @@ impl Population {
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
         let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        self.recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects).through(sieve));
+        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
-            return Err(format!(
-                "{} objects lie in a square of {PLOT_PX} x {PLOT_PX} pixels; a slide can number {most} there: ask for fewer",
-                objects.len()
-            ));
+            return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
         }
         for (id, object) in (1_u32..).zip(&mut objects) {
             object.id = number << OBJECT_BITS | id;
@@ -354,11 +355,12 @@ fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
 }
 
 impl Relief {
-    fn new(depth_um: f64, cell_um: f64, key: u64) -> Result<Self, String> {
+    fn new(depth_um: f64, cell_um: f64, key: u64) -> Self {
         /// How far the noise of a field reaches from its lowest to its highest place, in the mean.
         const RANGE: f64 = 1.1;
-        let noise = Fractal::new(&FractalParams { octaves: 2, ..FractalParams::default() }, key);
-        Ok(Self { noise: noise.map_err(|e| format!("slide.relief_um: {e}"))?, cell_um, scale_um: depth_um / RANGE })
+        let params = FractalParams { octaves: 2, ..FractalParams::default() };
+        let noise = Fractal::new(&params, key).expect("two octaves of noise are valid");
+        Self { noise, cell_um, scale_um: depth_um / RANGE }
     }
 
     /// Depth at a place of the slide, µm.

@@ -2,6 +2,7 @@
 
 use rand_core::Rng;
 
+use crate::error::Cause;
 use crate::random;
 
 /// How likely each place of a field is, as an image that is stretched over it.
@@ -38,23 +39,17 @@ impl WeightMap {
     }
 
     /// Prepares the map, or says why nothing can be drawn from it.
-    pub(crate) fn sampler(&self) -> Result<Sampler, String> {
+    pub(crate) fn sampler(&self) -> Result<Sampler, Cause> {
         if self.width == 0 || self.weights.is_empty() || !self.weights.len().is_multiple_of(self.width) {
-            return Err(format!("a weight map of {} pixels cannot have rows of {}", self.weights.len(), self.width));
+            return Err(Cause::MapSize(self.weights.len(), self.width));
         }
         if let Some(bad) = self.weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
             let (x, y) = (bad % self.width, bad / self.width);
-            return Err(format!(
-                "the weight at pixel ({x}, {y}) is {}; expected a finite number of 0 or more",
-                self.weights[bad]
-            ));
+            return Err(Cause::Weight { x, y, weight: self.weights[bad] });
         }
         let largest = self.weights.iter().fold(0.0_f32, |a, b| a.max(*b));
         if largest <= 0.0 {
-            return Err(
-                "every weight is zero, so no object can ever be placed; expected at least one place above zero"
-                    .to_owned(),
-            );
+            return Err(Cause::NoWeight);
         }
         let possible = (0_u32..).zip(&self.weights).filter(|(_, w)| **w > 0.0).map(|(i, _)| i).collect();
         Ok(Sampler {
@@ -131,10 +126,18 @@ mod tests {
 
     #[test]
     fn a_map_that_yields_nothing_is_an_error_that_says_so() {
-        assert!(WeightMap { width: 2, weights: vec![0.0; 4] }.sampler().unwrap_err().contains("every weight is zero"));
+        assert!(
+            WeightMap { width: 2, weights: vec![0.0; 4] }
+                .sampler()
+                .unwrap_err()
+                .to_string()
+                .contains("every weight is zero")
+        );
         assert!(WeightMap { width: 0, weights: vec![] }.sampler().is_err());
         assert!(WeightMap { width: 3, weights: vec![1.0; 4] }.sampler().is_err());
-        assert!(WeightMap { width: 2, weights: vec![1.0, f32::NAN] }.sampler().unwrap_err().contains("(1, 0)"));
-        assert!(WeightMap { width: 2, weights: vec![1.0, -1.0] }.sampler().unwrap_err().contains("-1"));
+        assert!(
+            WeightMap { width: 2, weights: vec![1.0, f32::NAN] }.sampler().unwrap_err().to_string().contains("(1, 0)")
+        );
+        assert!(WeightMap { width: 2, weights: vec![1.0, -1.0] }.sampler().unwrap_err().to_string().contains("-1"));
     }
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use optics_psf::{Abbe, AbbeParams, Factor, Lattice, Layer, Microscope, Source, fast_length};
 
-use super::Slide;
 use super::canvas::{Canvas, Mixer, Window};
 use super::lenses::Lens;
+use super::passage::Slide;
+use crate::error::Cause;
 use crate::scene::{SceneMicroscope, View};
 
 /// How widely light spreads beyond the condenser's cone, µm.
@@ -19,17 +20,17 @@ pub(super) fn image(
     lens: &Lens,
     light: (&Mixer, usize),
     stage_um: f64,
-) -> Result<Factor, String> {
+) -> Result<Factor, Cause> {
     let View { width, height, pixel_um } = slide.scene.grid();
     let microscope = lens.imager.microscope();
     // Light that leaves on one side comes back on the other: so far apart that it does not reach the picture.
     let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
-    let layers = layers(slide, optics.slab_um, light, frame)?;
     let params = AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions } };
-    let abbe = Abbe::new(microscope, &params).map_err(|e| format!("optics.directions: {e}"))?;
-    let whole = abbe.image(&layers, stage_um).map_err(|e| format!("optics: {e}"))?;
+    let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
+    let layers = layers(slide, optics.slab_um, light, frame)?;
+    let whole = abbe.image(&layers, stage_um)?;
     let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
     let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();
     Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, floored: 0 })
@@ -38,16 +39,11 @@ pub(super) fn image(
 /// The widest cone of light of all objects, µm.
 fn reach_um(slide: Slide<'_>, microscope: &Microscope, stage_um: f64) -> f64 {
     let depths = slide.scene.objects.iter().map(|object| object.depth_um);
-    depths.map(|depth_um| microscope.cone_radius_um(-depth_um, stage_um)).fold(0.0, f64::max)
+    depths.map(|depth_um| microscope.cone_radius_um(depth_um, stage_um)).fold(0.0, f64::max)
 }
 
 /// Every slab that is not empty, as amplitudes.
-fn layers(
-    slide: Slide<'_>,
-    slab_um: f64,
-    (mixer, light): (&Mixer, usize),
-    frame: Window,
-) -> Result<Vec<Layer>, String> {
+fn layers(slide: Slide<'_>, slab_um: f64, (mixer, light): (&Mixer, usize), frame: Window) -> Result<Vec<Layer>, Cause> {
     let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
     let mut canvas = Canvas::default();
     for (object, phantom) in slide.scene.objects.iter().zip(slide.phantoms) {
@@ -74,8 +70,6 @@ fn layers(
             }
         }
     }
-    let layer = |(slab, amplitudes): (i64, Vec<[f64; 2]>)| {
-        Layer::new(-(slab as f64) * slab_um, amplitudes).map_err(|e| format!("optics: {e}"))
-    };
+    let layer = |(slab, amplitudes): (i64, Vec<[f64; 2]>)| Ok(Layer::new(slab as f64 * slab_um, amplitudes)?);
     slabs.into_iter().map(layer).collect()
 }

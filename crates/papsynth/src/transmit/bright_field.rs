@@ -5,15 +5,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
+use portable_numerics::elementary::exp10_from;
 
+use super::abbe;
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
 use super::lights::{ColouredLight, Group, groups};
 use super::overlap::{Meets, Overlaps};
-use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
+use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
-use crate::exp10::exp10_from;
-use crate::phantom::Phantom;
+use crate::error::Cause;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
@@ -74,13 +76,13 @@ impl BrightFieldPath {
         optics: &SceneMicroscope,
         lenses: &Lenses,
         threads: Threads,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Cause> {
         let scene = slide.scene;
         let groups = groups(slide, optics, lenses, threads)?;
         let further = further(optics, scene.view.pixel_um)?;
         let restores = scene.restoration.restore != Restore::Off && any_imaged(slide.phantoms);
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
-        let restoration = restores.then(feather).transpose().map_err(|e| e.to_string())?;
+        let restoration = restores.then(feather).transpose()?;
         Ok(Self {
             view: scene.view,
             optics: *optics,
@@ -102,7 +104,7 @@ impl BrightFieldPath {
     }
 
     /// The channels of `light` become what the objects let through.
-    pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+    pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         let View { width, height, .. } = self.view;
         let Light { channels, lights, pictures, .. } = light;
         for channel in channels.iter_mut() {
@@ -149,7 +151,7 @@ impl BrightFieldPath {
         stage_um: f64,
         group: &Group,
         lights: &mut [optics_psf::Light],
-    ) -> Result<(), String> {
+    ) -> Result<(), Cause> {
         let indices: Vec<usize> = (0..lights.len()).collect();
         let images = threads::map(self.threads, &indices, |&light| {
             let ColouredLight { lens, shift_um, .. } = &group.lights[light];
@@ -168,7 +170,7 @@ impl BrightFieldPath {
         let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
         let microscope = light.lens.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
-        microscope.cone_radius_um(-slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
+        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
     }
 
     /// Multiplies the lights of a group by what the objects let through, on either grid. Gives the mean absorbances over the
@@ -180,7 +182,7 @@ impl BrightFieldPath {
         group: &Group,
         lights: &mut [optics_psf::Light],
         floored: &mut usize,
-    ) -> Result<Vec<Vec<f64>>, String> {
+    ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
         let indices: Vec<usize> = (0..slide.phantoms.len()).collect();
         // One thread multiplies a patch while it is still in the cache.
@@ -244,21 +246,20 @@ impl BrightFieldPath {
         }
     }
 
-    /// How deep an object lies and how far the stage has travelled, as the optics count them. Depth counts away from the
-    /// objective there, and towards it here.
+    /// How deep an object lies and how far the stage has travelled.
     fn place(scene: &Scene, depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
         match focus {
             FocusAt::Everywhere => [0.0, 0.0],
-            FocusAt::Stage(plane_um) => [-depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
+            FocusAt::Stage(plane_um) => [depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
         }
     }
 
     /// Images an object; nothing if none of its light reaches the picture.
-    fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, String> {
+    fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, Cause> {
         let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
         let of_light = |light: &ColouredLight| {
             let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
-            light.lens.imager.focus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))
+            light.lens.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
         let n = self.optics.oversampling;
@@ -290,7 +291,7 @@ impl BrightFieldPath {
             imager.expose(patch, focus, scratch, factor);
             if !loaded.restored.is_empty() {
                 let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
-                let focus = imager.refocus(depth_um, stage_um).map_err(|e| format!("optics: {e}"))?;
+                let focus = imager.refocus(depth_um, stage_um)?;
                 imager.expose(patch, &focus, scratch, again);
                 restore(factor, again, &loaded.restored, window, n);
             }
@@ -330,10 +331,10 @@ impl BrightFieldPath {
 }
 
 /// The further spread of finished light, if there is any.
-pub(super) fn further(optics: &SceneMicroscope, pixel_um: f64) -> Result<Option<Gaussian>, String> {
+pub(super) fn further(optics: &SceneMicroscope, pixel_um: f64) -> Result<Option<Gaussian>, Cause> {
     let gaussian = || Gaussian::truncated(optics.extra_blur_um / pixel_um, Method::Direct, LOST_TAIL);
     let further = (optics.extra_blur_um > 0.0).then(gaussian).transpose();
-    further.map_err(|e| format!("optics.extra_blur_um: {e}"))
+    further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))
 }
 
 fn any_imaged(phantoms: &[Phantom]) -> bool {

@@ -5,12 +5,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method, Scratch};
+use portable_numerics::elementary::exp10_from;
 
-use super::{BAND, Band, FocusAt, Light, Passage, Slide};
+use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
-use crate::exp10::exp10_from;
+use crate::error::Cause;
+use crate::phantom::piece::{Phantom, Piece};
 use crate::phantom::tile::{TileRef, lay};
-use crate::phantom::{Phantom, Piece};
 use crate::scene::{Scene, SceneLight};
 use crate::threads::{self, Threads};
 use crate::truth::Mask;
@@ -66,13 +67,12 @@ impl GaussianPath {
         sigma_xy_um: f64,
         sigma_z_um_per_um: f64,
         threads: Threads,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Cause> {
         let view = slide.scene.view;
-        let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)
-            .map_err(|e| e.to_string())?;
+        let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)?;
         let wavelength_um = match slide.scene.light {
             SceneLight::Monochrome { wavelength_um, .. } => wavelength_um,
-            SceneLight::Colour { .. } => return Err("colour is not known to Gaussians".to_owned()),
+            SceneLight::Colour { .. } => return Err(Cause::ColourWithGaussians),
         };
         let px_per_um = sigma_z_um_per_um / view.pixel_um;
         let (width, height) = (view.width, view.height);
@@ -85,7 +85,7 @@ impl GaussianPath {
     }
 
     /// `light` becomes the absorbance I_p of the phantoms.
-    pub(super) fn absorb(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+    pub(super) fn absorb(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         let absorbance = &mut light.channels[0];
         absorbance.clear();
         absorbance.resize(self.width * self.height, 0.0);
@@ -142,7 +142,7 @@ impl GaussianPath {
         phantom: &'a Phantom,
         masks: &[Mask],
         focus: FocusAt,
-    ) -> Result<Vec<Blurred<'a>>, String> {
+    ) -> Result<Vec<Blurred<'a>>, Cause> {
         let sigma_px = match focus {
             FocusAt::Everywhere => 0.0,
             // σ grows with the distance from focus: the object's own depth, exactly, in every plane.
@@ -197,13 +197,13 @@ impl GaussianPath {
 }
 
 /// The blur of an object out of focus, if it is any.
-fn blur(sigma_px: f64) -> Result<Option<Gaussian>, String> {
+fn blur(sigma_px: f64) -> Result<Option<Gaussian>, Cause> {
     let gaussian = (sigma_px > SHARP_PX).then(|| Gaussian::truncated(sigma_px, Method::Decimated, LOST_TAIL));
-    gaussian.transpose().map_err(|e| e.to_string())
+    Ok(gaussian.transpose()?)
 }
 
 /// Pixels by which an object is spread that is blurred by so many.
-pub(super) fn reach_px(sigma_px: f64) -> Result<usize, String> {
+pub(super) fn reach_px(sigma_px: f64) -> Result<usize, Cause> {
     Ok(blur(sigma_px)?.as_ref().map_or(0, Gaussian::radius))
 }
 

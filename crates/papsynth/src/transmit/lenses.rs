@@ -1,5 +1,6 @@
 //! Microscopes that were met before, with everything that was computed for them.
 
+use crate::error::Cause;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use optics_psf::{Microscope, MicroscopeParams, PatchImager};
@@ -22,7 +23,7 @@ pub(crate) struct Lens {
 
 impl Lenses {
     /// The microscope of these parameters.
-    pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, String> {
+    pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, Cause> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = known.iter().position(|lens| lens.params == *params) {
             // Those used last stand last.
@@ -30,7 +31,7 @@ impl Lenses {
             known.push(Arc::clone(&lens));
             return Ok(lens);
         }
-        let microscope = Microscope::new(params).map_err(|e| format!("optics: {e}"))?;
+        let microscope = Microscope::new(params)?;
         let imager = PatchImager::new(&microscope);
         let lens = Arc::new(Lens { params: params.clone(), imager });
         if known.len() == REMEMBERED {

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use optics_psf::{MicroscopeParams, Zernike};
 
-use super::Slide;
 use super::canvas::Mixer;
 use super::lenses::{Lens, Lenses};
+use super::passage::Slide;
+use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
 use crate::threads::{self, Threads};
@@ -34,7 +35,7 @@ pub(super) fn groups(
     optics: &SceneMicroscope,
     lenses: &Lenses,
     threads: Threads,
-) -> Result<Vec<Group>, String> {
+) -> Result<Vec<Group>, Cause> {
     let scene = slide.scene;
     let params = |wavelength_um: f64, bandwidth_um: f64| MicroscopeParams {
         na: optics.na,
@@ -67,8 +68,8 @@ pub(super) fn groups(
                 vec![ColouredLight { lens, shift_um: 0.0, weights: vec![1.0] }],
             )])
         }
-        SceneLight::Colour { chromatic_um, mixing, .. } => {
-            let colour = crate::detect::colour(scene)?;
+        SceneLight::Colour { chromatic_um, mixing, lamp_k, .. } => {
+            let colour = crate::detect::colour(lamp_k, mixing)?;
             let light = |wavelength_um: f64, bandwidth_um: f64, weights: Vec<f64>| {
                 let lens = lenses.get(&params(wavelength_um, bandwidth_um))?;
                 let shift_um = chromatic_um * (wavelength_um - GREEN_UM) / (RED_UM - GREEN_UM);
@@ -89,7 +90,7 @@ pub(super) fn groups(
             let own = |channel: usize| (0..channels.len()).map(|c| if c == channel { 1.0 } else { 0.0 }).collect();
             let lights = channels.iter().enumerate();
             let lights = lights.map(|(c, of)| light(of.wavelength_um, of.bandwidth_um, own(c)));
-            let lights = lights.collect::<Result<_, String>>()?;
+            let lights = lights.collect::<Result<_, Cause>>()?;
             Ok(vec![group(Mixer::Colour(Box::new(colour)), lights)])
         }
     }

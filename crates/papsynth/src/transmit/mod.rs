@@ -10,38 +10,19 @@ mod gaussian;
 mod lenses;
 mod lights;
 mod overlap;
+mod passage;
 
 use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, Scatter};
 use rand_core::Rng;
 
-use crate::phantom::Phantom;
+use crate::error::Cause;
 use crate::scene::{Scene, SceneIllumination, SceneOptics};
 use crate::threads::Threads;
-use crate::truth::Mask;
 
 use bright_field::BrightFieldPath;
 use gaussian::GaussianPath;
 pub(crate) use lenses::Lenses;
-
-/// Rows that go from light to grey levels together: few enough to stay in the cache of one core.
-pub(crate) const BAND: usize = 32;
-
-/// Which plane is in focus.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum FocusAt {
-    /// The stage stands here, µm.
-    Stage(f64),
-    /// Every object its own: the all-in-focus image.
-    Everywhere,
-}
-
-/// What is imaged: a scene, its phantoms, and the complete masks of their pieces.
-#[derive(Clone, Copy)]
-pub(crate) struct Slide<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) phantoms: &'a [Phantom],
-    pub(crate) masks: &'a [Vec<Mask>],
-}
+pub(crate) use passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 
 /// What all planes of one scene share.
 pub(crate) enum LightPath {
@@ -49,44 +30,9 @@ pub(crate) enum LightPath {
     BrightField(Box<BrightFieldPath>),
 }
 
-/// Rows of the light of one channel of a plane, as fractions of full scale.
-pub(crate) struct Band<'a> {
-    /// The first row.
-    pub(crate) first: usize,
-    /// 10^(I_b − I_p) before the spread in the image plane, where that spread is a step of its own; else empty.
-    pub(crate) sharp: &'a [f32],
-    /// The same after it, channel by channel.
-    pub(crate) spread: &'a mut [&'a mut [f32]],
-}
-
-/// Memory for the light of a plane.
-#[derive(Debug, Default)]
-pub(crate) struct Light {
-    /// I_b of Eq. 10: the logarithm of the empty slide's light, as a fraction of full scale.
-    empty_log10: Vec<f32>,
-    /// Of each channel of the picture: the absorbance, or what the objects let through; then the light.
-    channels: Vec<Vec<f32>>,
-    /// What the objects let through of light that is imaged by itself, and pictures of it.
-    lights: Vec<optics_psf::Light>,
-    pictures: Vec<Vec<f32>>,
-    /// Rows of the empty slide's light.
-    empty: Vec<f32>,
-    bands: Vec<Vec<f32>>,
-    scratch: optics_psf::Scratch,
-}
-
-/// What is known of a plane once light has come through the objects.
-#[derive(Debug, Default)]
-pub(crate) struct Passage {
-    /// Of each piece of each phantom, in their order, for each channel: its mean absorbance over its mask.
-    pub(crate) absorbances: Vec<Vec<f64>>,
-    /// Pixels where optics would have given less light than there can be, and a least one was put in its place.
-    pub(crate) floored: usize,
-}
-
 impl LightPath {
     /// Prepares the path, and the empty slide's light in `light`.
-    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses, threads: Threads, light: &mut Light) -> Result<Self, String> {
+    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses, threads: Threads, light: &mut Light) -> Result<Self, Cause> {
         let view = slide.scene.view;
         light.empty_log10.resize(view.width * view.height, 0.0);
         background(slide.scene)?.log10_into(&mut light.empty_log10, view.width, [0, 0]);
@@ -102,7 +48,7 @@ impl LightPath {
     }
 
     /// Lets light through the phantoms.
-    pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, String> {
+    pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         match self {
             Self::Gaussian(path) => path.absorb(slide, focus, light),
             Self::BrightField(path) => path.pass(slide, focus, light),
@@ -119,7 +65,7 @@ impl LightPath {
 }
 
 /// The background of a scene (Eqs. 8–10), in fractions of full scale.
-fn background(scene: &Scene) -> Result<Background, String> {
+fn background(scene: &Scene) -> Result<Background, Cause> {
     let view = scene.view;
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
@@ -139,7 +85,7 @@ fn background(scene: &Scene) -> Result<Background, String> {
         },
     };
     let key = scene.key.stream("field", 0, "background").next_u64();
-    let background = Background::new(&params, view.width, view.height, key).map_err(|e| format!("background: {e}"))?;
+    let background = Background::new(&params, view.width, view.height, key)?;
     Ok(match scene.frame {
         Some(frame) => background.on_slide(frame.origin_px),
         None => background,
@@ -165,7 +111,7 @@ enum SpreadKind {
 
 impl Spread {
     /// Of the optics of a scene, whose objects are not looked at.
-    pub(crate) fn new(scene: &Scene, lenses: &Lenses) -> Result<Self, String> {
+    pub(crate) fn new(scene: &Scene, lenses: &Lenses) -> Result<Self, Cause> {
         let empty = Slide { scene, phantoms: &[], masks: &[] };
         let kind = match &scene.optics {
             SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
@@ -192,15 +138,15 @@ impl Spread {
     }
 
     /// Pixels by which an object of that depth is spread in some plane of its scene.
-    pub(crate) fn of_object_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, String> {
+    pub(crate) fn of_object_px(&self, scene: &Scene, depth_um: f64) -> Result<usize, Cause> {
         let mut widest = 0;
         for &plane_um in &scene.planes_um {
             let seen_at_um = scene.seen_at_um(plane_um, depth_um);
             match &self.kind {
                 SpreadKind::BrightField { groups, .. } => {
                     for light in groups.iter().flat_map(|group| &group.lights) {
-                        let margin = light.lens.imager.margin_px(-depth_um, seen_at_um - light.shift_um);
-                        widest = widest.max(margin.map_err(|e| format!("optics: {e}"))?);
+                        let margin = light.lens.imager.margin_px(depth_um, seen_at_um - light.shift_um);
+                        widest = widest.max(margin?);
                     }
                 }
                 SpreadKind::Gaussian { px_per_um, .. } => {

@@ -11,7 +11,8 @@ use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
 use super::canvas::{Window, add};
-use crate::phantom::Phantom;
+use crate::error::Cause;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, TileRef, lay};
 use crate::threads::{self, Threads};
 
@@ -96,7 +97,7 @@ impl Overlaps {
         blur_px: impl Fn(usize) -> f64 + Sync + Send,
         channels: &mut [Vec<f32>],
         threads: Threads,
-    ) -> Result<(), String> {
+    ) -> Result<(), Cause> {
         if self.objects.len() < 2 {
             return Ok(());
         }
@@ -136,18 +137,16 @@ impl Overlaps {
 }
 
 impl Overlapping {
-    fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, String> {
+    fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, Cause> {
         let blurred;
         let pieces = if blur_px > SHARP_PX {
-            let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL).map_err(|e| e.to_string())?;
+            let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL)?;
             blurred = self.pieces.iter().map(|tile| spread(&gaussian, tile)).collect::<Vec<_>>();
             &blurred
         } else {
             &self.pieces
         };
-        let Some(window) = Window::around(pieces.iter(), 1) else {
-            return Err("an object has no pixel".to_owned());
-        };
+        let window = Window::around(pieces.iter(), 1).expect("what overlaps has pixels");
         let samples = window.width * window.height;
         let mut amounts: [Vec<f32>; DYES] = Default::default();
         for (dye, amounts) in amounts.iter_mut().enumerate() {

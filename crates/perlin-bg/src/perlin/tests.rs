@@ -1,8 +1,10 @@
 use super::*;
+use crate::Window;
 use core::f64::consts::TAU;
 use noise::{NoiseFn, Perlin as Rival};
+use portable_numerics::random::between;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rand_xoshiro::rand_core::SeedableRng;
 
 const SEED: u64 = 0x0070_6572_6c69_6e00;
 
@@ -32,7 +34,7 @@ fn variance(image: &[f32]) -> f64 {
 
 fn positions(count: usize, range: f64) -> Vec<[f64; 2]> {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    let mut draw = || (crate::hash::unit(rng.next_u64()) * 2.0 - 1.0) * range;
+    let mut draw = || between(-range, range, &mut rng);
     (0..count).map(|_| [draw(), draw()]).collect()
 }
 

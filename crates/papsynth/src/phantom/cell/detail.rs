@@ -3,13 +3,14 @@
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
+use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::pools::{Look, Pools, SIDE, Texels};
 use crate::phantom::studio::Studio;
 use crate::phantom::tile::{Point, Tile, grown};
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::scene::CellBody;
+use crate::scene::cell::CellBody;
 
 /// Radius of a granule, µm (the standard deviation of its absorbance).
 const GRANULE_UM: f64 = 0.28;
@@ -91,7 +92,7 @@ pub(super) fn add_cytoskeleton(
     strength: f64,
     pixel_um: f64,
     rng: &mut Stream,
-) -> Result<(), String> {
+) -> Result<(), Cause> {
     /// Width of a fibre, µm.
     const FIBRE_UM: f64 = 0.3;
     let origin = absorbance.origin.map(|o| o as f64);
@@ -99,7 +100,7 @@ pub(super) fn add_cytoskeleton(
     let rivers = studio.cytoskeletons.grow(&local, rng)?;
     let mut lines = vec![0.0; absorbance.values.len()];
     let line = LineParams { width_px: (FIBRE_UM / pixel_um).max(1.0), ..LineParams::default() };
-    draw_into(&mut lines, absorbance.width, &rivers, &line).map_err(|e| e.to_string())?;
+    draw_into(&mut lines, absorbance.width, &rivers, &line)?;
     for (value, line) in absorbance.values.iter_mut().zip(&lines) {
         *value += strength as f32 * line;
     }

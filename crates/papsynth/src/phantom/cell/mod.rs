@@ -6,16 +6,19 @@ mod detail;
 mod outline;
 mod wrinkles;
 
+use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
 use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
-use crate::phantom::{Phantom, Piece};
 use crate::phantom::{form, nucleus};
 use crate::profile::Stage;
-use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
-use crate::truth::Part;
+use crate::scene::cell::{CellBody, Fold, FoldForm};
+use crate::scene::field::{Object, Scene};
+use crate::truth::part::Part;
+use crate::truth::traits::Trait;
 
 /// Points of a cell's outline before its rim is roughened.
 const POINTS: usize = 180;
@@ -32,7 +35,7 @@ pub(super) fn make(
     scene: &Scene,
     pools: &Pools<'_>,
     cells: &[(&Object, &CellBody)],
-) -> Result<Vec<Phantom>, String> {
+) -> Result<Vec<Phantom>, Cause> {
     let plans =
         cells.iter().map(|(object, body)| Plan::new(studio, scene, object, body)).collect::<Result<Vec<_>, _>>()?;
     let sheets = studio.watch.time(Stage::Sheets, || crumple(studio, scene, cells, &plans))?;
@@ -52,11 +55,8 @@ struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    fn new(studio: &'a Studio, scene: &Scene, object: &Object, body: &CellBody) -> Result<Self, String> {
-        let class = studio
-            .classes
-            .get(&body.class)
-            .ok_or_else(|| format!("the scene holds a cell of class `{}`, which its recipe does not", body.class))?;
+    fn new(studio: &'a Studio, scene: &Scene, object: &Object, body: &CellBody) -> Result<Self, Cause> {
+        let class = studio.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
         let centre = scene.sheet_grid().to_px(object.centre_um);
         let outline = studio.watch.time(Stage::Outlines, || outline(class, scene, object, body, centre))?;
         let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(studio, class, scene, object, body))?;
@@ -72,10 +72,10 @@ fn outline(
     object: &Object,
     body: &CellBody,
     centre: Point,
-) -> Result<Vec<Point>, String> {
+) -> Result<Vec<Point>, Cause> {
     let mut rng = scene.stream("cell", object, "outline");
     let radius_px = body.radius_um / scene.sheet_grid().pixel_um;
-    let drawn = class.cytoplasm.draw(radius_px, &mut rng).map_err(|e| e.to_string())?;
+    let drawn = class.cytoplasm.draw(radius_px, &mut rng)?;
     let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
     let posed = formed.rotated(object.rotation_deg.to_radians());
     let outline = posed.outline(POINTS);
@@ -131,13 +131,13 @@ fn crumple(
     scene: &Scene,
     cells: &[(&Object, &CellBody)],
     plans: &[Plan],
-) -> Result<Vec<Option<Sheet>>, String> {
+) -> Result<Vec<Option<Sheet>>, Cause> {
     let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs =
         cells.iter().zip(plans).map(|((_, body), plan)| Job { outline: &plan.outline, excess: body.detail.excess });
     let mut streams: Vec<Stream> = cells.iter().map(|(object, _)| scene.stream("cell", object, "sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
-    sheets.into_iter().map(|sheet| sheet.map(Some).map_err(|e| e.to_string())).collect()
+    sheets.into_iter().map(|sheet| Ok(Some(sheet?))).collect()
 }
 
 /// Presses, folds and stains a cell. Its absorbance is that of a dye along the light's path (Eq. 12): A = κ·c·l, where
@@ -150,14 +150,14 @@ fn finish(
     body: &CellBody,
     plan: Plan,
     sheet: Option<Sheet>,
-) -> Result<Phantom, String> {
+) -> Result<Phantom, Cause> {
     let own = |purpose: &str| scene.stream("cell", object, purpose);
     let mut rng = own("detail");
     let pixel_um = scene.sheet_grid().pixel_um;
     let mut pieces = vec![plan.outline.clone()];
     for crease in &plan.creases {
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
-        pieces = folded.map_err(|e| e.to_string())?.concat();
+        pieces = folded?.concat();
     }
     let rough: Vec<Vec<Point>> = pieces
         .iter()
@@ -173,7 +173,7 @@ fn finish(
     match sheet {
         Some(mut sheet) => {
             for crease in &plan.creases {
-                sheet.fold(crease).map_err(|e| e.to_string())?;
+                sheet.fold(crease)?;
             }
             let view = View { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel: 1.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
@@ -194,12 +194,12 @@ fn finish(
     }
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
-    let strength = body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE) as f32;
+    let strength = body.cytoplasm_absorbance.max(LEAST_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
     let area_px = coverage.sum() * (step * step) as f64;
     let absorbance = absorbance.refined(step);
-    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE);
+    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(LEAST_ABSORBANCE);
     let cytoplasm = Piece {
         part: Part::Cytoplasm,
         absorbance,
@@ -213,16 +213,16 @@ fn finish(
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
-fn traits(body: &CellBody) -> Vec<&'static str> {
+fn traits(body: &CellBody) -> Vec<Trait> {
     let fold = body.fold.map(|fold| match fold.form {
-        FoldForm::Flap => "flap",
-        FoldForm::Roll => "rolled",
-        FoldForm::Cigar => "folded",
+        FoldForm::Flap => Trait::Flap,
+        FoldForm::Roll => Trait::Rolled,
+        FoldForm::Cigar => Trait::Folded,
     });
-    let koilocytic = body.halo.map(|_| "koilocytic");
-    let granular = (body.detail.granules > 0.0).then_some("granular");
-    let pyknotic = body.nucleus.pyknotic.then_some("pyknotic");
-    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some("wrinkled");
+    let koilocytic = body.halo.map(|_| Trait::Koilocytic);
+    let granular = (body.detail.granules > 0.0).then_some(Trait::Granular);
+    let pyknotic = body.nucleus.pyknotic.then_some(Trait::Pyknotic);
+    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some(Trait::Wrinkled);
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 

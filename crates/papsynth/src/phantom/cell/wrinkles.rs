@@ -3,12 +3,12 @@
 use core::ops::Range;
 
 use multiversion::multiversion;
+use portable_numerics::elementary::exp_f32;
 
 use super::super::tile::{Point, Tile};
-use crate::exp10::exp;
 use crate::key::Stream;
 use crate::random;
-use crate::scene::CellDetail;
+use crate::scene::cell::CellDetail;
 
 /// Distance of the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
@@ -278,8 +278,8 @@ fn settle(thickness: &mut [f32], cover: &[f32], painted: &mut [f32]) {
 fn raise(row: &mut [f32], [first, step]: [f32; 2], [crest, slope]: [f32; 2], strength: f32) {
     for (i, value) in row.iter_mut().enumerate() {
         let off = first + step * i as f32;
-        let gauss = exp(crest * off * off);
-        let sloping = gauss + SLOPE as f32 * (exp(slope * off.max(0.0)) - gauss);
+        let gauss = exp_f32(crest * off * off);
+        let sloping = gauss + SLOPE as f32 * (exp_f32(slope * off.max(0.0)) - gauss);
         let profile = strength * if off > 0.0 { sloping } else { gauss };
         *value = if profile > *value { profile } else { *value };
     }

@@ -1,7 +1,8 @@
 //! What the microscope of a recipe must fulfil.
 
 use super::super::{Camera, Illumination, Imaging, Light, Number, Optics, Picture, Recipe};
-use super::{Check, Problem};
+use super::Check;
+use crate::error::Problem;
 
 /// Most pixels that one plane may have: 2³⁰, a gigapixel.
 const MAX_PIXELS: f64 = 1_073_741_824.0;

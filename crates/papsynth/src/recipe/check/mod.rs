@@ -2,25 +2,9 @@
 
 mod imaging;
 
-use std::fmt;
-
 use super::{Layout, Number, RECIPE_VERSION, Recipe};
 use crate::debris::MOST_PHASE_RAD;
-
-/// Something wrong with a recipe.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// The field, as a dotted path: `optics.sigma_xy_um`.
-    pub field: String,
-    /// What is wrong with it: the value, and what would be accepted.
-    pub message: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.field, self.message)
-    }
-}
+use crate::error::Problem;
 
 struct Check {
     problems: Vec<Problem>,

@@ -1,0 +1,372 @@
+//! Stockham's transform: no sequence is ever shuffled, and the order of operations is the same on every machine.
+
+use core::f64::consts::TAU;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use multiversion::multiversion;
+
+use super::lanes::{Lanes, Real};
+
+/// A forward transform of sequences of one length (Stockham's, with decimation in frequency). The inverse is the forward
+/// transform of the reversed sequence.
+#[derive(Debug, Clone)]
+pub struct LaneFft<T> {
+    len: usize,
+    passes: Vec<Pass<T>>,
+}
+
+#[derive(Debug, Clone)]
+struct Pass<T> {
+    radix: usize,
+    /// Butterflies, and numbers side by side that each of them takes.
+    butterflies: usize,
+    stride: usize,
+    /// Of each butterfly, exp −2πi pk/n for k = 1 … radix − 1.
+    twiddles: Vec<[T; 2]>,
+    /// exp −2πi k/radix, where the radix has no code of its own.
+    roots: Vec<[T; 2]>,
+}
+
+impl<T: Real> LaneFft<T> {
+    /// Plans a transform of `len` numbers. Prime factors above 5 are slow.
+    #[must_use]
+    pub fn new(len: usize) -> Self {
+        let (mut passes, mut rest, mut stride) = (Vec::new(), len, 1);
+        while rest > 1 {
+            let radix = [4, 2, 3, 5].into_iter().find(|&radix| rest.is_multiple_of(radix));
+            let radix = radix.unwrap_or_else(|| (7..).find(|&prime| rest.is_multiple_of(prime)).unwrap_or(rest));
+            let butterflies = rest / radix;
+            let places = (0..butterflies).flat_map(|p| (1..radix).map(move |k| p * k));
+            let twiddles = places.map(|place| root(place, rest)).collect();
+            let roots = if radix > 5 { (0..radix).map(|k| root(k, radix)).collect() } else { Vec::new() };
+            passes.push(Pass { radix, butterflies, stride, twiddles, roots });
+            rest = butterflies;
+            stride *= radix;
+        }
+        Self { len, passes }
+    }
+
+    /// Transforms `values`, whose memory and that of `spare` may change places.
+    ///
+    /// # Panics
+    ///
+    /// If `values` or `spare` has another length than the plan.
+    pub fn process<const N: usize>(&self, values: &mut Vec<Lanes<T, N>>, spare: &mut Vec<Lanes<T, N>>) {
+        assert!(values.len() == self.len && spare.len() == self.len, "a sequence has another length than its plan");
+        if run(&self.passes, values, spare) {
+            core::mem::swap(values, spare);
+        }
+    }
+}
+
+/// Transforms of all lengths that were asked for: each is planned once.
+#[derive(Debug, Default)]
+pub struct Plans<T> {
+    made: Mutex<BTreeMap<usize, Arc<LaneFft<T>>>>,
+}
+
+impl<T: Real> Plans<T> {
+    /// The plan for `len` numbers.
+    #[must_use]
+    pub fn get(&self, len: usize) -> Arc<LaneFft<T>> {
+        // A plan is whole or absent, even if a thread has panicked.
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(made.entry(len).or_insert_with(|| Arc::new(LaneFft::new(len))))
+    }
+}
+
+/// exp −2πi k/n, from the sine and cosine of an eighth of a turn at most.
+fn root<T: Real>(k: usize, n: usize) -> [T; 2] {
+    // Eighths of nths: whole, even where n is odd.
+    let (n, k) = (n as u64, 8 * (k % n) as u64);
+    let is_below = k > 4 * n;
+    let k = if is_below { 8 * n - k } else { k };
+    let is_left = k > 2 * n;
+    let k = if is_left { 4 * n - k } else { k };
+    let is_steep = k > n;
+    let k = if is_steep { 2 * n - k } else { k };
+    let (sin, cos) = libm::sincos(TAU * (k as f64 / (8 * n) as f64));
+    let (cos, sin) = if is_steep { (sin, cos) } else { (cos, sin) };
+    [if is_left { -cos } else { cos }, if is_below { sin } else { -sin }].map(T::nearest)
+}
+
+/// Says whether the spectrum is in `spare`.
+#[multiversion(targets = "simd")]
+fn run<T: Real, const N: usize>(passes: &[Pass<T>], values: &mut [Lanes<T, N>], spare: &mut [Lanes<T, N>]) -> bool {
+    let (mut from, mut to) = (values, spare);
+    for pass in passes {
+        match pass.radix {
+            2 => by_2(pass, from, to),
+            3 => by_3(pass, from, to),
+            4 => by_4(pass, from, to),
+            5 => by_5(pass, from, to),
+            _ => by_any(pass, from, to),
+        }
+        core::mem::swap(&mut from, &mut to);
+    }
+    !passes.len().is_multiple_of(2)
+}
+
+#[inline(always)]
+fn times<T: Real>([re, im]: [T; 2], w: [T; 2]) -> [T; 2] {
+    [re * w[0] - im * w[1], re * w[1] + im * w[0]]
+}
+
+/// The `j`-th run of the stride of numbers that a butterfly takes.
+#[inline(always)]
+fn run_of<'a, T, const N: usize>(
+    pass: &Pass<T>,
+    from: &'a [Lanes<T, N>],
+    butterfly: usize,
+    j: usize,
+) -> &'a [Lanes<T, N>] {
+    &from[pass.stride * (butterfly + pass.butterflies * j)..][..pass.stride]
+}
+
+#[inline(always)]
+fn by_2<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    let s = pass.stride;
+    for (p, (to, w)) in to.chunks_exact_mut(2 * s).zip(&pass.twiddles).enumerate() {
+        let run = |j| run_of(pass, from, p, j);
+        let (a, b) = (run(0), run(1));
+        let (to_0, to_1) = to.split_at_mut(s);
+        for q in 0..s {
+            two(&a[q], &b[q], w, &mut to_0[q], &mut to_1[q]);
+        }
+    }
+}
+
+#[inline(always)]
+fn by_3<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    let s = pass.stride;
+    for (p, (to, w)) in to.chunks_exact_mut(3 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
+        let run = |j| run_of(pass, from, p, j);
+        let (a, b, c) = (run(0), run(1), run(2));
+        let (to_0, to) = to.split_at_mut(s);
+        let (to_1, to_2) = to.split_at_mut(s);
+        for q in 0..s {
+            three(&a[q], &b[q], &c[q], w, &mut to_0[q], &mut to_1[q], &mut to_2[q]);
+        }
+    }
+}
+
+#[inline(always)]
+fn by_4<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    let s = pass.stride;
+    for (p, (to, w)) in to.chunks_exact_mut(4 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
+        let run = |j| run_of(pass, from, p, j);
+        let (a, b, c, d) = (run(0), run(1), run(2), run(3));
+        let (to_0, to) = to.split_at_mut(s);
+        let (to_1, to) = to.split_at_mut(s);
+        let (to_2, to_3) = to.split_at_mut(s);
+        for q in 0..s {
+            four(&a[q], &b[q], &c[q], &d[q], w, &mut to_0[q], &mut to_1[q], &mut to_2[q], &mut to_3[q]);
+        }
+    }
+}
+
+#[inline(always)]
+fn by_5<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    let s = pass.stride;
+    for (p, (to, w)) in to.chunks_exact_mut(5 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
+        let run = |j| run_of(pass, from, p, j);
+        let (a, b, c, d, e) = (run(0), run(1), run(2), run(3), run(4));
+        let (to_0, to) = to.split_at_mut(s);
+        let (to_1, to) = to.split_at_mut(s);
+        let (to_2, to) = to.split_at_mut(s);
+        let (to_3, to_4) = to.split_at_mut(s);
+        for q in 0..s {
+            let to = (&mut to_0[q], &mut to_1[q], &mut to_2[q], &mut to_3[q], &mut to_4[q]);
+            five(&a[q], &b[q], &c[q], &d[q], &e[q], w, to.0, to.1, to.2, to.3, to.4);
+        }
+    }
+}
+
+/// The sum itself, for other primes.
+#[inline(always)]
+fn by_any<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+    let (s, radix) = (pass.stride, pass.radix);
+    let butterflies = to.chunks_exact_mut(radix * s).zip(pass.twiddles.chunks_exact(radix - 1));
+    for (p, (to, w)) in butterflies.enumerate() {
+        for (k, to) in to.chunks_exact_mut(s).enumerate() {
+            for (q, to) in to.iter_mut().enumerate() {
+                let mut sum = [[T::default(); N]; 2];
+                for j in 0..radix {
+                    let value = &from[s * (p + pass.butterflies * j) + q];
+                    let root = pass.roots[j * k % radix];
+                    for l in 0..N {
+                        let [re, im] = times([value[0][l], value[1][l]], root);
+                        sum[0][l] += re;
+                        sum[1][l] += im;
+                    }
+                }
+                let w = k.checked_sub(1).map_or([1.0, 0.0].map(T::nearest), |k| w[k]);
+                for l in 0..N {
+                    [to[0][l], to[1][l]] = times([sum[0][l], sum[1][l]], w);
+                }
+            }
+        }
+    }
+}
+
+// Butterflies: functions of their own, whose arguments the compiler knows to lie apart, so that lanes become vectors.
+
+#[inline(always)]
+fn two<T: Real, const N: usize>(
+    a: &Lanes<T, N>,
+    b: &Lanes<T, N>,
+    w: &[T; 2],
+    to_0: &mut Lanes<T, N>,
+    to_1: &mut Lanes<T, N>,
+) {
+    for l in 0..N {
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + b[0][l], a[1][l] + b[1][l]);
+        [to_1[0][l], to_1[1][l]] = times([a[0][l] - b[0][l], a[1][l] - b[1][l]], *w);
+    }
+}
+
+#[inline(always)]
+fn three<T: Real, const N: usize>(
+    a: &Lanes<T, N>,
+    b: &Lanes<T, N>,
+    c: &Lanes<T, N>,
+    w: &[[T; 2]; 2],
+    to_0: &mut Lanes<T, N>,
+    to_1: &mut Lanes<T, N>,
+    to_2: &mut Lanes<T, N>,
+) {
+    /// sin 2π/3.
+    const SIN: f64 = 0.866_025_403_784_438_6;
+    let (sine, half) = (T::nearest(SIN), T::nearest(0.5));
+    for l in 0..N {
+        let sum = [b[0][l] + c[0][l], b[1][l] + c[1][l]];
+        let apart = [sine * (b[0][l] - c[0][l]), sine * (b[1][l] - c[1][l])];
+        let rest = [a[0][l] - half * sum[0], a[1][l] - half * sum[1]];
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + sum[0], a[1][l] + sum[1]);
+        [to_1[0][l], to_1[1][l]] = times([rest[0] + apart[1], rest[1] - apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([rest[0] - apart[1], rest[1] + apart[0]], w[1]);
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
+fn four<T: Real, const N: usize>(
+    a: &Lanes<T, N>,
+    b: &Lanes<T, N>,
+    c: &Lanes<T, N>,
+    d: &Lanes<T, N>,
+    w: &[[T; 2]; 3],
+    to_0: &mut Lanes<T, N>,
+    to_1: &mut Lanes<T, N>,
+    to_2: &mut Lanes<T, N>,
+    to_3: &mut Lanes<T, N>,
+) {
+    for l in 0..N {
+        let even = [a[0][l] + c[0][l], a[1][l] + c[1][l]];
+        let even_apart = [a[0][l] - c[0][l], a[1][l] - c[1][l]];
+        let odd = [b[0][l] + d[0][l], b[1][l] + d[1][l]];
+        let odd_apart = [b[0][l] - d[0][l], b[1][l] - d[1][l]];
+        (to_0[0][l], to_0[1][l]) = (even[0] + odd[0], even[1] + odd[1]);
+        [to_1[0][l], to_1[1][l]] = times([even_apart[0] + odd_apart[1], even_apart[1] - odd_apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([even[0] - odd[0], even[1] - odd[1]], w[1]);
+        [to_3[0][l], to_3[1][l]] = times([even_apart[0] - odd_apart[1], even_apart[1] + odd_apart[0]], w[2]);
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
+fn five<T: Real, const N: usize>(
+    a: &Lanes<T, N>,
+    b: &Lanes<T, N>,
+    c: &Lanes<T, N>,
+    d: &Lanes<T, N>,
+    e: &Lanes<T, N>,
+    w: &[[T; 2]; 4],
+    to_0: &mut Lanes<T, N>,
+    to_1: &mut Lanes<T, N>,
+    to_2: &mut Lanes<T, N>,
+    to_3: &mut Lanes<T, N>,
+    to_4: &mut Lanes<T, N>,
+) {
+    /// Cosines and sines of 2π/5 and 4π/5.
+    const COS: [f64; 2] = [0.309_016_994_374_947_4, -0.809_016_994_374_947_4];
+    const SIN: [f64; 2] = [0.951_056_516_295_153_6, 0.587_785_252_292_473_1];
+    let (cos, sin) = (COS.map(T::nearest), SIN.map(T::nearest));
+    for l in 0..N {
+        let outer = [b[0][l] + e[0][l], b[1][l] + e[1][l]];
+        let outer_apart = [b[0][l] - e[0][l], b[1][l] - e[1][l]];
+        let inner = [c[0][l] + d[0][l], c[1][l] + d[1][l]];
+        let inner_apart = [c[0][l] - d[0][l], c[1][l] - d[1][l]];
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + outer[0] + inner[0], a[1][l] + outer[1] + inner[1]);
+        let near = [a[0][l] + cos[0] * outer[0] + cos[1] * inner[0], a[1][l] + cos[0] * outer[1] + cos[1] * inner[1]];
+        let far = [a[0][l] + cos[1] * outer[0] + cos[0] * inner[0], a[1][l] + cos[1] * outer[1] + cos[0] * inner[1]];
+        let near_apart =
+            [sin[0] * outer_apart[0] + sin[1] * inner_apart[0], sin[0] * outer_apart[1] + sin[1] * inner_apart[1]];
+        let far_apart =
+            [sin[1] * outer_apart[0] - sin[0] * inner_apart[0], sin[1] * outer_apart[1] - sin[0] * inner_apart[1]];
+        [to_1[0][l], to_1[1][l]] = times([near[0] + near_apart[1], near[1] - near_apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([far[0] + far_apart[1], far[1] - far_apart[0]], w[1]);
+        [to_3[0][l], to_3[1][l]] = times([far[0] - far_apart[1], far[1] + far_apart[0]], w[2]);
+        [to_4[0][l], to_4[1][l]] = times([near[0] - near_apart[1], near[1] + near_apart[0]], w[3]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lanes::ZERO;
+    use super::*;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
+    use rustfft::FftPlanner;
+    use rustfft::num_complex::Complex64;
+
+    #[test]
+    fn roots_are_cosines_and_sines() {
+        for n in 1..300 {
+            for k in 0..2 * n {
+                let [re, im] = root::<f64>(k, n);
+                let (sin, cos) = libm::sincos(TAU * (k % n) as f64 / n as f64);
+                assert!((re - cos).abs() + (im + sin).abs() < 2e-15, "{k}/{n}");
+                assert_eq!(root::<f64>(n - k % n, n), [re, -im], "{k}/{n} mirrored");
+            }
+        }
+    }
+
+    /// Largest error relative to the largest value, of every lane, beside another library.
+    fn error<T: Real + Into<f64>, const N: usize>(len: usize) -> f64 {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xF0);
+        let mut number = || f64::from(rng.next_u32() >> 8) / 16_777_216.0 - 0.5;
+        let image: Vec<Lanes<T, N>> =
+            (0..len).map(|_| [0, 1].map(|_| core::array::from_fn(|_| T::nearest(number())))).collect();
+        let (mut values, mut spare) = (image.clone(), image.clone());
+        LaneFft::new(len).process(&mut values, &mut spare);
+        let oracle = FftPlanner::new().plan_fft_forward(len);
+        let mut worst = 0.0_f64;
+        for l in 0..N {
+            let complex = |from: &Lanes<T, N>| Complex64::new(from[0][l].into(), from[1][l].into());
+            let mut expected: Vec<Complex64> = image.iter().map(complex).collect();
+            oracle.process(&mut expected);
+            let largest = expected.iter().map(|z| z.norm()).fold(0.0, f64::max);
+            for (found, expected) in values.iter().map(complex).zip(&expected) {
+                worst = worst.max((found - expected).norm() / largest);
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn spectra_are_those_of_another_library() {
+        let lengths = [1, 2, 3, 4, 5, 6, 7, 8, 12, 15, 16, 22, 30, 49, 60, 64, 90, 96, 101, 125, 128, 150, 162, 512];
+        for len in lengths {
+            let (single, double) = (error::<f32, 16>(len), error::<f64, 8>(len));
+            assert!(single < 1e-6 && double < 2e-15, "{len}: {single}, {double}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "another length")]
+    fn a_wrong_length_is_named() {
+        LaneFft::new(4).process(&mut vec![ZERO; 4], &mut vec![ZERO; 3]);
+    }
+}

@@ -1,0 +1,7 @@
+#![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+pub mod elementary;
+pub mod fourier;
+pub mod random;
+pub mod statistics;

@@ -1,0 +1,180 @@
+//! Scalar draws: uniform, whole and normal numbers, and random orders.
+
+use rand_core::Rng;
+
+/// 2⁻⁵³: one step of a 53-bit mantissa.
+const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+
+/// Maps a random word to a number uniform in `[0, 1)`, by its upper 53 bits.
+#[must_use]
+pub fn unit(word: u64) -> f64 {
+    (word >> 11) as f64 * STEP
+}
+
+/// Returns a number uniform in `[0, 1)` with 53 random bits.
+pub fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    unit(rng.next_u64())
+}
+
+/// Returns a number uniform in `(0, 1]`, whose logarithm is finite.
+pub fn open_uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    ((rng.next_u64() >> 11) as f64 + 0.5) * STEP
+}
+
+/// Returns a number uniform in `[low, high)`.
+pub fn between<R: Rng + ?Sized>(low: f64, high: f64, rng: &mut R) -> f64 {
+    low + (high - low) * uniform(rng)
+}
+
+/// Returns a whole number uniform in `0..count`, by multiplication: uneven by less than count / 2⁶⁴. It is 0 when `count` is 0.
+pub fn below<R: Rng + ?Sized>(count: usize, rng: &mut R) -> usize {
+    let product = u128::from(rng.next_u64()) * count as u128;
+    usize::try_from(product >> u64::BITS).unwrap_or(0)
+}
+
+/// Returns true with the given probability.
+pub fn chance<R: Rng + ?Sized>(probability: f64, rng: &mut R) -> bool {
+    uniform(rng) < probability
+}
+
+/// Returns a direction in radians, uniform on the circle.
+pub fn direction<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    between(0.0, core::f64::consts::TAU, rng)
+}
+
+/// Rounds a drawn number to a count, at least 0 and at most 2³² − 1.
+#[must_use]
+pub fn count(value: f64) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of u32")]
+    let count = libm::round(value).clamp(0.0, f64::from(u32::MAX)) as usize;
+    count
+}
+
+/// Puts items into a random order, each order as likely as every other (Fisher and Yates).
+pub fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
+    for last in (1..items.len()).rev() {
+        items.swap(last, below(last + 1, rng));
+    }
+}
+
+/// Returns one standard normal number. Where several are needed, [`Normals`] draws half as many words.
+pub fn normal<R: Rng + ?Sized>(rng: &mut R) -> f64 {
+    normal_pair(rng)[0]
+}
+
+/// Two independent standard normal numbers by Marsaglia's polar method (doi:10.1137/1006063).
+fn normal_pair<R: Rng + ?Sized>(rng: &mut R) -> [f64; 2] {
+    loop {
+        let x = 2.0 * uniform(rng) - 1.0;
+        let y = 2.0 * uniform(rng) - 1.0;
+        let s = x * x + y * y;
+        if s > 0.0 && s < 1.0 {
+            let scale = (-2.0 * libm::log(s) / s).sqrt();
+            return [scale * x, scale * y];
+        }
+    }
+}
+
+/// Standard normal numbers in a row: both of each pair that [`normal`] draws.
+#[derive(Debug)]
+pub struct Normals<'a, R: Rng + ?Sized> {
+    rng: &'a mut R,
+    spare: Option<f64>,
+}
+
+impl<'a, R: Rng + ?Sized> Normals<'a, R> {
+    /// Draws from `rng`.
+    pub fn new(rng: &'a mut R) -> Self {
+        Self { rng, spare: None }
+    }
+
+    /// Returns the next number.
+    pub fn draw(&mut self) -> f64 {
+        self.spare.take().unwrap_or_else(|| {
+            let [first, second] = normal_pair(self.rng);
+            self.spare = Some(second);
+            first
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+    use rand_xoshiro::rand_core::SeedableRng;
+
+    /// Mean, variance, skewness and excess kurtosis.
+    fn moments(values: &[f64]) -> [f64; 4] {
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let central = |k: usize| values.iter().map(|v| [v - mean; 4][..k].iter().product::<f64>()).sum::<f64>() / n;
+        let var = central(2);
+        [mean, var, central(3) / (var * var.sqrt()), central(4) / (var * var) - 3.0]
+    }
+
+    #[test]
+    fn normals_have_normal_moments() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x40A1);
+        let single: Vec<f64> = (0..200_000).map(|_| normal(&mut rng)).collect();
+        let mut normals = Normals::new(&mut rng);
+        let both: Vec<f64> = (0..200_000).map(|_| normals.draw()).collect();
+        for values in [single, both] {
+            let n = values.len() as f64;
+            // Standard errors of the four moments of a normal sample; bound 4.
+            for (moment, (wanted, variance)) in
+                moments(&values).into_iter().zip([(0.0, 1.0), (1.0, 2.0), (0.0, 6.0), (0.0, 24.0)])
+            {
+                assert!((moment - wanted).abs() < 4.0 * (variance / n).sqrt(), "{moment} for {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_normal_is_the_first_of_a_pair() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        assert_eq!(normal(&mut rng.clone()), Normals::new(&mut rng).draw());
+    }
+
+    #[test]
+    fn uniforms_fill_the_unit_interval() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0F0);
+        let values: Vec<f64> = (0..100_000).map(|_| uniform(&mut rng)).collect();
+        assert!(values.iter().all(|v| (0.0..1.0).contains(v)));
+        let [mean, var, ..] = moments(&values);
+        assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / 1e5_f64).sqrt());
+        assert!((var - 1.0 / 12.0).abs() < 4.0 * (1.0 / 180.0 / 1e5_f64).sqrt());
+        assert_eq!([unit(0), unit(u64::MAX)], [0.0, 1.0 - STEP]);
+        assert!((0..1000).map(|_| open_uniform(&mut rng)).all(|u| 0.0 < u && u <= 1.0));
+    }
+
+    #[test]
+    fn whole_numbers_below_are_even() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xbe10);
+        let mut counts = [0.0; 7];
+        (0..70_000).for_each(|_| counts[below(7, &mut rng)] += 1.0);
+        let chi_square: f64 = counts.map(|n| (n - 1e4) * (n - 1e4) / 1e4).iter().sum();
+        // 0.1 % of the distribution with 6 degrees of freedom.
+        assert!(chi_square < 22.5, "{chi_square}");
+        assert_eq!(below(0, &mut rng), 0);
+    }
+
+    #[test]
+    fn every_order_is_as_likely() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+        let mut counts = std::collections::BTreeMap::new();
+        for _ in 0..6000 {
+            let mut items = [0, 1, 2];
+            shuffle(&mut items, &mut rng);
+            *counts.entry(items).or_insert(0) += 1;
+        }
+        // Six orders of 1000 each, with a standard error of √(6000 · 1/6 · 5/6) = 29.
+        assert!(counts.len() == 6 && counts.values().all(|c: &i32| (c - 1000).abs() < 4 * 29), "{counts:?}");
+    }
+
+    #[test]
+    fn counts_are_rounded_and_bounded() {
+        let counts = [-3.0, f64::NAN, 0.49, 0.5, 2.5, 1e300].map(count);
+        assert_eq!(counts, [0, 0, 0, 1, 3, u32::MAX as usize]);
+    }
+}

@@ -1,0 +1,20 @@
+//! Random numbers: scalar draws from any generator, and SplitMix64 for what is a function of a key.
+//!
+//! Three samplers of standard normal numbers serve three needs:
+//!
+//! | sampler | numbers | takes | for |
+//! |---|---|---|---|
+//! | [`normal`], [`Normals`] | `f64`, any size | a generator | scalar draws |
+//! | [`Ziggurat`] | `f32`, any size | a generator | millions of draws in order, four times as fast |
+//! | [`normals_of_words`] | `f32`, up to 6.76 | two random words for each pair | rows of pixels whose words are a function of position; no branch, so that vectors compute it |
+
+mod draws;
+mod splitmix;
+mod words;
+mod ziggurat;
+
+pub use draws::{Normals, below, between, chance, count, direction, normal, open_uniform, shuffle, uniform, unit};
+pub use rand_core::Rng;
+pub use splitmix::SplitMix64;
+pub use words::{normals_of_words, open_unit};
+pub use ziggurat::Ziggurat;
