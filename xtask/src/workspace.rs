@@ -8,22 +8,23 @@ use serde_json::Value;
 
 use crate::shell;
 
-/// A crate that takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
+/// What takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
 pub(crate) struct Heavy {
-    pub(crate) package: &'static str,
-    /// The features of other crates that bring it along.
+    /// A crate of this workspace, if it is one; else an optional dependency.
+    pub(crate) package: Option<&'static str>,
+    /// The features that bring it along.
     pub(crate) features: &'static [&'static str],
 }
 
-/// All of them; each is missing in the `default-members` of the workspace, too.
+/// All of them; the crates are missing in the `default-members` of the workspace, too.
 pub(crate) const HEAVY: &[Heavy] = &[
-    Heavy { package: "papsynth-cloud", features: &["papsynth-cli/cloud", "papsynth-python/cloud"] },
-    Heavy { package: "papsynth-python", features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/cloud", "papsynth-cli/cloud", "papsynth-python/cloud"] },
+    Heavy { package: Some("papsynth-python"), features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/parquet", "papsynth-web/parquet", "papsynth-cli/parquet"] },
     Heavy {
-        package: "papsynth-parquet",
-        features: &["papsynth-dataset/parquet", "papsynth-web/parquet", "papsynth-cli/parquet"],
+        package: Some("papsynth-zarr"),
+        features: &["papsynth-dataset/zarr", "papsynth-web/zarr", "papsynth-cli/zarr"],
     },
-    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-web/zarr", "papsynth-cli/zarr"] },
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.
@@ -42,7 +43,7 @@ pub(crate) fn heavy_features_of(package: &str) -> String {
 pub(crate) fn heavy_packages() -> Vec<&'static str> {
     let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
     let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
-    packages.extend(HEAVY.iter().map(|heavy| heavy.package));
+    packages.extend(HEAVY.iter().filter_map(|heavy| heavy.package));
     packages.sort_unstable();
     packages.dedup();
     packages
@@ -104,8 +105,8 @@ impl Workspace {
     pub(crate) fn cargo_light(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
         command.args(subcommand).args(["--workspace", "--features", &self.light_features()]);
-        for heavy in HEAVY {
-            command.args(["--exclude", heavy.package]);
+        for package in HEAVY.iter().filter_map(|heavy| heavy.package) {
+            command.args(["--exclude", package]);
         }
         command
     }

@@ -24,8 +24,8 @@ pub fn images_of(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Erro
     let mut images = BTreeMap::new();
     for shard in dataset.shards()? {
         for frame in read_record(&dataset.folder, shard)?.frames {
-            let [image, _] = dataset.images_of(&frame, shard);
-            images.insert(frame.index, (frame.slide, image.unwrap_or_default()));
+            let (image, _) = dataset.images_of(&frame, shard);
+            images.insert(frame.index, (frame.slide, image));
         }
     }
     Ok(images)

@@ -211,7 +211,7 @@ impl Source {
         if Form::of(frame.planes_um.len()) == Form::Single {
             return Ok(Vec::new());
         }
-        let [_, Some(name)] = self.dataset.images_of(frame, shard) else {
+        let (_, Some(name)) = self.dataset.images_of(frame, shard) else {
             let layout = &self.dataset.layout;
             return self.refuse(format!("{layout} keeps no picture of a stack with everything in focus"));
         };

@@ -103,8 +103,8 @@ impl Dataset {
 /// The image that shows a frame in one plane: of a stack the one with everything in focus or, where that was not written, the middle
 /// plane.
 pub(super) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
-    let [image, all_in_focus] = dataset.images_of(frame, shard);
-    let name = all_in_focus.or(image).unwrap_or_default();
+    let (image, all_in_focus) = dataset.images_of(frame, shard);
+    let name = all_in_focus.unwrap_or(image);
     let path = dataset.folder.path(&name);
     let (mut number, mut middle) = (0, None);
     pages(dataset, &name, frame, shard, &mut |page| {

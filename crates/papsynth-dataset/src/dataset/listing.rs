@@ -2,7 +2,7 @@
 
 use sha2::{Digest, Sha256};
 
-use super::manifest::{Entry, ManifestHead};
+use super::manifest::{Entry, ManifestFile};
 use super::record::{FORMAT, FORMAT_VERSION, WRITER};
 use super::set::{Dataset, read_record, recorded_shards};
 use crate::bytes::{hex, json};
@@ -54,19 +54,19 @@ fn manifest(
     out: &mut Sink,
 ) -> Result<(), Error> {
     let folder = &dataset.folder;
-    let head = ManifestHead {
-        format: FORMAT,
+    let head = ManifestFile {
+        format: FORMAT.to_owned(),
         version: FORMAT_VERSION,
-        writer,
-        identity: &dataset.identity,
-        layout: &dataset.layout,
+        writer: writer.to_owned(),
+        identity: dataset.identity.clone(),
+        layout: dataset.layout.clone(),
         frames,
         shards: shards.len() as u64,
-        categories: &dataset.categories,
+        categories: dataset.categories.clone(),
         head_sha256: String::new(),
-    }
-    .sealed();
-    let head = json(&head);
+        files: Vec::new(),
+    };
+    let (head, _) = head.sealed();
     // The list is put into the head's braces by hand: it may be longer than memory.
     out(head.strip_suffix(b"}").unwrap_or(&head))?;
     out(b",\"files\":[")?;

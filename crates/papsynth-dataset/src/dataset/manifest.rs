@@ -33,21 +33,31 @@ pub struct Manifest {
     pub files: Vec<FileRecord>,
 }
 
-/// As it stands in the file.
-#[derive(Deserialize)]
+/// The file: written without its list, which follows piece by piece.
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawManifest {
-    format: String,
-    version: u32,
-    writer: String,
-    identity: Identity,
-    layout: Layout,
-    frames: u64,
-    shards: u64,
-    categories: Vec<Category>,
-    head_sha256: String,
-    #[serde(deserialize_with = "of_no_shard")]
-    files: Vec<FileRecord>,
+pub(super) struct ManifestFile {
+    pub(super) format: String,
+    pub(super) version: u32,
+    pub(super) writer: String,
+    pub(super) identity: Identity,
+    pub(super) layout: Layout,
+    pub(super) frames: u64,
+    pub(super) shards: u64,
+    pub(super) categories: Vec<Category>,
+    /// SHA-256 of the head as compact JSON in which this is empty.
+    pub(super) head_sha256: String,
+    #[serde(skip_serializing, deserialize_with = "of_no_shard")]
+    pub(super) files: Vec<FileRecord>,
+}
+
+impl ManifestFile {
+    /// The compact JSON of the head, with its SHA-256.
+    pub(super) fn sealed(mut self) -> (Vec<u8>, String) {
+        self.head_sha256 = String::new();
+        self.head_sha256 = sha256(&json(&self));
+        (json(&self), self.head_sha256)
+    }
 }
 
 /// Of a list of files, which may be longer than memory, those that belong to no shard: they come first, before the first record.
@@ -87,28 +97,6 @@ pub(crate) struct Entry {
     pub(crate) shard: Option<u64>,
 }
 
-/// The head of the file, as it is written.
-#[derive(Serialize)]
-pub(crate) struct ManifestHead<'a> {
-    pub(crate) format: &'a str,
-    pub(crate) version: u32,
-    pub(crate) writer: &'a str,
-    pub(crate) identity: &'a Identity,
-    pub(crate) layout: &'a Layout,
-    pub(crate) frames: u64,
-    pub(crate) shards: u64,
-    pub(crate) categories: &'a [Category],
-    /// SHA-256 of the head as compact JSON in which this is empty.
-    pub(crate) head_sha256: String,
-}
-
-impl ManifestHead<'_> {
-    pub(crate) fn sealed(self) -> Self {
-        let open = Self { head_sha256: String::new(), ..self };
-        Self { head_sha256: sha256(&json(&open)), ..open }
-    }
-}
-
 impl Manifest {
     /// Parses a manifest.
     ///
@@ -131,36 +119,27 @@ impl Manifest {
     }
 
     fn from_reader(reader: &mut dyn Read) -> Result<Self, Problem> {
-        let raw: RawManifest = serde_json::from_reader(reader)?;
-        if raw.format != FORMAT {
-            let message = format!("format is `{}`; `{FORMAT}` is wanted", raw.format.escape_default());
+        let file: ManifestFile = serde_json::from_reader(reader)?;
+        if file.format != FORMAT {
+            let message = format!("format is `{}`; `{FORMAT}` is wanted", file.format.escape_default());
             return Err(Problem::broken("JSON", message));
         }
-        version(raw.version)?;
-        inside(&raw.files)?;
-        raw.layout.check()?;
-        let head = ManifestHead {
-            format: &raw.format,
-            version: raw.version,
-            writer: &raw.writer,
-            identity: &raw.identity,
-            layout: &raw.layout,
-            frames: raw.frames,
-            shards: raw.shards,
-            categories: &raw.categories,
-            head_sha256: String::new(),
+        version(file.version)?;
+        inside(&file.files)?;
+        file.layout.check()?;
+        let manifest = Self {
+            writer: file.writer.clone(),
+            identity: file.identity.clone(),
+            layout: file.layout.clone(),
+            frames: file.frames,
+            shards: file.shards,
+            categories: file.categories.clone(),
+            files: file.files.clone(),
         };
-        if head.sealed().head_sha256 != raw.head_sha256 {
-            return Err(Problem::broken("JSON", "is not as it was written: the SHA-256 of its head is another"));
+        let said = file.head_sha256.clone();
+        match file.sealed() {
+            (_, sha256) if sha256 == said => Ok(manifest),
+            _ => Err(Problem::broken("JSON", "is not as it was written: the SHA-256 of its head is another")),
         }
-        Ok(Self {
-            writer: raw.writer,
-            identity: raw.identity,
-            layout: raw.layout,
-            frames: raw.frames,
-            shards: raw.shards,
-            categories: raw.categories,
-            files: raw.files,
-        })
     }
 }

@@ -32,9 +32,9 @@ pub use images::FramePlace;
 pub use inspect::{Defect, Overview, inspect, shards_to_make};
 pub use manifest::Manifest;
 pub use picture::{Picture, write_png};
-#[cfg(feature = "zarr")]
-pub(crate) use record::WRITER;
 pub use record::{Identity, ShardRecord};
+#[cfg(feature = "zarr")]
+pub(crate) use record::{WRITER, lies_inside};
 pub use set::{Dataset, Summary};
 pub(crate) use set::{read_record, recorded_shards};
 pub use shard_writer::ShardWriter;

@@ -152,11 +152,15 @@ impl ShardRecord {
     }
 }
 
-/// Paths must be relative and stay below where they start.
-pub(super) fn inside(files: &[FileRecord]) -> Result<(), Problem> {
+/// Whether a path is relative and stays below where it starts.
+pub(crate) fn lies_inside(path: &str) -> bool {
     // A name as it stands is one part of a path: no `.`, `..`, drive or root, and nothing between two slashes.
     let is_name = |part: &str| Path::new(part).components().eq([Component::Normal(part.as_ref())]);
-    let lies_inside = |path: &str| !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name);
+    !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name)
+}
+
+/// Files must lie in the data set.
+pub(super) fn inside(files: &[FileRecord]) -> Result<(), Problem> {
     match files.iter().find(|file| !lies_inside(&file.path)) {
         Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),
         None => Ok(()),

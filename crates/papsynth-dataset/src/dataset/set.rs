@@ -99,7 +99,7 @@ impl Dataset {
     }
 
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
-    pub(crate) fn images_of(&self, frame: &FrameSummary, shard: u64) -> [Option<String>; 2] {
+    pub(crate) fn images_of(&self, frame: &FrameSummary, shard: u64) -> (String, Option<String>) {
         self.layout.images_of(self.identity.seed, shard, frame)
     }
 

@@ -26,6 +26,20 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     Folder::new(folder).write(&name, bytes).map(|_| ())
 }
 
+/// What lies in a folder; nothing if it is not there.
+fn entries(path: &Path) -> Result<Vec<fs::DirEntry>, Error> {
+    match fs::read_dir(path) {
+        Ok(entries) => entries.collect::<Result<_, _>>().map_err(Error::io("read", path)),
+        Err(e) if is_absent(&e) => Ok(Vec::new()),
+        Err(e) => Err(Error::io("read", path)(e)),
+    }
+}
+
+/// Whether there is no such file or folder.
+fn is_absent(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
+}
+
 /// A folder into which files are written by names relative to it, with `/` between folders. Of a data set in an object store it is where
 /// its files are worked on: what gets its name is put into the store, and what is read is copied from there first.
 #[derive(Debug, Clone)]
@@ -97,9 +111,7 @@ impl Folder {
         }
         let path = self.path(name);
         match fs::remove_file(&path) {
-            Err(e) if !matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-                Err(Error::io("remove", &path)(e))
-            }
+            Err(e) if !is_absent(&e) => Err(Error::io("remove", &path)(e)),
             _ => Ok(()),
         }
     }
@@ -208,7 +220,7 @@ impl Folder {
         let size = match fs::metadata(&path) {
             Ok(found) if found.is_file() => found.len(),
             Ok(_) => return Ok(Some("is no file".to_owned())),
-            Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => return missing(),
+            Err(e) if is_absent(&e) => return missing(),
             Err(e) => return Err(Error::io("read", &path)(e)),
         };
         Ok(if size != record.bytes {
@@ -234,13 +246,7 @@ impl Folder {
         let mut next = 0;
         while let Some(path) = found.get(next).cloned() {
             next += 1;
-            let entries = match fs::read_dir(&path) {
-                Ok(entries) => entries,
-                Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => continue,
-                Err(e) => return Err(Error::io("read", &path)(e)),
-            };
-            for entry in entries {
-                let entry = entry.map_err(Error::io("read", &path))?;
+            for entry in entries(&path)? {
                 if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
                     found.push(entry.path());
                 }
@@ -263,15 +269,13 @@ impl Folder {
         }
         let mut found = Vec::new();
         for path in self.folders()? {
-            for entry in fs::read_dir(&path).map_err(Error::io("read", &path))? {
-                let entry = entry.map_err(Error::io("read", &path))?;
+            for entry in entries(&path)? {
                 if entry.file_type().map_err(Error::io("read", &path))?.is_dir() {
                     continue;
                 }
                 let below = entry.path();
-                let below = below.strip_prefix(&self.root).map_err(|_| {
-                    Error::input(&path)(Problem::Differs { what: "a file lies outside the folder".to_owned() })
-                })?;
+                let below = below.strip_prefix(&self.root);
+                let below = below.expect("what is found in folders from the root down lies below it");
                 let parts: Vec<_> = below.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
                 found.push(parts.join("/"));
             }
@@ -311,13 +315,7 @@ impl Folder {
     pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
         let [mut removed, mut stayed] = [0; 2];
         for path in self.folders()? {
-            let entries = match fs::read_dir(&path) {
-                Ok(entries) => entries,
-                Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => continue,
-                Err(e) => return Err(Error::io("read", &path)(e)),
-            };
-            for entry in entries {
-                let entry = entry.map_err(Error::io("read", &path))?;
+            for entry in entries(&path)? {
                 if !is_temporary(&entry.file_name().to_string_lossy()) {
                     continue;
                 }

@@ -114,9 +114,9 @@ impl Format {
 
 impl Layout {
     /// Where the image of a frame lies and, of a stack, the one with everything in focus.
-    pub(crate) fn images_of(&self, seed: u64, shard: u64, frame: &FrameSummary) -> [Option<String>; 2] {
-        let image = self.formats.first().map(|format| format.image(seed, shard, frame));
+    pub(crate) fn images_of(&self, seed: u64, shard: u64, frame: &FrameSummary) -> (String, Option<String>) {
+        let image = self.formats.first().expect("a layout has a format").image(seed, shard, frame);
         let mut sharp = self.formats.iter().filter_map(|format| format.all_in_focus(seed, shard, frame));
-        [image, (Form::of(frame.planes_um.len()) == Form::Stack).then(|| sharp.next()).flatten()]
+        (image, (Form::of(frame.planes_um.len()) == Form::Stack).then(|| sharp.next()).flatten())
     }
 }

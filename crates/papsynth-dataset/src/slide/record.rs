@@ -1,14 +1,12 @@
 //! What a slide is, and what of it is whole.
 
-use std::path::{Component, Path};
-
 use papsynth::Slide;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{json, json_lines, sha256};
-use crate::dataset::{Identity, WRITER, nested};
+use crate::dataset::{Identity, WRITER, lies_inside, nested};
 use crate::error::{Error, Problem};
 use crate::files::{FileRecord, Folder};
 
@@ -189,8 +187,6 @@ impl SlideRecord {
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
         let record: Self = serde_json::from_slice(bytes)?;
         let said = |message: &str| Err(Problem::broken("JSON", message));
-        let lies_inside =
-            |path: &str| !path.is_empty() && Path::new(path).components().all(|c| matches!(c, Component::Normal(_)));
         if !record.files.iter().all(|file| lies_inside(&file.path)) {
             return said("names a file outside the slide");
         }

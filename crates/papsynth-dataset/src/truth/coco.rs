@@ -42,12 +42,12 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    fn new(frame: &FrameSummary, saturated: &[Mask], [file_name, all_in_focus]: [Option<String>; 2]) -> Self {
+    fn new(frame: &FrameSummary, saturated: &[Mask], (file_name, all_in_focus): (String, Option<String>)) -> Self {
         Self {
             id: frame.index,
             width: frame.width,
             height: frame.height,
-            file_name: file_name.unwrap_or_default(),
+            file_name,
             all_in_focus,
             pixel_um: frame.pixel_um,
             saturated: if saturated.iter().all(Mask::is_empty) {
@@ -253,7 +253,7 @@ impl Document {
         frame: &FrameSummary,
         saturated: &[Mask],
         categories: &[Category],
-        files: [Option<String>; 2],
+        files: (String, Option<String>),
     ) -> Result<Self, UnknownCategory> {
         let parent = |object: &ObjectTruth| {
             let is_cell = |other: &ObjectTruth| other.part == Part::Cytoplasm && other.id == object.id;

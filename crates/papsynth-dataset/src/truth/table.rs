@@ -217,7 +217,9 @@ pub fn columns(truth: &Truth, image: u64) -> Vec<(&'static str, Column)> {
 impl Column {
     fn of(sort: Sort, cells: impl Iterator<Item = Cell>) -> Self {
         match sort {
-            Sort::Id | Sort::Whole => Self::Whole(cells.map(|cell| cell.whole().unwrap_or_default()).collect()),
+            Sort::Id | Sort::Whole => {
+                Self::Whole(cells.map(|cell| cell.whole().expect("a whole number in every row")).collect())
+            }
             Sort::WholeOrNone | Sort::Number | Sort::NumberOrNone => {
                 Self::Number(cells.map(|cell| cell.number()).collect())
             }

@@ -18,38 +18,16 @@ pub(crate) fn is_large(width: usize, height: usize) -> bool {
 }
 
 /// Grey levels of 8 or of 16 bits.
-pub(super) trait Level: Copy + Default {
+pub(super) trait Level: Copy + Default + Into<u32> + TryFrom<u32> {
     const BITS: u16;
-
-    fn into_u32(self) -> u32;
-
-    fn from_u32(level: u32) -> Self;
 }
 
 impl Level for u8 {
     const BITS: u16 = 8;
-
-    fn into_u32(self) -> u32 {
-        self.into()
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "the mean of bytes is one")]
-    fn from_u32(level: u32) -> Self {
-        level as Self
-    }
 }
 
 impl Level for u16 {
     const BITS: u16 = 16;
-
-    fn into_u32(self) -> u32 {
-        self.into()
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "the mean of 16 bits has no more")]
-    fn from_u32(level: u32) -> Self {
-        level as Self
-    }
 }
 
 /// An image whose channels lie side by side.
@@ -74,8 +52,9 @@ impl<T: Level> Image<'_, T> {
             for x in 0..width {
                 for channel in 0..channels {
                     let at = 2 * x * channels + channel;
-                    let sum: u32 = rows.iter().map(|row| row[at].into_u32() + row[at + channels].into_u32()).sum();
-                    half.push(T::from_u32((sum + 2) / 4));
+                    let sum: u32 = rows.iter().map(|row| row[at].into() + row[at + channels].into()).sum();
+                    let mean = T::try_from((sum + 2) / 4).ok();
+                    half.push(mean.expect("a mean of levels has no more bits than they have"));
                 }
             }
         }
@@ -142,7 +121,7 @@ where
         for column in 0..width.div_ceil(TILE) {
             let tile = image.tile(column, row);
             offsets.push(K::convert_offset(directory.write_data(tile.as_slice())?)?);
-            sizes.push(u32::try_from(tile.len() * usize::from(T::BITS) / 8)?);
+            sizes.push(u32::try_from(size_of_val(tile.as_slice()))?);
         }
     }
     directory.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;

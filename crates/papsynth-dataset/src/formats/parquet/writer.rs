@@ -247,3 +247,75 @@ impl<'a> Writer<'a> {
 fn empty(columns: &[Column]) -> Vec<Leaf> {
     columns.iter().flat_map(|column| column.kind.leaves()).map(Leaf::new).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+
+    use super::*;
+    use crate::support::Scratch;
+
+    fn begin(scratch: &Scratch, columns: Vec<Column>) -> Writer<'static> {
+        let file = File::create(scratch.join("table.parquet")).unwrap();
+        Writer::new(Box::new(file), columns, &[("a", "1")]).unwrap()
+    }
+
+    fn reader(scratch: &Scratch) -> SerializedFileReader<File> {
+        SerializedFileReader::new(File::open(scratch.join("table.parquet")).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn nested_rows_are_read_back_as_they_were_written() {
+        let fields = vec![
+            Column::new("id", Kind::U32).or_null(),
+            Column::new("name", Kind::Text),
+            Column::new("sides", Kind::list(Kind::F64)),
+        ];
+        let columns = vec![
+            Column::new("n", Kind::I64),
+            Column::new("flag", Kind::Bool).or_null(),
+            Column::new("objects", Kind::list(Kind::Struct(fields))).or_null(),
+        ];
+        let object = |id: Value, sides: &[f64]| {
+            Value::Struct(vec![id, "x".into(), Value::List(sides.iter().copied().map(Value::F64).collect())])
+        };
+        let rows = vec![
+            vec![
+                Value::I64(1),
+                true.into(),
+                Value::List(vec![object(7_u32.into(), &[0.5, 2.0]), object(Value::Null, &[])]),
+            ],
+            vec![Value::I64(-2), Value::Null, Value::List(Vec::new())],
+            vec![Value::I64(3), false.into(), Value::Null],
+            vec![Value::I64(4), false.into(), Value::List(vec![object(u32::MAX.into(), &[1.0])])],
+        ];
+        let scratch = Scratch::new("nested-rows");
+        let mut writer = begin(&scratch, columns);
+        rows.into_iter().for_each(|row| writer.row(row).unwrap());
+        writer.finish().unwrap();
+        let found =
+            reader(&scratch).get_row_iter(None).unwrap().map(|row| row.unwrap().to_string()).collect::<Vec<_>>();
+        let expected = [
+            "{n: 1, flag: true, objects: [{id: 7, name: \"x\", sides: [0.5, 2.0]}, {id: null, name: \"x\", sides: []}]}",
+            "{n: -2, flag: null, objects: []}",
+            "{n: 3, flag: false, objects: null}",
+            "{n: 4, flag: false, objects: [{id: 4294967295, name: \"x\", sides: [1.0]}]}",
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn memory_is_bounded_by_a_group() {
+        let scratch = Scratch::new("bounded-rows");
+        let mut writer = begin(&scratch, vec![Column::new("data", Kind::Bytes)]);
+        for n in 1..=70_usize {
+            writer.row(vec![vec![7_u8; 1 << 20].into()]).unwrap();
+            let written = scratch.join("table.parquet").metadata().unwrap().len() as usize;
+            assert!((n << 20) <= written + GROUP_BYTES + BUFFER_BYTES, "{written} bytes are written after {n} rows");
+        }
+        writer.finish().unwrap();
+        assert_eq!(reader(&scratch).num_row_groups(), 3);
+    }
+}
