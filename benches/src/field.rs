@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Law, Layout, Number, Preset, Recipe};
+use papsynth::recipe::{Clusters, Law, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
@@ -36,7 +36,7 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
     let share = width * height / (middle(&recipe.field.width_px) * middle(&recipe.field.height_px));
     recipe.field.width_px = width.into();
     recipe.field.height_px = height.into();
-    if let Layout::Clusters { count, .. } = &mut recipe.layout {
+    if let Layout::Clusters(Clusters { count, .. }) = &mut recipe.layout {
         *count = (share * middle(count)).round().clamp(1.0, 1e4).into();
     }
     let debris = &mut recipe.debris;

@@ -4,7 +4,10 @@
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CameraPreset, Imaging, Layout, Light, Mixing, Number, Optics, Preset, Recipe, Rendition};
+use papsynth::recipe::{
+    CameraPreset, Clusters, Colour, Imaging, Layout, Light, Microscope, Mixing, Number, Optics, Preset, Recipe,
+    Rendition,
+};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Frame, Inputs};
 use sha2::{Digest, Sha256};
@@ -47,7 +50,7 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
     recipes.push(("jpeg", jpeg));
 
     let mut abbe = small(Preset::Sparse, [64, 48]);
-    if let Optics::BrightField { imaging, directions, .. } = &mut abbe.optics {
+    if let Optics::BrightField(Microscope { imaging, directions, .. }) = &mut abbe.optics {
         *imaging = Imaging::Abbe;
         *directions = Number::Fixed(5.0);
     }
@@ -56,12 +59,12 @@ fn recipes() -> Vec<(&'static str, Recipe)> {
 }
 
 fn in_colour() -> Light {
-    Light::Colour {
+    Light::Colour(Colour {
         lamp_k: Number::Fixed(3200.0),
         mixing: Mixing::Spectral,
         chromatic_um: Number::Fixed(0.3),
         rendition: Rendition::Display,
-    }
+    })
 }
 
 /// A preset on a field of so few pixels that a handful of cells fills it.
@@ -72,7 +75,7 @@ fn small(preset: Preset, [width, height]: [u16; 2]) -> Recipe {
     for mix in recipe.cells.values_mut() {
         mix.count = Number::uniform(1.0, 2.0);
     }
-    if let Layout::Clusters { radius_um, .. } = &mut recipe.layout {
+    if let Layout::Clusters(Clusters { radius_um, .. }) = &mut recipe.layout {
         *radius_um = Number::Fixed(15.0);
     }
     recipe.slide.spacing_um = Number::Fixed(4.0);

@@ -1,5 +1,7 @@
 //! From a set of outlines to their statistics.
 
+use portable_numerics::statistics::{deviation, mean};
+
 use crate::coordinates::add_scaled;
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, count_as_f64, resample, signed_area};
@@ -9,7 +11,6 @@ use crate::sample::Bend;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics};
 use crate::steps::to_steps;
 use crate::{Error, ShapeModel};
-use portable_numerics::statistics::{deviation, mean};
 
 /// Fewest outlines to fit a model to: fewer have no spread.
 const FEWEST_OUTLINES: usize = 3;
@@ -101,11 +102,12 @@ impl ShapeModel {
             let shape = described.normalised();
             shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
         }
+        let (ln_radius_mean, ln_radius_sd) = (mean(&ln_radii), deviation(&ln_radii));
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
             outlines: outlines.len(),
-            ln_radius_mean: mean(&ln_radii),
-            ln_radius_sd: deviation(&ln_radii),
+            ln_radius_mean,
+            ln_radius_sd,
             mean: mean_of(&shapes),
             components: Vec::new(),
             residual: Residual::Descriptors,

@@ -2,12 +2,12 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
+mod complex;
 #[cfg(any(feature = "image", feature = "mint", feature = "nalgebra"))]
 mod convert;
 mod coordinates;
 mod crossing;
 mod descriptors;
-mod dft;
 mod error;
 #[cfg(feature = "fit")]
 mod fit;

@@ -1,12 +1,13 @@
 //! Roughness: what the fine detail of outlines has beyond a normal field that is alike from shape to shape and all along the outline.
 
+use portable_numerics::statistics::deviation;
+
 use crate::coordinates::{finest_coarse, order, terms};
 use crate::descriptors::Descriptors;
 use crate::model::LEAST_FOR_LOCAL;
 use crate::outline::count_as_f64;
 use crate::pca::dot;
 use crate::statistics::ShapeStatistics;
-use portable_numerics::statistics::deviation;
 
 /// Places per harmonic at which detail is looked at.
 const PLACES_PER_HARMONIC: usize = 8;

@@ -3,19 +3,24 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits, field_files};
-use papsynth_dataset::write_file;
+use papsynth::recipe::diagnose::quoted;
+use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
+use papsynth_dataset::{field_files, write_file};
 use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
 use rayon::prelude::*;
 
-use crate::args::{self, threads};
+use crate::args;
 use crate::exit::{self, Complaint, Failure};
-use crate::text_file::may_replace;
+use crate::setup::pool;
+use crate::text_file::may_replace_in;
 
 /// Files that are written, and how those begin that may be replaced.
-const PAGE: (&str, &[u8]) =
-    ("report.html", b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<");
-const NUMBERS: (&str, &[u8]) = ("report.json", b"{\n  \"judge_report\":");
+const PAGE: (&str, &[u8], &str) = (
+    "report.html",
+    b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<",
+    "an older report",
+);
+const NUMBERS: (&str, &[u8], &str) = ("report.json", b"{\n  \"judge_report\":", "an older report");
 
 /// Pixels that differ by less are of one size.
 const SAME_PIXEL: f64 = 0.01;
@@ -34,13 +39,7 @@ struct Side {
 }
 
 pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
-    for (name, begins) in [PAGE, NUMBERS] {
-        may_replace(&args.out.join(name), begins, "an older report")?;
-    }
-    if args.out.exists() && !args.out.is_dir() {
-        let message = format!("--out {}: there is a file of this name; expected a folder", args.out.display());
-        return Err(Failure::input(Complaint::new(message)));
-    }
+    may_replace_in(&args.out, &[PAGE, NUMBERS])?;
     let (real, synthetic) = sides(args)?;
     let pixel_um = coarsest(&real, &synthetic);
     for (folder, side) in [(&args.real, &real), (&args.synthetic, &synthetic)] {
@@ -50,15 +49,13 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
     let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(refuse)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(refuse)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(args.threads)).build();
-    let pool = pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))?;
-    let report = pool.install(|| {
+    let report = pool(args.threads)?.install(|| {
         let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
         judge.compare(&real, &synthetic).map_err(refuse)
     })?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
     numbers.push('\n');
-    for ((name, _), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
+    for ((name, ..), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
     exit::print(&told(&report, &args.out))
@@ -120,9 +117,7 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
             return Err(Failure::input(Complaint::new(message).help(help)));
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::input(
-            Complaint::new(message).help(format!("there are {}", papsynth_recipe::quoted(known.into_iter()))),
-        ));
+        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", quoted(known.into_iter())))));
     }
     Ok(files)
 }

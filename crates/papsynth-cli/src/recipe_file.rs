@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use papsynth::model::Model;
-use papsynth::recipe::{Preset, Recipe};
+use papsynth::recipe::diagnose::{self, Fault, Schema};
+use papsynth::recipe::{Preset, Recipe, Swath};
 use toml::{Table, Value};
 
 use crate::args::RecipeArgs;
 use crate::exit::{Complaint, Failure};
 use crate::text_file;
-use papsynth_recipe::{Fault, Schema};
 
 /// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
 const LARGEST: u64 = 1 << 20;
@@ -60,7 +60,7 @@ impl RecipeFile {
                 let (name, text) = text_file::read(path, LARGEST, "a recipe, a few kilobytes of text")?;
                 let text = Arc::new(text);
                 let sources = Sources { file: Some((name.clone(), Arc::clone(&text))), sets: Vec::new() };
-                let base = papsynth_recipe::read(&text)
+                let base = diagnose::read(&text)
                     .map_err(|faults| Failure::input(sources.complaint(faults, "the recipe cannot be read")))?;
                 let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
                 (base, Some((name, text)), folder)
@@ -70,7 +70,7 @@ impl RecipeFile {
             let (name, text) = text_file::read(path, LARGEST, "sections of a recipe, a few kilobytes of text")?;
             let text = Arc::new(text);
             let sources = Sources { file: Some((name, Arc::clone(&text))), sets: Vec::new() };
-            let found = papsynth_recipe::read(&text)
+            let found = diagnose::read(&text)
                 .map_err(|faults| Failure::input(sources.complaint(faults, "these sections cannot be read")))?;
             let sections: Table = toml::from_str(&text).unwrap_or_default();
             base.replace(&found, |section| sections.contains_key(section));
@@ -91,7 +91,7 @@ impl RecipeFile {
 
     /// Every class of cells must be one of the model's.
     pub(crate) fn check_classes(&self, model: &Model) -> Result<(), Failure> {
-        let faults = papsynth_recipe::unknown_classes(&self.recipe, model);
+        let faults = diagnose::unknown_classes(&self.recipe, model);
         match faults.is_empty() {
             true => Ok(()),
             false => Err(Failure::input(self.sources.complaint(faults, "the model lacks classes"))),
@@ -111,7 +111,7 @@ impl RecipeFile {
             papsynth::Error::Recipe(problems) => {
                 let fields = problems
                     .iter()
-                    .map(|p| (p.field.clone(), papsynth_recipe::middle_left_out(&p.to_string())))
+                    .map(|p| (p.field.clone(), diagnose::middle_left_out(&p.to_string())))
                     .collect::<Vec<_>>();
                 (fields, "the recipe asks for what cannot be")
             }
@@ -144,7 +144,7 @@ impl Sources {
         }
         let text = toml::to_string(&table).map_err(|e| fault(e.to_string()))?;
         // The places found in this text mean nothing to the user; the paths do.
-        papsynth_recipe::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
+        diagnose::read(&text).map_err(|faults| faults.into_iter().map(|f| Fault { span: None, ..f }).collect())
     }
 
     /// Faults at the places where the user wrote the fields: the last `--set` that touches one, or the file.
@@ -166,7 +166,7 @@ impl Sources {
             return complaint(fault.message).at("--set", &set.argument, set.value_at..set.argument.len());
         }
         match &self.file {
-            Some((name, text)) => match fault.span.or_else(|| papsynth_recipe::find(text, &fault.path)) {
+            Some((name, text)) => match fault.span.or_else(|| diagnose::find(text, &fault.path)) {
                 Some(span) => complaint(fault.message).at(name, text, span),
                 None => complaint(format!("{name}: {}", fault.message)),
             },
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
         let sets = ["layout.kind=swath", "layout.width_um=50", "layout.outside=0.1"];
-        let swath = Layout::Swath { width_um: 50.0.into(), outside: 0.1.into() };
+        let swath = Layout::Swath(Swath { width_um: 50.0.into(), outside: 0.1.into() });
         assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, swath);
         // The later one wins.
         let recipe = load(Preset::Lbc, &["field.width_px=96", "field.width_px=64"]).unwrap();

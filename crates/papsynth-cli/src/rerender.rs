@@ -12,6 +12,7 @@ use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::setup::Setup;
+use crate::words::runs;
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
@@ -36,9 +37,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     }
     let (layout, _) = args.layout.layout(0);
     let interrupt = Interrupt::watch()?;
-    let frames: Vec<Range<u64>> =
-        frames.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
-    let outcome = render(&after, seed, &frames, &layout, &args.out, interrupt.flag())?;
+    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
         let complaint = Complaint::new(format!("the truth is another: {difference}"));
         return Err(Failure::input(
@@ -110,16 +109,12 @@ pub(crate) fn render(
             stop,
             profile: None,
         };
-        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| match error {
-            papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
-            other => other.into(),
-        })?;
+        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
         sum.kept += outcome.kept;
         sum.made += outcome.made;
         if outcome.stopped {
             let message = format!("stopped; every file in {} is whole", out.display());
-            let complaint = Complaint::new(message).help("run the same command again to make the rest");
-            return Err(Failure::interrupted(complaint));
+            return Err(Failure::stopped(message, "make"));
         }
     }
     dataset.finish()?;

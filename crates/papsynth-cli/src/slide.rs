@@ -1,6 +1,5 @@
 //! `papsynth slide`: whole slides, and any part of one.
 
-use papsynth::Slide;
 use papsynth_dataset::write_png;
 
 use crate::args::{SlideTile, SlideVerb};
@@ -39,7 +38,7 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
     }
     text_file::is_png(&args.out)?;
     let setup = Setup::load(&args.engine, None)?;
-    let slide = open(&setup, args.engine.seed, args.slide)?;
+    let slide = setup.slide(args.engine.seed, args.slide)?;
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.refuse(&e))?;
     let middle = part.planes.len() / 2;
     if part.planes.len() > 1 {
@@ -57,8 +56,4 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
         slide.pixel_um(),
     )?;
     exit::print(&format!("Look at: {}\n", args.out.display()))
-}
-
-fn open(setup: &Setup, seed: u64, number: u64) -> Result<Slide<'_>, Failure> {
-    setup.engine.slide(seed, number).map_err(|error| setup.recipe.refuse(&error))
 }

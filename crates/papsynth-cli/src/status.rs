@@ -6,17 +6,16 @@ use std::ops::Range;
 use papsynth_dataset::{Check, Dataset, shards_to_make};
 
 use crate::args::{Merge, Status, check_of};
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Complaint, Failure};
 use crate::place;
+use crate::words::{counted, runs};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         let there = crate::slide::there(&args.dir)?;
-        let missing: Vec<Range<u64>> =
-            there.missing.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
         let close = (!there.is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
-        return tell(args, &missing, there.shards, close.as_deref());
+        return tell(args, &runs(&there.missing), there.shards, close.as_deref());
     }
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
@@ -79,14 +78,7 @@ fn of_tasks(shards: &[Range<u64>], tasks: u64) -> Vec<Range<u64>> {
     let of_range =
         |range: &Range<u64>| (range.start..range.end.min(range.start.saturating_add(tasks))).map(|n| n % tasks);
     let numbers: BTreeSet<u64> = shards.iter().flat_map(of_range).collect();
-    let mut ranges: Vec<Range<u64>> = Vec::new();
-    for number in numbers {
-        match ranges.last_mut() {
-            Some(last) if last.end == number => last.end += 1,
-            _ => ranges.push(number..number + 1),
-        }
-    }
-    ranges
+    runs(&Vec::from_iter(numbers))
 }
 
 /// Numbers as `sbatch --array` takes them.

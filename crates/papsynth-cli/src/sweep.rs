@@ -1,13 +1,12 @@
 //! `papsynth sweep`: the same fields under every combination of some settings.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
 use papsynth_dataset::{Dataset, images_of, write_file};
 
-use crate::args::{EngineArgs, RecipeArgs, Sweep};
+use crate::args::Sweep;
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::rerender::render;
@@ -53,8 +52,8 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
         let name = set_name(number);
         let out = args.out.join(&name);
         render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
-        for image in rows(&out)? {
-            let fixed = [name.as_str(), &image.index, &image.slide, &image.file];
+        for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
+            let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
             table.push_str(&csv_line(fixed.into_iter().chain(values.iter().copied())));
         }
         if !args.quiet {
@@ -154,28 +153,9 @@ fn combination(axes: &[Axis], mut number: usize) -> Vec<&str> {
 }
 
 fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure> {
-    let EngineArgs { recipe, model, seed, threads } = &args.engine;
-    let mut set = recipe.set.clone();
-    set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
-    let RecipeArgs { recipe, preset, with, camera, .. } = recipe;
-    let recipe = RecipeArgs { recipe: recipe.clone(), preset: *preset, with: with.clone(), camera: *camera, set };
-    Setup::load(&EngineArgs { recipe, model: model.clone(), seed: *seed, threads: *threads }, None)
-}
-
-/// An image of a data set, for the table.
-struct Row {
-    index: String,
-    slide: String,
-    file: String,
-}
-
-fn rows(out: &Path) -> Result<Vec<Row>, Failure> {
-    let dataset = Dataset::open(out)?;
-    let images: BTreeMap<u64, (u64, String)> = images_of(&dataset)?;
-    Ok(images
-        .into_iter()
-        .map(|(index, (slide, file))| Row { index: index.to_string(), slide: slide.to_string(), file })
-        .collect())
+    let mut engine = args.engine.clone();
+    engine.recipe.set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
+    Setup::load(&engine, None)
 }
 
 /// A line of a table; a value with a comma or a quote is quoted.

@@ -3,10 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use papsynth::recipe::{Imaging, Light, Mixing, Number, Optics, Recipe};
+use papsynth::recipe::{Colour, Imaging, Light, Microscope, Mixing, Number, Optics, Recipe};
 
-use crate::formats::Format;
-use crate::layout::Layout;
+use crate::formats::{Format, Layout};
 
 /// What the program has before the first frame: the model, fields that all frames share.
 const PROGRAM: f64 = 32.0 * MIB;
@@ -64,14 +63,16 @@ impl Need {
         };
         let is_stack = most(&recipe.focus.planes) > 1.0;
         let (samples, is_filtered, is_exact) = match &recipe.optics {
-            Optics::Gaussian { .. } => (1.0, false, false),
-            Optics::BrightField { oversampling, imaging, .. } => (most(oversampling), true, *imaging == Imaging::Abbe),
+            Optics::Gaussian(_) => (1.0, false, false),
+            Optics::BrightField(Microscope { oversampling, imaging, .. }) => {
+                (most(oversampling), true, *imaging == Imaging::Abbe)
+            }
         };
         // Channels of the picture, and lights that are imaged at one time.
         let (channels, lights) = match &recipe.light {
-            Light::Monochrome { .. } => (1.0, 1.0),
-            Light::Colour { mixing: Mixing::PerWavelength, .. } => (3.0, 1.0),
-            Light::Colour { .. } => (3.0, 3.0),
+            Light::Monochrome(_) => (1.0, 1.0),
+            Light::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
+            Light::Colour(_) => (3.0, 3.0),
         };
         let grid = samples * samples;
         let mut a_pixel = 10.0 + 25.0 * channels + 4.0 * grid * lights;
@@ -121,7 +122,7 @@ impl Need {
         (frame.field.width_px, frame.field.height_px) = (side.into(), side.into());
         frame.cells.values_mut().for_each(|mix| mix.count = (most(&mix.count) * grown).into());
         let of_frame = Self::of(&frame, &Layout::default());
-        let channels = if matches!(recipe.light, Light::Monochrome { .. }) { 1.0 } else { 3.0 };
+        let channels = if matches!(recipe.light, Light::Monochrome(_)) { 1.0 } else { 3.0 };
         // Grey levels, three labels and layers of a pixel; and once more what is being packed.
         let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;
         let shard = f64::from(shard_px) * f64::from(shard_px) * (a_pixel + 4.0 * channels);

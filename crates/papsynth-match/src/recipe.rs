@@ -1,6 +1,8 @@
 //! From values of parameters to a recipe, and back.
 
-use papsynth::recipe::{CellMix, Illumination, Law, Layout, Number, Optics, Picture, Preset, Recipe};
+use papsynth::recipe::{
+    Bowl, CellMix, Clusters, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics, Picture, Preset, Recipe,
+};
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
 
@@ -64,7 +66,7 @@ impl Setting {
             P::Across | P::Down => self.extended,
             P::Pixel => self.seek_pixel,
             P::Size => !self.seek_pixel,
-            P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters { .. }),
+            P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters(_)),
             P::Superficial => ["superficial", "intermediate"].iter().all(|class| self.base.cells.contains_key(*class)),
             _ => true,
         }
@@ -80,8 +82,8 @@ impl Setting {
         };
         let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
         let (x2, y2) = match &base.background.illumination {
-            Illumination::Bowl { x2, y2, .. } => (centre(x2), centre(y2)),
-            Illumination::Border { .. } => (0.0, 0.0),
+            Illumination::Bowl(Bowl { x2, y2, .. }) => (centre(x2), centre(y2)),
+            Illumination::Border(_) => (0.0, 0.0),
         };
         let camera = &base.camera;
         let glare = centre(&camera.glare_removed);
@@ -97,7 +99,7 @@ impl Setting {
         let first = base.cells.values().next();
         let of_cells = |f: fn(&CellMix) -> &Number| first.map_or(&Number::Fixed(1.0), f).clone();
         let (radius, outside) = match &base.layout {
-            Layout::Clusters { radius_um, outside, .. } => (centre(radius_um), centre(outside)),
+            Layout::Clusters(Clusters { radius_um, outside, .. }) => (centre(radius_um), centre(outside)),
             _ => (30.0, 1.0),
         };
         let blur = blur(&base.optics);
@@ -185,14 +187,14 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     }
     if either(P::BowlAcross, P::BowlDown) {
         let off_centre = match &r.background.illumination {
-            Illumination::Bowl { off_centre, .. } => off_centre.clone(),
-            Illumination::Border { .. } => 0.0.into(),
+            Illumination::Bowl(Bowl { off_centre, .. }) => off_centre.clone(),
+            Illumination::Border(_) => 0.0.into(),
         };
-        r.background.illumination = Illumination::Bowl {
+        r.background.illumination = Illumination::Bowl(Bowl {
             x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
             y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
             off_centre,
-        };
+        });
     }
     if on(P::Scatter) {
         r.background.scatter = about(get(P::Scatter), &setting.base.background.scatter);
@@ -230,7 +232,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         }
     }
     cells(&mut r, area, &base, &on, &or_base);
-    if let Layout::Clusters { radius_um, outside, .. } = &mut r.layout {
+    if let Layout::Clusters(Clusters { radius_um, outside, .. }) = &mut r.layout {
         if on(P::ClusterRadius) {
             *radius_um = about(get(P::ClusterRadius), radius_um);
         }
@@ -341,15 +343,15 @@ fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_b
 
 fn blur(optics: &Optics) -> &Number {
     match optics {
-        Optics::BrightField { extra_blur_um, .. } => extra_blur_um,
-        Optics::Gaussian { sigma_xy_um, .. } => sigma_xy_um,
+        Optics::BrightField(Microscope { extra_blur_um, .. }) => extra_blur_um,
+        Optics::Gaussian(Gaussians { sigma_xy_um, .. }) => sigma_xy_um,
     }
 }
 
 fn blur_mut(optics: &mut Optics) -> &mut Number {
     match optics {
-        Optics::BrightField { extra_blur_um, .. } => extra_blur_um,
-        Optics::Gaussian { sigma_xy_um, .. } => sigma_xy_um,
+        Optics::BrightField(Microscope { extra_blur_um, .. }) => extra_blur_um,
+        Optics::Gaussian(Gaussians { sigma_xy_um, .. }) => sigma_xy_um,
     }
 }
 

@@ -1,6 +1,6 @@
 //! What goes wrong, as Python's exceptions.
 
-use papsynth_recipe::Fault;
+use papsynth::recipe::diagnose::Fault;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;

@@ -62,6 +62,20 @@ def test_truth_agrees_with_itself(frame):
     assert frame.labels is frame.labels, "made once"
 
 
+def test_a_scene_can_be_changed_and_rendered(tmp_path):
+    engine = papsynth.Engine(SMALL)
+    scene = engine.scene(seed=7, index=3)
+    before = engine.render(7, 3)
+    assert np.array_equal(engine.render(scene=scene).image, before.image)
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    assert np.array_equal(papsynth.render(SMALL, scene=tmp_path / "scene.json").image, before.image)
+    scene["objects"][0]["centre_um"] = [5.0, 5.0]
+    assert not np.array_equal(engine.render(scene=scene).image, before.image)
+    scene["objects"][0]["depth_um"] = None
+    with pytest.raises(ValueError, match=r"objects\[0\]"):
+        engine.render(scene=scene)
+
+
 @pytest.mark.skipif(PROGRAM is None, reason="PAPSYNTH does not name the program")
 def test_bytes_are_those_of_the_command_line(tmp_path):
     for preset, words, recipe in ((None, WORDS, SMALL), ("high-grade", [], "high-grade")):
@@ -331,7 +345,7 @@ def test_recipes_are_objects_too_which_know_every_field():
     with pytest.raises(TypeError):
         Field(widht_px=3)
     tool = Path(__file__).parent.parent / "tools/write_recipes.py"
-    checked = subprocess.run([sys.executable, tool, "--check"], capture_output=True, text=True)
+    checked = subprocess.run([sys.executable, tool, "--check"], input=json.dumps(papsynth.schema()), capture_output=True, text=True)
     assert checked.returncode == 0, checked.stderr
 
 
@@ -369,6 +383,59 @@ def test_a_class_is_learned_and_rendered():
     for wrong in ({"like": "nobody"}, {"pixel_um": -1.0}, {"nuclei": nuclei[:1]}, {"cytoplasm_outlines": [np.zeros((4, 3))]}, {"nuclei": [(np.ones((3, 3)), np.ones((4, 4)))]}):
         with pytest.raises(ValueError):
             papsynth.learn(**{"name": "mine", "pixel_um": 0.25, "nuclei": nuclei, "like": "intermediate", **wrong})
+
+
+def test_a_microscope_is_measured():
+    y, x = np.mgrid[:96, :96].astype(np.float64)
+
+    def smooth_step(distance, sigma):
+        from math import erf
+
+        return 0.5 * (1 + np.vectorize(erf)(distance / (sigma * 2**0.5)))
+
+    edge = 80 + 120 * smooth_step(0.8 * (x - 45.3) + 0.6 * (y - 50.1), 0.9)
+    found = papsynth.calibrate_microscope(edge=edge, pixel_um=0.2)
+    assert abs(found["edge"]["sigma_px"] - 0.9) < 0.02 and "focus" not in found
+    assert abs(found["recipe_gaussian"]["optics"]["sigma_xy_um"] - 0.18) < 0.005
+    assert papsynth.recipe(found["recipe"])["optics"]["kind"] == "bright-field"
+    # A disk with spots, blurred more with each plane from the fourth.
+    planes = []
+    for plane in range(9):
+        sigma = (0.8**2 + (0.6 * (plane - 4)) ** 2) ** 0.5
+        image = 200 - 80 * smooth_step(16 - np.hypot(x - 48, y - 48), sigma)
+        for u, v in ((40, 44), (55, 50), (47, 57), (52, 40)):
+            image -= 60 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * (sigma**2 + 4))) * 4 / (sigma**2 + 4)
+        planes.append(image)
+    stack = papsynth.calibrate_microscope(np.array(planes), windows=[(22, 22, 52, 52)])
+    assert stack["focus"]["nuclei"][0]["focused"] == 4 and stack["recipe"] is None
+    assert stack == papsynth.calibrate_microscope(np.array(planes), windows=[(22, 22, 52, 52)], threads=1)
+    for wrong in (
+        {},
+        {"stack": planes[:2]},
+        {"stack": [np.zeros((64, 64))] * 4},
+        {"edge": edge, "na": 1.2},
+        {"edge": edge, "line": (0, 0, 4, 0)},
+        {"stack": [planes[0], planes[1][:50], planes[2]]},
+    ):
+        with pytest.raises(ValueError):
+            papsynth.calibrate_microscope(**wrong)
+
+
+def test_a_camera_is_measured():
+    random = np.random.default_rng(5)
+
+    def frames(electrons, count=2):
+        charge = random.poisson(electrons, (count, 128, 128)) + random.normal(0, 9, (count, 128, 128))
+        return np.clip(np.rint(100 + 0.25 * charge), 0, 4095).astype(np.uint16)
+
+    flats, darks = [frames(electrons) for electrons in (1000, 4000, 8000, 12000)], frames(0, 8)
+    found = papsynth.calibrate_camera(flats, darks, bits=12)
+    assert abs(found["camera"]["gain_dn_per_e"] - 0.25) < 0.006 and len(found["camera"]["levels"]) == 5
+    assert abs(found["recipe"]["camera"]["offset_dn"] - 100) < 0.2 and found["recipe"]["camera"]["bits"] == 12
+    papsynth.recipe(found["recipe"])
+    for wrong in ((flats, darks, 8), (flats, [], 12), (flats, darks, 17), (flats, darks + 0.5, 12), (flats, darks, None)):
+        with pytest.raises(ValueError):
+            papsynth.calibrate_camera(*wrong[:2], bits=wrong[2])
 
 
 def test_fields_are_judged():

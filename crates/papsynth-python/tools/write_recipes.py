@@ -1,13 +1,13 @@
 """Writes python/papsynth/recipes.py: a class for each section of a recipe, from the JSON schema of recipes.
 
-Usage: python write_recipes.py [--check]. Needs the package to be installed; with --check nothing is written, and a difference ends with status 1.
+Usage: papsynth schema | python write_recipes.py [--check]. The schema is read from standard input; with --check nothing is written, and a
+difference ends with status 1.
 """
 
+import json
 import sys
 import textwrap
 from pathlib import Path
-
-import papsynth
 
 TARGET = Path(__file__).parent.parent / "python/papsynth/recipes.py"
 
@@ -152,8 +152,7 @@ class Writer:
             self.text.append("\n" + f"{name} = {kind}\n" + "\n".join(self.described(schema.get("description"), 0)) + "\n")
 
 
-def text():
-    schema = papsynth.schema()
+def text(schema):
     writer = Writer(schema)
     for name in sorted(schema["$defs"]):
         writer.definition(name)
@@ -167,7 +166,7 @@ def text():
 
 
 def main(check):
-    made = text()
+    made = text(json.load(sys.stdin))
     compile(made, str(TARGET), "exec")
     if not check:
         TARGET.write_text(made)

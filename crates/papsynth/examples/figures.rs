@@ -5,7 +5,7 @@
 use image::GrayImage;
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Chromatin, Debris, Layout, Number, PhotonNoise, Preset, Recipe};
+use papsynth::recipe::{CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe, Swath};
 use papsynth::scene::Kind;
 use papsynth::truth::{ObjectTruth, Part};
 use papsynth::{Engine, Frame, Inputs};
@@ -159,8 +159,8 @@ fn detail() -> Outcome<GrayImage> {
 fn layouts() -> Outcome<GrayImage> {
     let layouts = [
         Layout::Uniform {},
-        Layout::Clusters { count: 4.0.into(), radius_um: 14.0.into(), outside: 0.03.into() },
-        Layout::Swath { width_um: 12.0.into(), outside: 0.03.into() },
+        Layout::Clusters(Clusters { count: 4.0.into(), radius_um: 14.0.into(), outside: 0.03.into() }),
+        Layout::Swath(Swath { width_um: 12.0.into(), outside: 0.03.into() }),
     ];
     let mut pictures = Vec::new();
     for layout in layouts {

@@ -8,7 +8,9 @@
 use image::{GrayImage, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Debris, Illumination, Imaging, Layout, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition};
+use papsynth::recipe::{
+    Border, Colour, Debris, Illumination, Imaging, Layout, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
+};
 use papsynth::scene::{Body, Scene, SceneOptics};
 use papsynth::{Engine, Error, Inputs, Threads};
 
@@ -41,7 +43,7 @@ fn bare() -> Recipe {
     recipe.slide.stacking_um = 0.0.into();
     recipe.cells.clear();
     recipe.debris = Debris::none();
-    recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
+    recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
     recipe.background.scatter = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe.camera.photon_noise = PhotonNoise::Off;
@@ -121,12 +123,12 @@ fn colour() -> Outcome<RgbImage> {
     for mix in recipe.cells.values_mut() {
         mix.count = 8.0.into();
     }
-    recipe.light = Light::Colour {
+    recipe.light = Light::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: Mixing::Spectral,
         chromatic_um: 0.3.into(),
         rendition: Rendition::Display,
-    };
+    });
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
     let frame = engine.frame(Key { seed: 2015, index: 5 })?;
     // Without noise, which a smaller picture would not show and a PNG would keep.

@@ -9,7 +9,7 @@ use image::{Rgb, RgbImage};
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    CellMix, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
+    CellMix, Colour, Debris, Group, GroupForm, Layout, Light, Mixing, Number, Preset, Recipe, Rendition, TintMix,
 };
 use papsynth::scene::Kind;
 use papsynth::truth::Part;
@@ -184,12 +184,12 @@ fn debris() -> Vec<Chapter> {
 fn draw(chapter: &Chapter, colour: bool) -> Outcome<RgbImage> {
     let mut recipe = chapter.recipe.clone();
     if colour {
-        recipe.light = Light::Colour {
+        recipe.light = Light::Colour(Colour {
             lamp_k: 5500.0.into(),
             mixing: Mixing::Spectral,
             chromatic_um: 0.0.into(),
             rendition: Rendition::Display,
-        };
+        });
     }
     let engine = Engine::new(&recipe, &Model::builtin(), &Inputs::default())?;
     const TRIES: u64 = 6;

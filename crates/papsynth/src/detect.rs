@@ -266,7 +266,7 @@ impl Channel {
             },
             ..CameraParams::default()
         };
-        let side = camera.binning_px;
+        let side = camera.binning_px as usize;
         let binned = match (side, camera.binning) {
             (1, _) => Ok(params),
             (_, Binning::Charge) => params.binned(ccd_noise::Binning::Charge { side }),

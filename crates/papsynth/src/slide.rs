@@ -98,7 +98,7 @@ impl<'a> Slide<'a> {
         if number > Self::LAST {
             return Err(fail("slide", format!("{number} is no number of a slide; expected 0 to {}", Self::LAST)));
         }
-        if matches!(recipe.optics, Optics::BrightField { imaging: Imaging::Abbe, .. }) {
+        if matches!(&recipe.optics, Optics::BrightField(microscope) if microscope.imaging == Imaging::Abbe) {
             return Err(fail("optics.imaging", "\"abbe\" images whole fields; slides know \"product\"".to_owned()));
         }
         let key = Key { seed, index: number };

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use papsynth::Inputs;
-use papsynth::recipe::{Layout, Recipe};
+use papsynth::recipe::{Labels, Layout, Recipe};
 use papsynth::scene::WeightMap;
 use papsynth::truth::LabelMap;
 
-use super::image::PNG_SIGNATURE;
-use super::{GreyImage, Limits, bytes, label_map};
+use super::file::{Limits, bytes};
+use super::image::{GreyImage, PNG_SIGNATURE, label_map};
+use crate::bytes::sha256;
 use crate::error::{Error, Problem};
-use crate::files::sha256;
 
 /// Brightness as weight: 0 where black, 1 at the file's largest grey level.
 ///
@@ -51,7 +51,7 @@ pub struct InputFile {
 /// If the file cannot be read, or allows no place.
 pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
     let is_grey = matches!(recipe.layout, Layout::Map { .. });
-    let (Layout::Map { path } | Layout::Labels { path, .. }) = &mut recipe.layout else {
+    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
         return Ok((Inputs::default(), None));
     };
     let found = folder.join(&path);

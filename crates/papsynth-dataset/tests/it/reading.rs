@@ -8,7 +8,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use crate::support::Scratch;
-use papsynth::recipe::{Layout, Recipe};
+use papsynth::recipe::{Labels, Layout, Recipe};
 use papsynth::truth::LabelMap;
 use papsynth_dataset::read::{
     GreyImage, Limits, NucleusSample, components, image_files, label_map, label_weights, outlines, read_inputs,
@@ -247,7 +247,7 @@ fn weight_maps_need_a_place() {
     assert_eq!(layout, Layout::Map { path: file.name.clone() });
     fs::write(scratch.join("map.png"), grey_png(&[0, 52, 255, 0], 2)).unwrap();
     assert_ne!(read(&recipe).unwrap().1.unwrap().name, file.name, "another content has another name");
-    recipe.layout = Layout::Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() };
+    recipe.layout = Layout::Labels(Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() });
     assert_eq!(read(&recipe).unwrap().0.unwrap().weights, [0.0, 1.0, 1.0, 0.0]);
     fs::write(scratch.join("map.png"), grey_png(&[0; 4], 2)).unwrap();
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: every pixel is 0"));

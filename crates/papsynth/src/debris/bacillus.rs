@@ -1,45 +1,46 @@
 //! Rod-shaped bacteria ("Bacilli"): short bent lines of even width with round ends, some in chains.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::tile::{Point, Tile};
 use crate::phantom::wobble::placed;
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Bacilli {
-    /// Number of clusters, 0 to 100000; drawn once a field.
-    pub clusters: Number,
-    /// Bacilli of a cluster, 1 to 10000.
-    pub per_cluster: Number,
-    /// Radius (standard deviation) of a cluster, µm, 0 to 1000.
-    pub cluster_um: Number,
-    /// Share of the clusters that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Length of a bacillus, µm, 0.3 to 50.
-    pub length_um: Number,
-    /// Width of a bacillus, µm, 0.1 to 5.
-    pub width_um: Number,
-    /// Bend of a bacillus, degrees between its ends, 0 to 120.
-    pub bend_deg: Number,
-    /// Share of the bacilli that hang together in chains of two to four, 0 to 1.
-    pub chained: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through a bacillus, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
+section! {
+    /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
+    pub struct Bacilli {
+        /// Number of clusters; drawn once a field.
+        clusters: Count = Number::log_normal(4.0, 0.8), 0..=100000;
+        /// Bacilli of a cluster.
+        per_cluster: Count = Number::log_normal(9.0, 0.9).at_least(1.0), 1..=10000;
+        /// Radius (standard deviation) of a cluster.
+        cluster_um: Number = Number::uniform(5.0, 16.0), 0..=1000, "µm";
+        /// Share of the clusters that lie on a cell.
+        on_cells: Number = 0.85, 0..=1;
+        /// Length of a bacillus.
+        length_um: Number = Number::log_normal(2.6, 0.35), 0.3..=50, "µm";
+        /// Width of a bacillus.
+        width_um: Number = Number::normal(0.6, 0.05), 0.1..=5, "µm";
+        /// Bend of a bacillus.
+        bend_deg: Number = Number::uniform(0.0, 35.0), 0..=120, "degrees between its ends";
+        /// Share of the bacilli that hang together in chains of two to four.
+        chained: Number = 0.12, 0..=1;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.09, 0.35), 0..=4;
+        /// How late light comes through a bacillus; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
+    }
 }
 
 /// A rod-shaped bacterium or a chain of them, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bacillus {
     /// Length of a rod, µm.
     pub length_um: f64,
@@ -55,67 +56,30 @@ pub struct Bacillus {
     pub phase_rad: f64,
 }
 
-impl Default for Bacilli {
-    fn default() -> Self {
-        Self {
-            clusters: Number::log_normal(4.0, 0.8),
-            per_cluster: Number::log_normal(9.0, 0.9).at_least(1.0),
-            cluster_um: Number::uniform(5.0, 16.0),
-            on_cells: 0.85.into(),
-            length_um: Number::log_normal(2.6, 0.35),
-            width_um: Number::normal(0.6, 0.05),
-            bend_deg: Number::uniform(0.0, 35.0),
-            chained: 0.12.into(),
-            absorbance: Number::log_normal(0.09, 0.35),
-            phase_rad: Number::uniform(0.1, 0.25),
-        }
-    }
-}
-
 /// Chains have this many rods at most.
 const LONGEST_CHAIN: usize = 4;
 
-impl Kinds for Bacilli {
-    fn none() -> Self {
-        Self { clusters: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("clusters", &self.clusters, 0.0, 1e5);
-        section.count("per_cluster", &self.per_cluster, 1.0, 1e4);
-        section.number("cluster_um", &self.cluster_um, 0.0, 1000.0);
-        section.share("on_cells", &self.on_cells);
-        section.number("length_um", &self.length_um, 0.3, 50.0);
-        section.number("width_um", &self.width_um, 0.1, 5.0);
-        section.number("bend_deg", &self.bend_deg, 0.0, 120.0);
-        section.share("chained", &self.chained);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for index in 0..ground.count("clusters", &self.clusters) {
-            let mut rng = ground.stream(index, "cluster");
-            let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
-            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = clump.place(&mut rng);
-                let mut own = ground.stream(number, "chain");
-                let chained = random::chance(self.chained.draw(&mut own), &mut own);
-                let bacillus = Bacillus {
-                    length_um: self.length_um.draw(&mut rng),
-                    width_um: self.width_um.draw(&mut rng),
-                    bend_deg: self.bend_deg.draw(&mut rng),
-                    rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
-                };
-                let depth_um = clump.depth_um + 0.3 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, bacillus);
+impl Kinds<Bacillus> for Bacilli {
+    fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
+        let clusters = Clusters {
+            purpose: "cluster",
+            on_cells: &self.on_cells,
+            radius_um: &self.cluster_um,
+            members: &self.per_cluster,
+            spread_um: 0.3,
+        };
+        ground.strew_in_clusters(named!(self.clusters), &clusters, |ground, number, rng| {
+            let mut own = ground.stream(number, "chain");
+            let chained = random::chance(self.chained.draw(&mut own), &mut own);
+            Bacillus {
+                length_um: self.length_um.draw(rng),
+                width_um: self.width_um.draw(rng),
+                bend_deg: self.bend_deg.draw(rng),
+                rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
+                absorbance: self.absorbance.draw(rng),
+                phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
             }
-        }
+        });
     }
 }
 
@@ -129,10 +93,6 @@ const KINK: f64 = 0.35;
 const WAIST: f64 = 0.7;
 
 impl Thing for Bacillus {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.rods.max(1) as f64 * (1.2 * self.length_um + self.width_um)
     }
@@ -152,7 +112,7 @@ impl Thing for Bacillus {
         let middle = rods.iter().flatten().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
         let count = (self.rods * (PARTS + 1)) as f64;
         let middle = if self.rods > 1 { middle.map(|sum| sum / count) } else { [0.0; 2] };
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         for point in rods.iter_mut().flatten() {
             *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, site.centre);
         }
@@ -175,7 +135,7 @@ impl Thing for Bacillus {
             1 => area / (site.pixel_um * site.pixel_um),
             _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
         };
-        let dyes = site.scene.dyes.bacillus;
+        let dyes = site.dyes.bacillus;
         Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
     }
 }

@@ -1,41 +1,42 @@
 //! Bare nuclei: nuclei of intermediate cells that have lost their cytoplasm but for faint shreds.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Bare nuclei: what bacteria leave of intermediate cells.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BareNuclei {
-    /// Number of nuclei, 0 to 100000; drawn once a field.
-    pub count: Number,
-    /// Share of the nuclei that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Radius of the disc of the same area, µm, 1 to 20.
-    pub radius_um: Number,
-    /// Length relative to width, 1 to 4.
-    pub elongation: Number,
-    /// Absorbance, 0 to 4, before the field's stain of nuclei.
-    pub absorbance: Number,
-    /// Contrast of its chromatin relative to the absorbance, 0 to 2.
-    pub texture: Number,
-    /// Absorbance of the shreds of cytoplasm round it, 0 to 4.
-    pub shreds: Number,
+section! {
+    /// Bare nuclei: what bacteria leave of intermediate cells.
+    pub struct BareNuclei {
+        /// Number of nuclei; drawn once a field.
+        count: Count = Number::log_normal(0.5, 0.9), 0..=100000;
+        /// Share of the nuclei that lie on a cell.
+        on_cells: Number = 0.15, 0..=1;
+        /// Radius of the disc of the same area.
+        radius_um: Number = Number::normal(3.7, 0.35), 1..=20, "µm";
+        /// Length relative to width.
+        elongation: Number = Number::uniform(1.05, 1.5), 1..=4;
+        /// Absorbance, before the field's stain of nuclei.
+        absorbance: Number = Number::normal(0.34, 0.05), 0..=4;
+        /// Contrast of its chromatin relative to the absorbance.
+        texture: Number = Number::uniform(0.08, 0.18), 0..=2;
+        /// Absorbance of the shreds of cytoplasm round it.
+        shreds: Number = Number::uniform(0.0, 0.06), 0..=4;
+    }
 }
 
 /// A bare nucleus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BareNucleus {
     /// Radius of the disc of the same area, µm.
     pub radius_um: f64,
@@ -51,51 +52,18 @@ pub struct BareNucleus {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for BareNuclei {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(0.5, 0.9),
-            on_cells: 0.15.into(),
-            radius_um: Number::normal(3.7, 0.35),
-            elongation: Number::uniform(1.05, 1.5),
-            absorbance: Number::normal(0.34, 0.05),
-            texture: Number::uniform(0.08, 0.18),
-            shreds: Number::uniform(0.0, 0.06),
-        }
-    }
-}
-
-impl Kinds for BareNuclei {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e5);
-        section.share("on_cells", &self.on_cells);
-        section.number("radius_um", &self.radius_um, 1.0, 20.0);
-        section.number("elongation", &self.elongation, 1.0, 4.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.number("texture", &self.texture, 0.0, 2.0);
-        section.absorbance("shreds", &self.shreds);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<BareNucleus> for BareNuclei {
+    fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
         let dyes = ground.cyanophilic();
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let nucleus = BareNucleus {
-                radius_um: self.radius_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng) * ground.nuclear_stain(),
-                texture: self.texture.draw(&mut rng),
-                shreds: self.shreds.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, nucleus);
-        }
+        let stain = ground.nuclear_stain();
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| BareNucleus {
+            radius_um: self.radius_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            absorbance: self.absorbance.draw(rng) * stain,
+            texture: self.texture.draw(rng),
+            shreds: self.shreds.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -110,10 +78,6 @@ const CLUMP_UM: f64 = 0.35;
 const SHREDS: usize = 7;
 
 impl Thing for BareNucleus {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
     }
@@ -145,6 +109,6 @@ impl Thing for BareNucleus {
             let half_width = site.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }
-        nucleus.finish(site.scene.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
+        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
     }
 }

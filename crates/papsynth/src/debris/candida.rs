@@ -1,54 +1,56 @@
 //! *Candida*: pseudohyphae, long and septate with constrictions and branches, and budding yeasts.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
+use crate::truth::traits::Trait;
 
-/// *Candida*: colonies of pseudohyphae and budding yeasts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Candidas {
-    /// Number of colonies, 0 to 10000; drawn once a field.
-    pub colonies: Number,
-    /// Pseudohyphae of a colony, 0 to 1000.
-    pub hyphae: Number,
-    /// Yeasts of a colony, most of them budding, 0 to 10000.
-    pub yeasts: Number,
-    /// Radius (standard deviation) of a colony, µm, 0 to 1000.
-    pub colony_um: Number,
-    /// Share of the colonies that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Segments of a pseudohypha, 1 to 30.
-    pub segments: Number,
-    /// Length of a segment, µm, 2 to 50.
-    pub segment_um: Number,
-    /// Width of a pseudohypha, µm, 0.5 to 10.
-    pub width_um: Number,
-    /// Diameter of a yeast, µm, 0.5 to 20.
-    pub yeast_um: Number,
-    /// Probability of a branch at each septum, 0 to 1.
-    pub branches: Number,
-    /// Probability of buds at each septum, 0 to 1.
-    pub buds: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Its dyes.
-    pub dyes: DyeAmounts,
+section! {
+    /// *Candida*: colonies of pseudohyphae and budding yeasts.
+    pub struct Candidas {
+        /// Number of colonies; drawn once a field.
+        colonies: Count = Number::log_normal(0.08, 0.9), 0..=10000;
+        /// Pseudohyphae of a colony.
+        hyphae: Count = Number::uniform(1.0, 5.0), 0..=1000;
+        /// Yeasts of a colony, most of them budding.
+        yeasts: Count = Number::log_normal(7.0, 0.7), 0..=10000;
+        /// Radius (standard deviation) of a colony.
+        colony_um: Number = Number::uniform(10.0, 25.0), 0..=1000, "µm";
+        /// Share of the colonies that lie on a cell.
+        on_cells: Number = 0.7, 0..=1;
+        /// Segments of a pseudohypha.
+        segments: Count = Number::uniform(2.0, 6.0), 1..=30;
+        /// Length of a segment.
+        segment_um: Number = Number::log_normal(10.0, 0.25), 2..=50, "µm";
+        /// Width of a pseudohypha.
+        width_um: Number = Number::normal(2.4, 0.2), 0.5..=10, "µm";
+        /// Diameter of a yeast.
+        yeast_um: Number = Number::normal(3.6, 0.35), 0.5..=20, "µm";
+        /// Probability of a branch at each septum.
+        branches: Number = 0.2, 0..=1;
+        /// Probability of buds at each septum.
+        buds: Number = 0.4, 0..=1;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.16, 0.25), 0..=4;
+        /// How late light comes through; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.2, 0.5), -3..=3, "radians of phase";
+        /// Its dyes.
+        dyes: DyeAmounts = DyeAmounts { eosin_y: 2.2, haematein: 0.55, orange_g: 0.6, ..DyeAmounts::none() };
+    }
 }
 
 /// What a piece of *Candida* is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Growth {
     /// A pseudohypha with its branches and buds.
@@ -58,7 +60,8 @@ pub enum Growth {
 }
 
 /// A pseudohypha or a yeast, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Candida {
     /// What it is.
     pub growth: Growth,
@@ -82,52 +85,10 @@ pub struct Candida {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Candidas {
-    fn default() -> Self {
-        Self {
-            colonies: Number::log_normal(0.08, 0.9),
-            hyphae: Number::uniform(1.0, 5.0),
-            yeasts: Number::log_normal(7.0, 0.7),
-            colony_um: Number::uniform(10.0, 25.0),
-            on_cells: 0.7.into(),
-            segments: Number::uniform(2.0, 6.0),
-            segment_um: Number::log_normal(10.0, 0.25),
-            width_um: Number::normal(2.4, 0.2),
-            yeast_um: Number::normal(3.6, 0.35),
-            branches: 0.2.into(),
-            buds: 0.4.into(),
-            absorbance: Number::log_normal(0.16, 0.25),
-            phase_rad: Number::uniform(0.2, 0.5),
-            dyes: DyeAmounts { eosin_y: 2.2, haematein: 0.55, orange_g: 0.6, ..DyeAmounts::none() },
-        }
-    }
-}
-
-impl Kinds for Candidas {
-    fn none() -> Self {
-        Self { colonies: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("colonies", &self.colonies, 0.0, 1e4);
-        section.count("hyphae", &self.hyphae, 0.0, 1000.0);
-        section.count("yeasts", &self.yeasts, 0.0, 1e4);
-        section.number("colony_um", &self.colony_um, 0.0, 1000.0);
-        section.share("on_cells", &self.on_cells);
-        section.count("segments", &self.segments, 1.0, 30.0);
-        section.number("segment_um", &self.segment_um, 2.0, 50.0);
-        section.number("width_um", &self.width_um, 0.5, 10.0);
-        section.number("yeast_um", &self.yeast_um, 0.5, 20.0);
-        section.share("branches", &self.branches);
-        section.share("buds", &self.buds);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Candida> for Candidas {
+    fn draw(&self, ground: &mut Ground<'_, Candida>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count("colonies", &self.colonies) {
+        for index in 0..ground.count(named!(self.colonies)) {
             let mut rng = ground.stream(index, "colony");
             let colony = ground.cluster(&self.on_cells, &self.colony_um, &mut rng);
             let hyphae = self.hyphae.draw_count(&mut rng);
@@ -174,10 +135,6 @@ const WALL_UM: f64 = 0.35;
 const INSIDE: f32 = 0.55;
 
 impl Thing for Candida {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         match self.growth {
             // Half of its length, and a branch of two segments from an end of it that bends back.
@@ -231,8 +188,8 @@ impl Thing for Candida {
         }
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         phantom.traits.push(match self.growth {
-            Growth::Hypha => "hypha",
-            Growth::Yeast => "yeast",
+            Growth::Hypha => Trait::Hypha,
+            Growth::Yeast => Trait::Yeast,
         });
         phantom
     }

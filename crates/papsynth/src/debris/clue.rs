@@ -3,38 +3,40 @@
 //! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
 //! cell's row in the truth has the trait `clue`.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Section;
 use super::paint::{Painting, Stroke};
+use super::site::Site;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Tile;
-use crate::phantom::{Phantom, Pools};
 use crate::random;
-use crate::recipe::Number;
-use crate::scene::{Body, FieldNumbers, Object, Scene};
+use crate::recipe::number::Number;
+use crate::recipe::section::{named, section};
+use crate::scene::numbers::FieldNumbers;
+use crate::truth::traits::Trait;
 
-/// Clue cells: cells covered with coccobacilli, and cells with patches of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ClueCells {
-    /// Share of the cells that carry a coat, 0 to 1; drawn once a field.
-    pub share: Number,
-    /// Coccobacilli per µm² where a coat is dense, 0 to 10.
-    pub density: Number,
-    /// Share of the cell that the dense patches of its coat cover, 0 to 1.
-    pub cover: Number,
-    /// How far the coat reaches beyond the cell's rim, µm, 0 to 20.
-    pub beyond_um: Number,
-    /// Width of a coccobacillus, µm, 0.1 to 5.
-    pub width_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
+section! {
+    /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
+    pub struct ClueCells {
+        /// Share of the cells that carry a coat; drawn once a field.
+        share: Number = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
+        /// Coccobacilli per µm² where a coat is dense.
+        density: Number = Number::uniform(1.5, 4.5), 0..=10;
+        /// Share of the cell that the dense patches of its coat cover.
+        cover: Number = Number::uniform(0.35, 0.95), 0..=1;
+        /// How far the coat reaches beyond the cell's rim.
+        beyond_um: Number = Number::uniform(0.8, 3.0), 0..=20, "µm";
+        /// Width of a coccobacillus.
+        width_um: Number = Number::normal(0.6, 0.04), 0.1..=5, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.045, 0.25), 0..=4;
+    }
 }
 
 /// The coat of a clue cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Coat {
     /// Coccobacilli per µm² where it is dense.
     pub density: f64,
@@ -48,43 +50,16 @@ pub struct Coat {
     pub absorbance: f64,
 }
 
-impl Default for ClueCells {
-    fn default() -> Self {
-        Self {
-            share: Number::log_normal(0.004, 1.3).at_most(0.8),
-            density: Number::uniform(1.5, 4.5),
-            cover: Number::uniform(0.35, 0.95),
-            beyond_um: Number::uniform(0.8, 3.0),
-            width_um: Number::normal(0.6, 0.04),
-            absorbance: Number::log_normal(0.045, 0.25),
-        }
-    }
-}
-
 impl ClueCells {
-    /// A slide without any.
-    pub(super) fn none() -> Self {
-        Self { share: 0.0.into(), ..Self::default() }
-    }
-
-    pub(super) fn check(&self, section: &mut Section<'_>) {
-        section.share("share", &self.share);
-        section.number("density", &self.density, 0.0, 10.0);
-        section.share("cover", &self.cover);
-        section.number("beyond_um", &self.beyond_um, 0.0, 20.0);
-        section.number("width_um", &self.width_um, 0.1, 5.0);
-        section.absorbance("absorbance", &self.absorbance);
-    }
-
-    /// Gives cells their coats.
-    pub(super) fn draw(&self, field: &FieldNumbers, objects: &mut [Object]) {
-        let share = field.draw("debris.clue_cells.share", &self.share);
+    /// Gives cells, by their numbers, their coats.
+    pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
+        let share = field.draw(named!("debris.clue_cells", self.share));
         if share <= 0.0 {
             return;
         }
-        for object in objects.iter_mut().filter(|object| matches!(object.body, Body::Cell(_))) {
-            let mut rng = field.key.stream("cell", object.number, "coat");
-            object.coat = random::chance(share, &mut rng).then(|| Coat {
+        for (number, coat) in cells {
+            let mut rng = field.key.stream("cell", number, "coat");
+            *coat = random::chance(share, &mut rng).then(|| Coat {
                 density: self.density.draw(&mut rng),
                 cover: self.cover.draw(&mut rng),
                 beyond_um: self.beyond_um.draw(&mut rng),
@@ -113,10 +88,10 @@ const TUFTED: f64 = 0.15;
 const RIM_UM: f64 = 2.0;
 
 /// Lays its coat on a cell.
-pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: &mut Phantom) {
-    let (Some(coat), Some(cell)) = (&object.coat, phantom.pieces.first()) else { return };
-    let mut rng = scene.stream("cell", object, "coat.shape");
-    let pixel_um = scene.grid().pixel_um;
+pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
+    let Some(cell) = phantom.pieces.first() else { return };
+    let (pools, pixel_um) = (site.pools, site.pixel_um);
+    let mut rng = site.stream("coat.shape");
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
     let whole = cell.coverage.clone().repeated(cell.cover_step);
     let corner = whole.origin.map(|at| at as f64);
@@ -161,8 +136,8 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
         let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
         painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
-    *phantom = core::mem::take(phantom).stained(painting.absorbance, scene.dyes.bacillus);
-    phantom.traits.push("clue");
+    *phantom = core::mem::take(phantom).stained(painting.absorbance, site.dyes.bacillus);
+    phantom.traits.push(Trait::Clue);
 }
 
 /// A tile on the place of a wider one.

@@ -1,44 +1,45 @@
 //! Cocci and coccobacilli: round bacteria in pairs, chains and clouds. A colony is one object.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Cocci and coccobacilli, colony by colony.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Cocci {
-    /// Number of colonies, 0 to 100000; drawn once a field.
-    pub colonies: Number,
-    /// Cocci of a colony, 1 to 20000.
-    pub per_colony: Number,
-    /// Radius (standard deviation) of a cloud, µm, 0 to 500.
-    pub cloud_um: Number,
-    /// Share of the colonies that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Share of the colonies that are one chain, 0 to 1.
-    pub chains: Number,
-    /// Diameter of a coccus, µm, 0.1 to 5.
-    pub diameter_um: Number,
-    /// Length of a coccus relative to its diameter, 1 to 5: above 1.3 it is a coccobacillus.
-    pub elongation: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through a coccus, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
+section! {
+    /// Cocci and coccobacilli, colony by colony.
+    pub struct Cocci {
+        /// Number of colonies; drawn once a field.
+        colonies: Count = Number::log_normal(0.6, 1.1), 0..=100000;
+        /// Cocci of a colony.
+        per_colony: Count = Number::log_normal(30.0, 0.9).at_least(2.0), 1..=20000;
+        /// Radius (standard deviation) of a cloud.
+        cloud_um: Number = Number::log_normal(3.5, 0.5), 0..=500, "µm";
+        /// Share of the colonies that lie on a cell.
+        on_cells: Number = 0.6, 0..=1;
+        /// Share of the colonies that are one chain.
+        chains: Number = 0.15, 0..=1;
+        /// Diameter of a coccus.
+        diameter_um: Number = Number::normal(0.8, 0.05), 0.1..=5, "µm";
+        /// Length of a coccus relative to its diameter: above 1.3 it is a coccobacillus.
+        elongation: Number = Number::uniform(1.0, 1.6), 1..=5;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.11, 0.3), 0..=4;
+        /// How late light comes through a coccus; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.05, 0.2), -3..=3, "radians of phase";
+    }
 }
 
 /// A colony of cocci, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Colony {
     /// Number of cocci.
     pub cocci: usize,
@@ -56,55 +57,17 @@ pub struct Colony {
     pub phase_rad: f64,
 }
 
-impl Default for Cocci {
-    fn default() -> Self {
-        Self {
-            colonies: Number::log_normal(0.6, 1.1),
-            per_colony: Number::log_normal(30.0, 0.9).at_least(2.0),
-            cloud_um: Number::log_normal(3.5, 0.5),
-            on_cells: 0.6.into(),
-            chains: 0.15.into(),
-            diameter_um: Number::normal(0.8, 0.05),
-            elongation: Number::uniform(1.0, 1.6),
-            absorbance: Number::log_normal(0.11, 0.3),
-            phase_rad: Number::uniform(0.05, 0.2),
-        }
-    }
-}
-
-impl Kinds for Cocci {
-    fn none() -> Self {
-        Self { colonies: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("colonies", &self.colonies, 0.0, 1e5);
-        section.count("per_colony", &self.per_colony, 1.0, 2e4);
-        section.number("cloud_um", &self.cloud_um, 0.0, 500.0);
-        section.share("on_cells", &self.on_cells);
-        section.share("chains", &self.chains);
-        section.number("diameter_um", &self.diameter_um, 0.1, 5.0);
-        section.number("elongation", &self.elongation, 1.0, 5.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for number in 0..ground.count("colonies", &self.colonies) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let colony = Colony {
-                cocci: self.per_colony.draw_count(&mut rng).max(1),
-                cloud_um: self.cloud_um.draw(&mut rng),
-                chain: random::chance(self.chains.draw(&mut rng), &mut rng),
-                diameter_um: self.diameter_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, colony);
-        }
+impl Kinds<Colony> for Cocci {
+    fn draw(&self, ground: &mut Ground<'_, Colony>) {
+        ground.strew_on_cells(named!(self.colonies), &self.on_cells, |rng| Colony {
+            cocci: self.per_colony.draw_count(rng).max(1),
+            cloud_um: self.cloud_um.draw(rng),
+            chain: random::chance(self.chains.draw(rng), rng),
+            diameter_um: self.diameter_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -122,10 +85,6 @@ const KINK: f64 = 0.45;
 const FARTHEST: f64 = 4.0;
 
 impl Thing for Colony {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         if self.chain {
             0.8 * self.cocci.min(LONGEST_CHAIN) as f64 * self.diameter_um * self.elongation + self.diameter_um
@@ -148,7 +107,7 @@ impl Thing for Colony {
             let stroke = Stroke::even([at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy], site.px(size * half_width));
             painting.stroke(&stroke, self.absorbance);
         }
-        painting.finish(site.scene.dyes.bacillus, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.bacillus, self.phase_rad, self.absorbance)
     }
 }
 

@@ -1,36 +1,38 @@
 //! Precipitated dye: dark, angular, refracting grains.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Precipitated dye: dark, angular, refracting grains.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Crystals {
-    /// Number of grains, 0 to 100000; drawn once a field.
-    pub count: Number,
-    /// Share of the grains that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Diameter, µm, 0.2 to 50.
-    pub diameter_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Its dyes.
-    pub dyes: DyeAmounts,
+section! {
+    /// Precipitated dye: dark, angular, refracting grains.
+    pub struct Crystals {
+        /// Number of grains; drawn once a field.
+        count: Count = Number::log_normal(0.45, 0.9), 0..=100000;
+        /// Share of the grains that lie on a cell.
+        on_cells: Number = 0.3, 0..=1;
+        /// Diameter.
+        diameter_um: Number = Number::log_normal(1.2, 0.4), 0.2..=50, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.6, 0.4), 0..=4;
+        /// How late light comes through it; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.3, 1.0), -3..=3, "radians of phase";
+        /// Its dyes.
+        dyes: DyeAmounts = DyeAmounts { haematein: 0.9, eosin_y: 0.4, orange_g: 0.4, ..DyeAmounts::none() };
+    }
 }
 
 /// A grain of dye, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Crystal {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -42,55 +44,19 @@ pub struct Crystal {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Crystals {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(0.45, 0.9),
-            on_cells: 0.3.into(),
-            diameter_um: Number::log_normal(1.2, 0.4),
-            absorbance: Number::log_normal(0.6, 0.4),
-            phase_rad: Number::uniform(0.3, 1.0),
-            dyes: DyeAmounts { haematein: 0.9, eosin_y: 0.4, orange_g: 0.4, ..DyeAmounts::none() },
-        }
-    }
-}
-
-impl Kinds for Crystals {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e5);
-        section.share("on_cells", &self.on_cells);
-        section.number("diameter_um", &self.diameter_um, 0.2, 50.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Crystal> for Crystals {
+    fn draw(&self, ground: &mut Ground<'_, Crystal>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let crystal = Crystal {
-                diameter_um: self.diameter_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, crystal);
-        }
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Crystal {
+            diameter_um: self.diameter_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
 impl Thing for Crystal {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.7 * self.diameter_um + 1.0
     }

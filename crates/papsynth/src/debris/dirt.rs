@@ -1,45 +1,47 @@
 //! The faint dirt of the background: flecks of a micrometre or two, many of them, hardly darker than empty slide.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
-///
-/// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Dirt {
-    /// Number of drifts, 0 to 100000; drawn once a field.
-    pub drifts: Number,
-    /// Flecks of a drift, 1 to 10000.
-    pub per_drift: Number,
-    /// Radius (standard deviation) of a drift, µm, 0 to 1000.
-    pub drift_um: Number,
-    /// Length of a fleck, µm, 0.1 to 20.
-    pub length_um: Number,
-    /// Width of a fleck, µm, 0.1 to 10.
-    pub width_um: Number,
-    /// Share of the flecks that lie in the direction of their drift, 0 to 1.
-    pub aligned: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through a fleck, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Their dyes.
-    pub dyes: DyeAmounts,
+section! {
+    /// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
+    ///
+    /// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
+    pub struct Dirt {
+        /// Number of drifts; drawn once a field.
+        drifts: Count = Number::log_normal(20.0, 0.7), 0..=100000;
+        /// Flecks of a drift.
+        per_drift: Count = Number::log_normal(4.0, 0.8).at_least(1.0), 1..=10000;
+        /// Radius (standard deviation) of a drift.
+        drift_um: Number = Number::log_normal(22.0, 0.6), 0..=1000, "µm";
+        /// Length of a fleck.
+        length_um: Number = Number::log_normal(2.1, 0.5), 0.1..=20, "µm";
+        /// Width of a fleck.
+        width_um: Number = Number::log_normal(1.1, 0.35), 0.1..=10, "µm";
+        /// Share of the flecks that lie in the direction of their drift.
+        aligned: Number = 0.6, 0..=1;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15), 0..=4;
+        /// How late light comes through a fleck; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.0, 0.12), -3..=3, "radians of phase";
+        /// Their dyes.
+        dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
+    }
 }
 
 /// A fleck of dirt, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fleck {
     /// Length, µm.
     pub length_um: f64,
@@ -53,22 +55,6 @@ pub struct Fleck {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Dirt {
-    fn default() -> Self {
-        Self {
-            drifts: Number::log_normal(20.0, 0.7),
-            per_drift: Number::log_normal(4.0, 0.8).at_least(1.0),
-            drift_um: Number::log_normal(22.0, 0.6),
-            length_um: Number::log_normal(2.1, 0.5),
-            width_um: Number::log_normal(1.1, 0.35),
-            aligned: 0.6.into(),
-            absorbance: Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15),
-            phase_rad: Number::uniform(0.0, 0.12),
-            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
-        }
-    }
-}
-
 /// Most strokes that a fleck is made of, and the spread of the angles between them, radians.
 const MOST_STROKES: usize = 4;
 const KINK: f64 = 0.7;
@@ -79,26 +65,10 @@ const SCATTER_UM: f64 = 1.2;
 /// Spread of the directions of flecks that lie as their drift does, degrees.
 const ASTRAY_DEG: f64 = 14.0;
 
-impl Kinds for Dirt {
-    fn none() -> Self {
-        Self { drifts: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("drifts", &self.drifts, 0.0, 1e5);
-        section.count("per_drift", &self.per_drift, 1.0, 1e4);
-        section.number("drift_um", &self.drift_um, 0.0, 1000.0);
-        section.number("length_um", &self.length_um, 0.1, 20.0);
-        section.number("width_um", &self.width_um, 0.1, 10.0);
-        section.share("aligned", &self.aligned);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Fleck> for Dirt {
+    fn draw(&self, ground: &mut Ground<'_, Fleck>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count("drifts", &self.drifts) {
+        for index in 0..ground.count(named!(self.drifts)) {
             let mut rng = ground.stream(index, "drift");
             let drift = ground.cluster(&Number::Fixed(0.0), &self.drift_um, &mut rng);
             let direction_deg = random::between(0.0, 360.0, &mut rng);
@@ -126,10 +96,6 @@ impl Kinds for Dirt {
 }
 
 impl Thing for Fleck {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.length_um + self.width_um
     }

@@ -1,33 +1,33 @@
 //! Dust on the glass, so far from the cells that only its shade is seen.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::crystal::shard;
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Dust on the cover glass or within the mountant.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Dust {
-    /// Number of grains, 0 to 100000; drawn once a field.
-    pub count: Number,
-    /// Diameter, µm, 0.5 to 200.
-    pub diameter_um: Number,
-    /// How far above the cells it lies, µm, -1000 to 1000: 170 is the outside of a cover glass, less lies within the
-    /// mountant.
-    pub height_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
+section! {
+    /// Dust on the cover glass or within the mountant.
+    pub struct Dust {
+        /// Number of grains; drawn once a field.
+        count: Count = Number::log_normal(0.12, 0.9), 0..=100000;
+        /// Diameter.
+        diameter_um: Number = Number::log_normal(14.0, 0.5), 0.5..=200, "µm";
+        /// How far above the cells it lies: 170 is the outside of a cover glass, less lies within the mountant.
+        height_um: Number = Number::choice([20.0, 35.0, 60.0, 170.0]), -1000..=1000, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::uniform(0.1, 0.7), 0..=4;
+    }
 }
 
 /// A grain of dust, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Grain {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -35,46 +35,16 @@ pub struct Grain {
     pub absorbance: f64,
 }
 
-impl Default for Dust {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(0.12, 0.9),
-            diameter_um: Number::log_normal(14.0, 0.5),
-            height_um: Number::choice([20.0, 35.0, 60.0, 170.0]),
-            absorbance: Number::uniform(0.1, 0.7),
-        }
-    }
-}
-
-impl Kinds for Dust {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e5);
-        section.number("diameter_um", &self.diameter_um, 0.5, 200.0);
-        section.height_um("height_um", &self.height_um);
-        section.absorbance("absorbance", &self.absorbance);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let grain =
-                Grain { diameter_um: self.diameter_um.draw(&mut rng), absorbance: self.absorbance.draw(&mut rng) };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, grain);
-        }
+impl Kinds<Grain> for Dust {
+    fn draw(&self, ground: &mut Ground<'_, Grain>) {
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Grain {
+            diameter_um: self.diameter_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+        });
     }
 }
 
 impl Thing for Grain {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.65 * self.diameter_um + 1.0
     }
@@ -84,6 +54,6 @@ impl Thing for Grain {
         let outline = site.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
         let mut painting = site.painting(&outline, 0.0);
         painting.fill(&outline, self.absorbance);
-        painting.finish(site.scene.dyes.speckle, 0.0, self.absorbance)
+        painting.finish(site.dyes.speckle, 0.0, self.absorbance)
     }
 }

@@ -1,40 +1,40 @@
 //! Fibres of cotton and cloth: long, of even width, sharply bounded, with refracting edges.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Fibres of cotton and cloth, in the mountant or on the glass.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Fibres {
-    /// Number of fibres, 0 to 10000; drawn once a field.
-    pub count: Number,
-    /// Length, µm, 5 to 500.
-    pub length_um: Number,
-    /// Width, µm, 0.5 to 50.
-    pub width_um: Number,
-    /// How wavy it is, 0 to 2: 0 is straight.
-    pub waves: Number,
-    /// How far above the cells it lies, µm, -1000 to 1000: 170 is the outside of a cover glass, less lies within the
-    /// mountant.
-    pub height_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through its middle, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
+section! {
+    /// Fibres of cotton and cloth, in the mountant or on the glass.
+    pub struct Fibres {
+        /// Number of fibres; drawn once a field.
+        count: Count = Number::log_normal(0.1, 0.8), 0..=10000;
+        /// Length.
+        length_um: Number = Number::uniform(60.0, 200.0), 5..=500, "µm";
+        /// Width.
+        width_um: Number = Number::uniform(5.0, 15.0), 0.5..=50, "µm";
+        /// How wavy it is: 0 is straight.
+        waves: Number = Number::uniform(0.0, 0.8), 0..=2;
+        /// How far above the cells it lies: 170 is the outside of a cover glass, less lies within the mountant.
+        height_um: Number = Number::choice([0.0, 8.0, 30.0, 170.0]), -1000..=1000, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::uniform(0.03, 0.2), 0..=4;
+        /// How late light comes through its middle; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.4, 1.2), -3..=3, "radians of phase";
+    }
 }
 
 /// A fibre, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fibre {
     /// Length, µm.
     pub length_um: f64,
@@ -48,49 +48,15 @@ pub struct Fibre {
     pub phase_rad: f64,
 }
 
-impl Default for Fibres {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(0.1, 0.8),
-            length_um: Number::uniform(60.0, 200.0),
-            width_um: Number::uniform(5.0, 15.0),
-            waves: Number::uniform(0.0, 0.8),
-            height_um: Number::choice([0.0, 8.0, 30.0, 170.0]),
-            absorbance: Number::uniform(0.03, 0.2),
-            phase_rad: Number::uniform(0.4, 1.2),
-        }
-    }
-}
-
-impl Kinds for Fibres {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e4);
-        section.number("length_um", &self.length_um, 5.0, 500.0);
-        section.number("width_um", &self.width_um, 0.5, 50.0);
-        section.number("waves", &self.waves, 0.0, 2.0);
-        section.height_um("height_um", &self.height_um);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let fibre = Fibre {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                waves: self.waves.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, fibre);
-        }
+impl Kinds<Fibre> for Fibres {
+    fn draw(&self, ground: &mut Ground<'_, Fibre>) {
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Fibre {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            waves: self.waves.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -107,10 +73,6 @@ const EDGE: f32 = 2.5;
 const EDGE_WIDTH: f64 = 0.12;
 
 impl Thing for Fibre {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.7 * self.length_um + self.width_um
     }
@@ -141,6 +103,6 @@ impl Thing for Fibre {
         for ((value, cover), inner) in values {
             *value = self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0));
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

@@ -3,63 +3,64 @@
 mod neutrophil;
 mod round;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Cluster, Lie, cluster_id, member_number, near};
+use super::ground::{Cluster, Ground, Lie, cluster_id, member_number, near};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// How the nucleus of a leukocyte is shaped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum NucleusForm {
-    /// Lobes joined by bridges within a pale, ragged cytoplasm, as neutrophils have them; clusters are tight.
-    Lobed,
-    /// The paper's: one perturbed circle (Eq. 7).
-    Round,
+section! {
+    /// How the nucleus of a leukocyte is shaped.
+    pub enum NucleusForm {
+        /// Lobes joined by bridges within a pale, ragged cytoplasm, as neutrophils have them; clusters are tight.
+        Lobed,
+        /// The paper's: one perturbed circle (Eq. 7).
+        Round,
+    }
 }
 
-/// White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Leukocytes {
-    /// Number of clusters, 0 to 100000; drawn once a field.
-    pub clusters: Number,
-    /// Leukocytes of a cluster, 1 to 10000.
-    pub per_cluster: Number,
-    /// Radius (standard deviation) of a cluster, µm, 0 to 1000; of lobed ones that of those which do not touch another.
-    pub cluster_um: Number,
-    /// Share of a cluster's lobed leukocytes that touch another one, 0 to 1.
-    pub touching: Number,
-    /// Share of the clusters that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// How the nucleus is shaped.
-    pub form: NucleusForm,
-    /// Radius of a leukocyte's nucleus, µm, 0.3 to 20 (s of Eq. 7); of a lobed one that of the disc of its area.
-    pub radius_um: Number,
-    /// Range of the radial perturbation, 0 to 0.5 (α of Eq. 7).
-    pub alpha: Number,
-    /// Range of the angular perturbation, radians, 0 to 0.5 (β of Eq. 7).
-    pub beta: Number,
-    /// Lobes of a lobed nucleus, 1 to 8.
-    pub lobes: Number,
-    /// Diameter of a lobed leukocyte's cytoplasm, µm, 1 to 100.
-    pub cell_um: Number,
-    /// Probability that a lobed leukocyte is degenerated: its nucleus smudged, its cytoplasm frayed; 0 to 1.
-    pub degenerated: Number,
-    /// Absorbance, 0 to 4, before the field's stain of nuclei.
-    pub absorbance: Number,
-    /// Absorbance of the pale cytoplasm round the nucleus, 0 to 4.
-    pub halo: Number,
+section! {
+    /// White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9).
+    pub struct Leukocytes {
+        /// Number of clusters; drawn once a field.
+        clusters: Count = Number::log_normal(2.4, 1.0), 0..=100000;
+        /// Leukocytes of a cluster.
+        per_cluster: Count = Number::log_normal(1.7, 0.75).at_least(1.0), 1..=10000;
+        /// Radius (standard deviation) of a cluster; of lobed ones that of those which do not touch another.
+        cluster_um: Number = Number::uniform(8.0, 20.0), 0..=1000, "µm";
+        /// Share of a cluster's lobed leukocytes that touch another one.
+        touching: Number = 0.7, 0..=1;
+        /// Share of the clusters that lie on a cell.
+        on_cells: Number = 0.45, 0..=1;
+        /// How the nucleus is shaped.
+        form: NucleusForm = NucleusForm::Lobed;
+        /// Radius of a leukocyte's nucleus (s of Eq. 7); of a lobed one that of the disc of its area.
+        radius_um: Number = Number::normal(3.2, 0.28), 0.3..=20, "µm";
+        /// Range of the radial perturbation (α of Eq. 7).
+        alpha: Number = 0.10, 0..=0.5;
+        /// Range of the angular perturbation (β of Eq. 7).
+        beta: Number = 0.10, 0..=0.5, "radians";
+        /// Lobes of a lobed nucleus.
+        lobes: Count = Number::choice([1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]), 1..=8;
+        /// Diameter of a lobed leukocyte's cytoplasm.
+        cell_um: Number = Number::normal(9.6, 0.7), 1..=100, "µm";
+        /// Probability that a lobed leukocyte is degenerated: its nucleus smudged, its cytoplasm frayed.
+        degenerated: Number = 0.2, 0..=1;
+        /// Absorbance, before the field's stain of nuclei.
+        absorbance: Number = Number::normal(0.30, 0.05), 0..=4;
+        /// Absorbance of the pale cytoplasm round the nucleus.
+        halo: Number = Number::log_normal(0.10, 0.35), 0..=4;
+    }
 }
 
 /// A white blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Leukocyte {
     /// How the nucleus is shaped.
     pub form: NucleusForm,
@@ -83,51 +84,10 @@ pub struct Leukocyte {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Leukocytes {
-    fn default() -> Self {
-        Self {
-            clusters: Number::log_normal(2.4, 1.0),
-            per_cluster: Number::log_normal(1.7, 0.75).at_least(1.0),
-            cluster_um: Number::uniform(8.0, 20.0),
-            touching: 0.7.into(),
-            on_cells: 0.45.into(),
-            form: NucleusForm::Lobed,
-            radius_um: Number::normal(3.2, 0.28),
-            alpha: 0.10.into(),
-            beta: 0.10.into(),
-            lobes: Number::choice([1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]),
-            cell_um: Number::normal(9.6, 0.7),
-            degenerated: 0.2.into(),
-            absorbance: Number::normal(0.30, 0.05),
-            halo: Number::log_normal(0.10, 0.35),
-        }
-    }
-}
-
-impl Kinds for Leukocytes {
-    fn none() -> Self {
-        Self { clusters: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("clusters", &self.clusters, 0.0, 1e5);
-        section.count("per_cluster", &self.per_cluster, 1.0, 1e4);
-        section.number("cluster_um", &self.cluster_um, 0.0, 1000.0);
-        section.share("touching", &self.touching);
-        section.share("on_cells", &self.on_cells);
-        section.number("radius_um", &self.radius_um, 0.3, 20.0);
-        section.number("alpha", &self.alpha, 0.0, 0.5);
-        section.number("beta", &self.beta, 0.0, 0.5);
-        section.count("lobes", &self.lobes, 1.0, 8.0);
-        section.number("cell_um", &self.cell_um, 1.0, 100.0);
-        section.share("degenerated", &self.degenerated);
-        section.absorbance("absorbance", &self.absorbance);
-        section.absorbance("halo", &self.halo);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Leukocyte> for Leukocytes {
+    fn draw(&self, ground: &mut Ground<'_, Leukocyte>) {
         let dyes = ground.cyanophilic();
-        for index in 0..ground.count("clusters", &self.clusters) {
+        for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "cluster");
             let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
             let mut taken: Vec<[f64; 2]> = Vec::new();
@@ -223,10 +183,6 @@ impl Cluster {
 }
 
 impl Thing for Leukocyte {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.3 * self.cell_um).max((2.0 + 2.0 * self.alpha) * self.radius_um)
     }

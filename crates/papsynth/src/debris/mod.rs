@@ -8,14 +8,14 @@ mod bacillus;
 mod bare_nucleus;
 mod bubble;
 mod candida;
-mod check;
 mod clue;
 mod coccus;
 mod crystal;
 mod dirt;
 mod dust;
 mod fibre;
-mod ground;
+pub(crate) mod ground;
+mod kind;
 mod leukocyte;
 mod mucus;
 mod out_of_focus;
@@ -27,17 +27,16 @@ mod smudge;
 mod speckle;
 mod trichomonad;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::phantom::{Phantom, Pools};
-use crate::scene::{CellBody, Object, Scene};
+use crate::phantom::piece::Phantom;
+use crate::recipe::section::section;
+use crate::scene::cell::CellBody;
 
 pub use bacillus::{Bacilli, Bacillus};
 pub use bare_nucleus::{BareNuclei, BareNucleus};
 pub use bubble::{Bubble, Bubbles};
 pub use candida::{Candida, Candidas, Growth};
-pub(crate) use check::{MOST_PHASE_RAD, Section};
 pub(crate) use clue::cover;
 pub use clue::{ClueCells, Coat};
 pub use coccus::{Cocci, Colony};
@@ -45,7 +44,6 @@ pub use crystal::{Crystal, Crystals};
 pub use dirt::{Dirt, Fleck};
 pub use dust::{Dust, Grain};
 pub use fibre::{Fibre, Fibres};
-pub(crate) use ground::{Ground, Sieve};
 pub use leukocyte::{Leukocyte, Leukocytes, NucleusForm};
 pub use mucus::{Mucus, Strand};
 pub use out_of_focus::{Blob, OutOfFocus};
@@ -55,41 +53,19 @@ pub use smudge::{Smudge, Smudges};
 pub use speckle::{SpeckForm, Speckle, Speckles};
 pub use trichomonad::{Trichomonad, Trichomonads};
 
-use site::Site;
-
-/// A section of the recipe: how many objects of a kind there are, and what they are like.
-trait Kinds {
-    /// The section of a slide that has none of them.
-    fn none() -> Self;
-
-    /// Finds what is out of range.
-    fn check(&self, section: &mut Section<'_>);
-
-    /// Draws every object of a field.
-    fn draw(&self, ground: &mut Ground<'_>);
-}
-
-/// The numbers drawn of one object.
-trait Thing {
-    /// The strength of its stain.
-    fn absorbance(&self) -> f64;
-
-    /// How far it may reach from its middle, µm, where pixels have that size.
-    fn reach_um(&self, pixel_um: f64) -> f64;
-
-    /// What it absorbs where it lies.
-    fn phantom(&self, site: &Site<'_>) -> Phantom;
-}
+use ground::{Field, Ground, Strewn};
+use kind::{Kinds, Thing};
+pub(crate) use site::Site;
 
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $field:ident: $Section:ident => $Kind:ident($Thing:ident), $name:literal;)*) => {
-        /// Everything that is no epithelial cell.
-        #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(default, deny_unknown_fields)]
-        pub struct Debris {
-            /// Clue cells: epithelial cells covered with coccobacilli.
-            pub clue_cells: ClueCells,
-            $($(#[$doc])* pub $field: $Section,)*
+    ($($(#[$doc:meta])* $field:ident: $Section:ident { $count:ident } => $Kind:ident($Thing:ident), $name:literal;)*) => {
+        section! {
+            /// Everything that is no epithelial cell.
+            pub struct Debris {
+                /// Clue cells: epithelial cells covered with coccobacilli.
+                clue_cells: ClueCells;
+                $($(#[$doc])* $field: $Section;)*
+            }
         }
 
         /// What kind of thing an object is.
@@ -102,7 +78,7 @@ macro_rules! kinds {
         }
 
         /// What an object is, its numbers drawn.
-        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind", rename_all = "kebab-case")]
         pub enum Body {
             /// An epithelial cell.
@@ -155,96 +131,86 @@ macro_rules! kinds {
                 }
             }
 
+            /// What it absorbs; nothing of cells, which are made together.
+            pub(crate) fn phantom(&self, site: &Site<'_>) -> Option<Phantom> {
+                match self {
+                    Self::Cell(_) => None,
+                    $(Self::$Kind(thing) => Some(thing.phantom(site)),)*
+                }
+            }
+
             /// The strength of its stain: of a cell that of its cytoplasm.
             pub(crate) fn absorbance(&self) -> f64 {
                 match self {
                     Self::Cell(cell) => cell.cytoplasm_absorbance,
-                    $(Self::$Kind(thing) => thing.absorbance(),)*
+                    $(Self::$Kind(thing) => thing.absorbance,)*
                 }
             }
         }
-
-        $(impl From<$Thing> for Body {
-            fn from(thing: $Thing) -> Self {
-                Self::$Kind(thing)
-            }
-        })*
 
         impl Debris {
             /// A slide with nothing but cells.
             #[must_use]
             pub fn none() -> Self {
-                Self { clue_cells: ClueCells::none(), $($field: $Section::none(),)* }
-            }
-
-            /// Finds what is out of range; `find` is told the section's name.
-            pub(crate) fn check(&self, find: &mut impl FnMut(&str, &str, String)) {
-                {
-                    let mut add = |field: &str, message: String| find("clue_cells", field, message);
-                    self.clue_cells.check(&mut Section::new(&mut add));
+                Self {
+                    clue_cells: ClueCells { share: 0.into(), ..ClueCells::default() },
+                    $($field: $Section { $count: 0.into(), ..$Section::default() },)*
                 }
+            }
+
+            /// Draws everything that lies on a slide with these cells, kind by kind.
+            pub(crate) fn draw(&self, field: &Field<'_>) -> Vec<Strewn<Body>> {
+                let mut strewn = Vec::new();
                 $({
-                    let mut add = |field: &str, message: String| find(stringify!($field), field, message);
-                    self.$field.check(&mut Section::new(&mut add));
+                    let kind = Kind::$Kind;
+                    let mut ground = Ground::new(field, kind.name(), stringify!($field), kind.lies_on_glass());
+                    self.$field.draw(&mut ground);
+                    strewn.extend(ground.strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| {
+                        Strewn { number, cluster, lie, thing: Body::$Kind(thing) }
+                    }));
                 })*
-            }
-
-            /// Draws everything that lies on a slide with these cells.
-            pub(crate) fn draw(&self, ground: &mut Ground<'_>) {
-                ground.dress(&self.clue_cells);
-                $(
-                    ground.begin(Kind::$Kind, stringify!($field));
-                    self.$field.draw(ground);
-                )*
-            }
-        }
-
-        /// What an object absorbs; nothing of cells, which are made together.
-        pub(crate) fn phantom(scene: &Scene, pools: &Pools<'_>, object: &Object) -> Option<Phantom> {
-            let site = Site::new(scene, pools, object);
-            match &object.body {
-                Body::Cell(_) => None,
-                $(Body::$Kind(thing) => Some(thing.phantom(&site)),)*
+                strewn
             }
         }
     };
 }
 
+// A section of the recipe, which of its numbers says how many there are, and what is drawn from it.
 kinds! {
     /// White blood cells, single and in clusters.
-    leukocytes: Leukocytes => Leukocyte(Leukocyte), "leukocyte";
+    leukocytes: Leukocytes { clusters } => Leukocyte(Leukocyte), "leukocyte";
     /// Rod-shaped bacteria, in clusters, on cells and between them.
-    bacilli: Bacilli => Bacillus(Bacillus), "bacillus";
+    bacilli: Bacilli { clusters } => Bacillus(Bacillus), "bacillus";
     /// Specks of dust and stain, anywhere.
-    speckles: Speckles => Speckle(Speckle), "speckle";
+    speckles: Speckles { count } => Speckle(Speckle), "speckle";
     /// Objects far outside the depth of the slide.
-    out_of_focus: OutOfFocus => OutOfFocus(Blob), "out-of-focus";
+    out_of_focus: OutOfFocus { count } => OutOfFocus(Blob), "out-of-focus";
     /// Amorphous debris: granular clumps.
-    smudges: Smudges => Smudge(Smudge), "smudge";
+    smudges: Smudges { count } => Smudge(Smudge), "smudge";
     /// Faint flecks of background dirt.
-    dirt: Dirt => Dirt(Fleck), "dirt";
+    dirt: Dirt { drifts } => Dirt(Fleck), "dirt";
     /// Cocci and coccobacilli, colony by colony.
-    cocci: Cocci => Coccus(Colony), "coccus";
+    cocci: Cocci { colonies } => Coccus(Colony), "coccus";
     /// *Candida*: pseudohyphae and budding yeasts.
-    candida: Candidas => Candida(Candida), "candida";
+    candida: Candidas { colonies } => Candida(Candida), "candida";
     /// Trichomonads, pale pear-shaped flagellates.
-    trichomonads: Trichomonads => Trichomonad(Trichomonad), "trichomonad";
+    trichomonads: Trichomonads { groups } => Trichomonad(Trichomonad), "trichomonad";
     /// Red blood cells and their ghosts.
-    red_cells: RedCells => RedCell(RedCell), "red-cell";
+    red_cells: RedCells { clusters } => RedCell(RedCell), "red-cell";
     /// Strands of mucus.
-    mucus: Mucus => Mucus(Strand), "mucus";
+    mucus: Mucus { strands } => Mucus(Strand), "mucus";
     /// Bare nuclei.
-    bare_nuclei: BareNuclei => BareNucleus(BareNucleus), "bare-nucleus";
+    bare_nuclei: BareNuclei { count } => BareNucleus(BareNucleus), "bare-nucleus";
     /// Precipitated dye: dark, angular, refracting grains.
-    crystals: Crystals => Crystal(Crystal), "crystal";
+    crystals: Crystals { count } => Crystal(Crystal), "crystal";
     /// Dust on the glass, out of focus.
-    dust: Dust => Dust(Grain), "dust";
+    dust: Dust { count } => Dust(Grain), "dust";
     /// Fibres of cotton and cloth.
-    fibres: Fibres => Fibre(Fibre), "fibre";
+    fibres: Fibres { count } => Fibre(Fibre), "fibre";
     /// Air bubbles in the mountant.
-    bubbles: Bubbles => Bubble(Bubble), "bubble";
+    bubbles: Bubbles { count } => Bubble(Bubble), "bubble";
     /// Scratches in the glass.
-    scratches: Scratches => Scratch(Scratch), "scratch";
+    scratches: Scratches { count } => Scratch(Scratch), "scratch";
 }
 
 #[cfg(test)]

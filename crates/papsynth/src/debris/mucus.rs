@@ -1,44 +1,46 @@
 //! Strands of mucus: long bundles of faint parallel fibres.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Strands of mucus, bundles of faint fibres.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Mucus {
-    /// Number of strands, 0 to 10000; drawn once a field.
-    pub strands: Number,
-    /// Share of the strands that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Length of a strand, µm, 5 to 400.
-    pub length_um: Number,
-    /// Width of a strand, µm, 1 to 100.
-    pub width_um: Number,
-    /// Fibres across a strand, 1 to 200.
-    pub fibres: Number,
-    /// Width of a fibre, µm, 0.1 to 5.
-    pub fibre_um: Number,
-    /// Absorbance of a fibre, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through a fibre, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Its dyes.
-    pub dyes: DyeAmounts,
+section! {
+    /// Strands of mucus, bundles of faint fibres.
+    pub struct Mucus {
+        /// Number of strands; drawn once a field.
+        strands: Count = Number::log_normal(0.3, 0.8), 0..=10000;
+        /// Share of the strands that lie on a cell.
+        on_cells: Number = 0.3, 0..=1;
+        /// Length of a strand.
+        length_um: Number = Number::log_normal(40.0, 0.45).at_least(10.0).at_most(150.0), 5..=400, "µm";
+        /// Width of a strand.
+        width_um: Number = Number::log_normal(5.0, 0.4), 1..=100, "µm";
+        /// Fibres across a strand.
+        fibres: Count = Number::uniform(6.0, 20.0), 1..=200;
+        /// Width of a fibre.
+        fibre_um: Number = Number::uniform(0.4, 1.1), 0.1..=5, "µm";
+        /// Absorbance of a fibre.
+        absorbance: Number = Number::log_normal(0.05, 0.4), 0..=4;
+        /// How late light comes through a fibre; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.0, 0.12), -3..=3, "radians of phase";
+        /// Its dyes.
+        dyes: DyeAmounts = DyeAmounts { light_green: 2.5, eosin_y: 0.5, ..DyeAmounts::none() };
+    }
 }
 
 /// A strand of mucus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Strand {
     /// Length, µm.
     pub length_um: f64,
@@ -56,56 +58,18 @@ pub struct Strand {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Mucus {
-    fn default() -> Self {
-        Self {
-            strands: Number::log_normal(0.3, 0.8),
-            on_cells: 0.3.into(),
-            length_um: Number::log_normal(40.0, 0.45).at_least(10.0).at_most(150.0),
-            width_um: Number::log_normal(5.0, 0.4),
-            fibres: Number::uniform(6.0, 20.0),
-            fibre_um: Number::uniform(0.4, 1.1),
-            absorbance: Number::log_normal(0.05, 0.4),
-            phase_rad: Number::uniform(0.0, 0.12),
-            dyes: DyeAmounts { light_green: 2.5, eosin_y: 0.5, ..DyeAmounts::none() },
-        }
-    }
-}
-
-impl Kinds for Mucus {
-    fn none() -> Self {
-        Self { strands: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("strands", &self.strands, 0.0, 1e4);
-        section.share("on_cells", &self.on_cells);
-        section.number("length_um", &self.length_um, 5.0, 400.0);
-        section.number("width_um", &self.width_um, 1.0, 100.0);
-        section.count("fibres", &self.fibres, 1.0, 200.0);
-        section.number("fibre_um", &self.fibre_um, 0.1, 5.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Strand> for Mucus {
+    fn draw(&self, ground: &mut Ground<'_, Strand>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count("strands", &self.strands) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let strand = Strand {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                fibres: self.fibres.draw_count(&mut rng).max(1),
-                fibre_um: self.fibre_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, strand);
-        }
+        ground.strew_on_cells(named!(self.strands), &self.on_cells, |rng| Strand {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            fibres: self.fibres.draw_count(rng).max(1),
+            fibre_um: self.fibre_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -127,10 +91,6 @@ const TAPER: f64 = 0.3;
 const NECK: f64 = 0.35;
 
 impl Thing for Strand {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.8 * self.length_um + self.width_um
     }

@@ -1,45 +1,48 @@
 //! Red blood cells: discs with a pale middle, and the ghosts that are left of them.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
+use crate::truth::traits::Trait;
 
-/// Red blood cells, in clusters.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RedCells {
-    /// Number of clusters, 0 to 100000; drawn once a field.
-    pub clusters: Number,
-    /// Red cells of a cluster, 1 to 10000.
-    pub per_cluster: Number,
-    /// Radius (standard deviation) of a cluster, µm, 0 to 1000.
-    pub cluster_um: Number,
-    /// Share of the clusters that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Diameter, µm, 1 to 30.
-    pub diameter_um: Number,
-    /// Absorbance of the middle relative to the rim, 0 to 1.
-    pub pallor: Number,
-    /// Probability that it is a ghost that has lost its haemoglobin, 0 to 1.
-    pub ghosts: Number,
-    /// Absorbance, 0 to 4: haemoglobin in a disc of 2 µm absorbs 0.1 at 0.57 µm.
-    pub absorbance: Number,
-    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Its dyes: haemoglobin and eosin are much alike.
-    pub dyes: DyeAmounts,
+section! {
+    /// Red blood cells, in clusters.
+    pub struct RedCells {
+        /// Number of clusters; drawn once a field.
+        clusters: Count = Number::log_normal(0.22, 0.9), 0..=100000;
+        /// Red cells of a cluster.
+        per_cluster: Count = Number::log_normal(4.0, 0.9).at_least(1.0), 1..=10000;
+        /// Radius (standard deviation) of a cluster.
+        cluster_um: Number = Number::uniform(8.0, 25.0), 0..=1000, "µm";
+        /// Share of the clusters that lie on a cell.
+        on_cells: Number = 0.3, 0..=1;
+        /// Diameter.
+        diameter_um: Number = Number::normal(7.0, 0.35), 1..=30, "µm";
+        /// Absorbance of the middle relative to the rim.
+        pallor: Number = Number::uniform(0.3, 0.6), 0..=1;
+        /// Probability that it is a ghost that has lost its haemoglobin.
+        ghosts: Number = 0.3, 0..=1;
+        /// Absorbance: haemoglobin in a disc of 2 µm absorbs 0.1 at 0.57 µm.
+        absorbance: Number = Number::normal(0.10, 0.015), 0..=4;
+        /// How late light comes through it; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.1, 0.3), -3..=3, "radians of phase";
+        /// Its dyes: haemoglobin and eosin are much alike.
+        dyes: DyeAmounts = DyeAmounts { eosin_y: 4.5, orange_g: 1.5, haematein: 0.35, ..DyeAmounts::none() };
+    }
 }
 
 /// A red blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RedCell {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -55,63 +58,24 @@ pub struct RedCell {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for RedCells {
-    fn default() -> Self {
-        Self {
-            clusters: Number::log_normal(0.22, 0.9),
-            per_cluster: Number::log_normal(4.0, 0.9).at_least(1.0),
-            cluster_um: Number::uniform(8.0, 25.0),
-            on_cells: 0.3.into(),
-            diameter_um: Number::normal(7.0, 0.35),
-            pallor: Number::uniform(0.3, 0.6),
-            ghosts: 0.3.into(),
-            absorbance: Number::normal(0.10, 0.015),
-            phase_rad: Number::uniform(0.1, 0.3),
-            dyes: DyeAmounts { eosin_y: 4.5, orange_g: 1.5, haematein: 0.35, ..DyeAmounts::none() },
-        }
-    }
-}
-
-impl Kinds for RedCells {
-    fn none() -> Self {
-        Self { clusters: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("clusters", &self.clusters, 0.0, 1e5);
-        section.count("per_cluster", &self.per_cluster, 1.0, 1e4);
-        section.number("cluster_um", &self.cluster_um, 0.0, 1000.0);
-        section.share("on_cells", &self.on_cells);
-        section.number("diameter_um", &self.diameter_um, 1.0, 30.0);
-        section.share("pallor", &self.pallor);
-        section.share("ghosts", &self.ghosts);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<RedCell> for RedCells {
+    fn draw(&self, ground: &mut Ground<'_, RedCell>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count("clusters", &self.clusters) {
-            let mut rng = ground.stream(index, "cluster");
-            let cluster = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
-            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = cluster.place(&mut rng);
-                let red_cell = RedCell {
-                    diameter_um: self.diameter_um.draw(&mut rng),
-                    pallor: self.pallor.draw(&mut rng),
-                    ghost: random::chance(self.ghosts.draw(&mut rng), &mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut rng),
-                    dyes,
-                };
-                let depth_um = cluster.depth_um + 0.5 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, red_cell);
-            }
-        }
+        let clusters = Clusters {
+            purpose: "cluster",
+            on_cells: &self.on_cells,
+            radius_um: &self.cluster_um,
+            members: &self.per_cluster,
+            spread_um: 0.5,
+        };
+        ground.strew_in_clusters(named!(self.clusters), &clusters, |_, _, rng| RedCell {
+            diameter_um: self.diameter_um.draw(rng),
+            pallor: self.pallor.draw(rng),
+            ghost: random::chance(self.ghosts.draw(rng), rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -123,10 +87,6 @@ const SEAM: f64 = 0.18;
 const THICKEST: f64 = 0.68;
 
 impl Thing for RedCell {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.diameter_um
     }
@@ -158,7 +118,7 @@ impl Thing for RedCell {
         });
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         if self.ghost {
-            phantom.traits.push("ghost");
+            phantom.traits.push(Trait::Ghost);
         }
         phantom
     }

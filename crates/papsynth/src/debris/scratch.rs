@@ -1,38 +1,39 @@
 //! Scratches in the glass: long, thin, straight and interrupted lines.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Scratches in the slide or in the cover glass.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Scratches {
-    /// Number of scratches, 0 to 10000; drawn once a field.
-    pub count: Number,
-    /// Length, µm, 5 to 500.
-    pub length_um: Number,
-    /// Width, µm, 0.1 to 20.
-    pub width_um: Number,
-    /// How far above the cells it lies, µm, -1000 to 1000: a little below 0 is the slide's inner face, 170 the outside of
-    /// a cover glass, where only wide ones are seen.
-    pub height_um: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
+section! {
+    /// Scratches in the slide or in the cover glass.
+    pub struct Scratches {
+        /// Number of scratches; drawn once a field.
+        count: Count = Number::log_normal(0.12, 0.8), 0..=10000;
+        /// Length.
+        length_um: Number = Number::uniform(20.0, 120.0), 5..=500, "µm";
+        /// Width.
+        width_um: Number = Number::log_normal(0.7, 0.4), 0.1..=20, "µm";
+        /// How far above the cells it lies: a little below 0 is the slide's inner face, 170 the outside of a cover
+        /// glass, where only wide ones are seen.
+        height_um: Number = Number::choice([-3.0, 170.0, 170.0]), -1000..=1000, "µm";
+        /// Absorbance.
+        absorbance: Number = Number::uniform(0.02, 0.08), 0..=4;
+        /// How late light comes through it; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(-0.4, 0.4), -3..=3, "radians of phase";
+    }
 }
 
 /// A scratch, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scratch {
     /// Length, µm.
     pub length_um: f64,
@@ -44,46 +45,14 @@ pub struct Scratch {
     pub phase_rad: f64,
 }
 
-impl Default for Scratches {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(0.12, 0.8),
-            length_um: Number::uniform(20.0, 120.0),
-            width_um: Number::log_normal(0.7, 0.4),
-            height_um: Number::choice([-3.0, 170.0, 170.0]),
-            absorbance: Number::uniform(0.02, 0.08),
-            phase_rad: Number::uniform(-0.4, 0.4),
-        }
-    }
-}
-
-impl Kinds for Scratches {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e4);
-        section.number("length_um", &self.length_um, 5.0, 500.0);
-        section.number("width_um", &self.width_um, 0.1, 20.0);
-        section.height_um("height_um", &self.height_um);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let scratch = Scratch {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, scratch);
-        }
+impl Kinds<Scratch> for Scratches {
+    fn draw(&self, ground: &mut Ground<'_, Scratch>) {
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Scratch {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -94,10 +63,6 @@ const PARTS: usize = 24;
 const SKIPPED: f64 = 0.15;
 
 impl Thing for Scratch {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.length_um + self.width_um
     }
@@ -124,6 +89,6 @@ impl Thing for Scratch {
         for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
             *value = self.absorbance as f32 * cover;
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

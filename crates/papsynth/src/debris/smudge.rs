@@ -1,45 +1,47 @@
 //! Amorphous debris: greyish, granular, irregular clumps and shreds, frayed at their rims.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
+use super::kind::{Kinds, Thing};
 use super::paint::Painting;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Smudges {
-    /// Number of clumps, 0 to 100000; drawn once a field.
-    pub count: Number,
-    /// Share of the clumps that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Diameter of a clump, µm, 1 to 200.
-    pub diameter_um: Number,
-    /// Length of a clump relative to its width, 1 to 10.
-    pub elongation: Number,
-    /// Size of its grains, µm, 0.2 to 5.
-    pub grain_um: Number,
-    /// How much the grains differ from each other, relative to the absorbance, 0 to 2.
-    pub granularity: Number,
-    /// How ragged its outline is, 0 to 2: 0 is an ellipse.
-    pub ragged: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through it, radians of phase, -3 to 3; seen by bright-field optics alone.
-    pub phase_rad: Number,
-    /// Its dyes.
-    pub dyes: DyeAmounts,
+section! {
+    /// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
+    pub struct Smudges {
+        /// Number of clumps; drawn once a field.
+        count: Count = Number::log_normal(9.0, 0.8), 0..=100000;
+        /// Share of the clumps that lie on a cell.
+        on_cells: Number = 0.25, 0..=1;
+        /// Diameter of a clump.
+        diameter_um: Number = Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0), 1..=200, "µm";
+        /// Length of a clump relative to its width.
+        elongation: Number = Number::log_normal(1.5, 0.3).at_least(1.0), 1..=10;
+        /// Size of its grains.
+        grain_um: Number = Number::uniform(0.6, 1.1), 0.2..=5, "µm";
+        /// How much the grains differ from each other, relative to the absorbance.
+        granularity: Number = Number::uniform(0.3, 0.7), 0..=2;
+        /// How ragged its outline is: 0 is an ellipse.
+        ragged: Number = Number::uniform(0.6, 1.3), 0..=2;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.05, 0.65).at_least(0.012).at_most(0.4), 0..=4;
+        /// How late light comes through it; seen by bright-field optics alone.
+        phase_rad: Number = Number::uniform(0.0, 0.2), -3..=3, "radians of phase";
+        /// Its dyes.
+        dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
+    }
 }
 
 /// A clump of amorphous debris, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Smudge {
     /// Diameter of the disc of its area before it is frayed, µm.
     pub diameter_um: f64,
@@ -59,59 +61,19 @@ pub struct Smudge {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Smudges {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(9.0, 0.8),
-            on_cells: 0.25.into(),
-            diameter_um: Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0),
-            elongation: Number::log_normal(1.5, 0.3).at_least(1.0),
-            grain_um: Number::uniform(0.6, 1.1),
-            granularity: Number::uniform(0.3, 0.7),
-            ragged: Number::uniform(0.6, 1.3),
-            absorbance: Number::log_normal(0.05, 0.65).at_least(0.012).at_most(0.4),
-            phase_rad: Number::uniform(0.0, 0.2),
-            dyes: DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 },
-        }
-    }
-}
-
-impl Kinds for Smudges {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e5);
-        section.share("on_cells", &self.on_cells);
-        section.number("diameter_um", &self.diameter_um, 1.0, 200.0);
-        section.number("elongation", &self.elongation, 1.0, 10.0);
-        section.number("grain_um", &self.grain_um, 0.2, 5.0);
-        section.number("granularity", &self.granularity, 0.0, 2.0);
-        section.number("ragged", &self.ragged, 0.0, 2.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Smudge> for Smudges {
+    fn draw(&self, ground: &mut Ground<'_, Smudge>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count("count", &self.count) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let smudge = Smudge {
-                diameter_um: self.diameter_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                grain_um: self.grain_um.draw(&mut rng),
-                granularity: self.granularity.draw(&mut rng),
-                ragged: self.ragged.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, smudge);
-        }
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Smudge {
+            diameter_um: self.diameter_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            grain_um: self.grain_um.draw(rng),
+            granularity: self.granularity.draw(rng),
+            ragged: self.ragged.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -125,10 +87,6 @@ const WAVES: [(f64, f64); 2] = [(0.42, 0.42), (0.16, 0.22)];
 const FADE: f64 = 0.35;
 
 impl Thing for Smudge {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (REACH - 1.0) * self.ragged.min(1.5))
     }
@@ -141,7 +99,7 @@ impl Thing for Smudge {
         let reach = 1.0 + (REACH - 1.0) * self.ragged.min(1.5);
         let corners = site.places(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
         let mut painting = site.painting(&corners, 0.0);
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         let (sin, cos) = (libm::sin(turn), libm::cos(turn));
         let (a_px, b_px) = (site.px(a), site.px(b));
         // Where the clump is: 1 in its middle, 0 on its outline, before waves push that in and out.

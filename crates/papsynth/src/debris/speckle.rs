@@ -1,45 +1,46 @@
 //! Specks of dust and stain ("Speckles"): a pixel, extended by one in a random direction, then dilated.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::Lie;
+use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::tile::Tile;
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// How a speck is grown from its two pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SpeckForm {
-    /// Round, whatever the pixels.
-    Round,
-    /// The paper's: dilated by a cross of pixels, which makes diamonds.
-    Dilated,
+section! {
+    /// How a speck is grown from its two pixels.
+    pub enum SpeckForm {
+        /// Round, whatever the pixels.
+        Round,
+        /// The paper's: dilated by a cross of pixels, which makes diamonds.
+        Dilated,
+    }
 }
 
-/// Specks of dust and stain ("Speckles").
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Speckles {
-    /// Number of speckles, 0 to 1000000; drawn once a field.
-    pub count: Number,
-    /// How it is grown from its two pixels.
-    pub form: SpeckForm,
-    /// How often a speckle is grown by a pixel to all sides (binary dilation), 0 to 50.
-    pub dilations: Number,
-    /// Absorbance, 0 to 4.
-    pub absorbance: Number,
-    /// How late light comes through a speck, radians of phase, -3 to 3: the halo that changes sign with focus. Seen by
-    /// bright-field optics alone.
-    pub phase_rad: Number,
+section! {
+    /// Specks of dust and stain ("Speckles").
+    pub struct Speckles {
+        /// Number of speckles; drawn once a field.
+        count: Count = Number::log_normal(6.0, 0.7), 0..=1000000;
+        /// How it is grown from its two pixels.
+        form: SpeckForm = SpeckForm::Round;
+        /// How often a speckle is grown by a pixel to all sides (binary dilation).
+        dilations: Count = Number::log_normal(0.35, 0.9), 0..=50;
+        /// Absorbance.
+        absorbance: Number = Number::log_normal(0.09, 0.6), 0..=4;
+        /// How late light comes through a speck: the halo that changes sign with focus. Seen by bright-field optics
+        /// alone.
+        phase_rad: Number = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
+    }
 }
 
 /// A speck of dust or stain, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Speckle {
     /// How it was grown.
     pub form: SpeckForm,
@@ -51,32 +52,9 @@ pub struct Speckle {
     pub phase_rad: f64,
 }
 
-impl Default for Speckles {
-    fn default() -> Self {
-        Self {
-            count: Number::log_normal(6.0, 0.7),
-            form: SpeckForm::Round,
-            dilations: Number::log_normal(0.35, 0.9),
-            absorbance: Number::log_normal(0.09, 0.6),
-            phase_rad: Number::normal(0.25, 0.15),
-        }
-    }
-}
-
-impl Kinds for Speckles {
-    fn none() -> Self {
-        Self { count: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("count", &self.count, 0.0, 1e6);
-        section.count("dilations", &self.dilations, 0.0, 50.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.phase_rad("phase_rad", &self.phase_rad);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
-        for number in 0..ground.count("count", &self.count) {
+impl Kinds<Speckle> for Speckles {
+    fn draw(&self, ground: &mut Ground<'_, Speckle>) {
+        for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
             let speckle = Speckle {
@@ -93,19 +71,15 @@ impl Kinds for Speckles {
 }
 
 impl Thing for Speckle {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, pixel_um: f64) -> f64 {
         (self.dilations as f64 + 3.0) * pixel_um
     }
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
-        let pixel = site.scene.oversampling() as f64;
+        let pixel = site.oversampling as f64;
         // Its pixels are those of the image, whatever grid it is drawn on.
-        let [x, y] = site.scene.view.to_px(site.object.centre_um).map(libm::round);
+        let [x, y] = site.view.to_px(site.centre_um).map(libm::round);
         let [dx, dy] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][random::below(4, &mut rng)];
         let seeds = [[x, y], [x + dx, y + dy]];
         let to_grid = |p: [f64; 2]| p.map(|v| (v + 0.5) * pixel - 0.5);
@@ -134,6 +108,6 @@ impl Thing for Speckle {
         for value in &mut tile.values {
             *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
         }
-        Phantom::whole(tile, coverage, area, site.scene.dyes.speckle).refracting(self.phase_rad, self.absorbance)
+        Phantom::whole(tile, coverage, area, site.dyes.speckle).refracting(self.phase_rad, self.absorbance)
     }
 }

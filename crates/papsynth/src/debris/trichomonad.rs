@@ -1,45 +1,47 @@
 //! Trichomonads: pale pear-shaped flagellates with a small, spindle-shaped nucleus.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::smooth;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::{Count, Number};
+use crate::recipe::section::{named, section};
 
-/// Trichomonads, pale pear-shaped flagellates.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Trichomonads {
-    /// Number of groups, 0 to 100000; drawn once a field.
-    pub groups: Number,
-    /// Trichomonads of a group, 1 to 10000.
-    pub per_group: Number,
-    /// Radius (standard deviation) of a group, µm, 0 to 1000.
-    pub group_um: Number,
-    /// Share of the groups that lie on a cell, 0 to 1.
-    pub on_cells: Number,
-    /// Length, µm, 2 to 60.
-    pub length_um: Number,
-    /// Width relative to the length, 0.2 to 1.
-    pub width: Number,
-    /// Absorbance of the pale body, 0 to 4.
-    pub absorbance: Number,
-    /// Absorbance of the nucleus above the body, 0 to 4.
-    pub nucleus: Number,
-    /// Its dyes; the nucleus takes those of other nuclei.
-    pub dyes: DyeAmounts,
+section! {
+    /// Trichomonads, pale pear-shaped flagellates.
+    pub struct Trichomonads {
+        /// Number of groups; drawn once a field.
+        groups: Count = Number::log_normal(0.07, 0.9), 0..=100000;
+        /// Trichomonads of a group.
+        per_group: Count = Number::log_normal(5.0, 0.7).at_least(1.0), 1..=10000;
+        /// Radius (standard deviation) of a group.
+        group_um: Number = Number::uniform(12.0, 30.0), 0..=1000, "µm";
+        /// Share of the groups that lie on a cell.
+        on_cells: Number = 0.4, 0..=1;
+        /// Length.
+        length_um: Number = Number::normal(12.0, 1.0), 2..=60, "µm";
+        /// Width relative to the length.
+        width: Number = Number::uniform(0.55, 0.8), 0.2..=1;
+        /// Absorbance of the pale body.
+        absorbance: Number = Number::log_normal(0.09, 0.25), 0..=4;
+        /// Absorbance of the nucleus above the body.
+        nucleus: Number = Number::uniform(0.08, 0.2), 0..=4;
+        /// Its dyes; the nucleus takes those of other nuclei.
+        dyes: DyeAmounts = DyeAmounts { light_green: 2.2, eosin_y: 0.6, haematein: 0.15, ..DyeAmounts::none() };
+    }
 }
 
 /// A trichomonad, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Trichomonad {
     /// Length, µm.
     pub length_um: f64,
@@ -53,60 +55,23 @@ pub struct Trichomonad {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Default for Trichomonads {
-    fn default() -> Self {
-        Self {
-            groups: Number::log_normal(0.07, 0.9),
-            per_group: Number::log_normal(5.0, 0.7).at_least(1.0),
-            group_um: Number::uniform(12.0, 30.0),
-            on_cells: 0.4.into(),
-            length_um: Number::normal(12.0, 1.0),
-            width: Number::uniform(0.55, 0.8),
-            absorbance: Number::log_normal(0.09, 0.25),
-            nucleus: Number::uniform(0.08, 0.2),
-            dyes: DyeAmounts { light_green: 2.2, eosin_y: 0.6, haematein: 0.15, ..DyeAmounts::none() },
-        }
-    }
-}
-
-impl Kinds for Trichomonads {
-    fn none() -> Self {
-        Self { groups: 0.0.into(), ..Self::default() }
-    }
-
-    fn check(&self, section: &mut Section<'_>) {
-        section.count("groups", &self.groups, 0.0, 1e5);
-        section.count("per_group", &self.per_group, 1.0, 1e4);
-        section.number("group_um", &self.group_um, 0.0, 1000.0);
-        section.share("on_cells", &self.on_cells);
-        section.number("length_um", &self.length_um, 2.0, 60.0);
-        section.number("width", &self.width, 0.2, 1.0);
-        section.absorbance("absorbance", &self.absorbance);
-        section.absorbance("nucleus", &self.nucleus);
-        section.dyes("dyes", &self.dyes);
-    }
-
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Trichomonad> for Trichomonads {
+    fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count("groups", &self.groups) {
-            let mut rng = ground.stream(index, "group");
-            let group = ground.cluster(&self.on_cells, &self.group_um, &mut rng);
-            for member in 0..self.per_group.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = group.place(&mut rng);
-                let trichomonad = Trichomonad {
-                    length_um: self.length_um.draw(&mut rng),
-                    width: self.width.draw(&mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    nucleus: self.nucleus.draw(&mut rng),
-                    dyes,
-                };
-                let depth_um = group.depth_um + 0.5 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, trichomonad);
-            }
-        }
+        let clusters = Clusters {
+            purpose: "group",
+            on_cells: &self.on_cells,
+            radius_um: &self.group_um,
+            members: &self.per_group,
+            spread_um: 0.5,
+        };
+        ground.strew_in_clusters(named!(self.groups), &clusters, |_, _, rng| Trichomonad {
+            length_um: self.length_um.draw(rng),
+            width: self.width.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            nucleus: self.nucleus.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -126,10 +91,6 @@ const FLAGELLUM_UM: f64 = 0.25;
 const FLAGELLUM: f64 = 0.3;
 
 impl Thing for Trichomonad {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         1.1 * self.length_um
     }
@@ -179,7 +140,7 @@ impl Thing for Trichomonad {
         // Flagella are no part of its outline: nobody would draw it round them.
         painting
             .finish(self.dyes, 0.0, self.absorbance)
-            .stained(nucleus.absorbance, site.scene.dyes.nucleus)
+            .stained(nucleus.absorbance, site.dyes.nucleus)
             .stained(hairs.absorbance, self.dyes)
     }
 }

@@ -1,122 +1,92 @@
 //! The section of a recipe about the camera, and cameras that ship.
 
+use super::number::{Count, Number};
+use super::section::section;
 use ccd_noise::{Blooming, CameraParams, ReadNoise};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use super::Number;
-
-/// How photons are counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum PhotonNoise {
-    /// Poisson, exact at every mean.
-    Exact,
-    /// One normal of the summed variance where more than 400 electrons are expected (skewness below 0.05), Poisson below.
-    Normal,
-    /// No photon noise.
-    Off,
-}
-
-/// How the sensor's pixels are joined to the picture's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Binning {
-    /// Their charges are joined and read once, as in a CCD.
-    Charge,
-    /// They are read one by one and averaged, as in CMOS.
-    Digital,
-}
-
-/// How much of the colour JPEG leaves out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Subsampling {
-    /// None: 4:4:4.
-    Full,
-    /// Every second column: 4:2:2.
-    Columns,
-    /// Every second column and row: 4:2:0.
-    Squares,
-}
-
-/// The camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Numbers are those of one pixel of the sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Camera {
-    /// Side of a pixel of the sensor, µm, 1 to 100; `field.magnification` makes it the picture's.
-    pub pixel_um: Number,
-    /// Bits of a grey level, 8 to 16.
-    pub bits: Number,
-    /// Electrons that a pixel holds, which the largest grey level stands for, 10 to 10000000.
-    pub full_well_e: Number,
-    /// Standard deviation of the read noise, electrons, 0 to 100000; where pixels differ, its median.
-    pub read_noise_e: Number,
-    /// Root of the mean square of the read noises of pixels that differ, as in CMOS: from `read_noise_e` to 20 times that. 0 where all pixels are alike.
-    pub read_noise_rms_e: Number,
-    /// Grey level of a dark pixel, 0 to 4096.
-    pub offset_dn: Number,
-    /// Glare that was taken off the picture as its black level, as a share of the light of the empty slide, 0 to 0.8: what
-    /// is dark keeps the noise of the glare.
-    pub glare_removed: Number,
+section! {
     /// How photons are counted.
-    pub photon_noise: PhotonNoise,
-    /// Photo response non-uniformity: spread of the pixels' responses as a share of their mean, 0 to 0.5.
-    pub prnu: Number,
-    /// Dark signal non-uniformity: spread of the pixels' offsets, electrons, 0 to 100000.
-    pub dsnu_e: Number,
-    /// Which camera of its kind it is, 0 to 2⁵³: its fixed pattern is the same in all images.
-    pub serial: u64,
-    /// Exposure, seconds, 0 to 1000000: how long dark current is gathered. Light is what `background.level` says.
-    pub exposure_s: Number,
-    /// Dark current at `dark_reference_c`, electrons per second and pixel, 0 to 1000000.
-    pub dark_current_e_per_s: Number,
-    /// Temperature for which the dark current is given, °C, -200 to 150.
-    pub dark_reference_c: Number,
-    /// Temperature of the sensor, °C, -200 to 150.
-    pub temperature_c: Number,
-    /// Warming that doubles the dark current, K, 0.1 to 100.
-    pub dark_doubling_c: Number,
-    /// Share of the charge that a full pixel cannot hold and that blooms into its neighbours, 0 to 1; the rest is drained.
-    pub blooming: Number,
-    /// Share of that which stays within its column, 0 to 1.
-    pub blooming_vertical: Number,
-    /// Pixels of the sensor along the side of one of the picture, 1 to 8.
-    pub binning_px: Number,
-    /// How they are joined.
-    pub binning: Binning,
-    /// Quality of a JPEG through which the picture has gone, 1 to 100, or 0 for none; 8 bits only.
-    pub jpeg_quality: Number,
-    /// How much of the colour that leaves out.
-    pub jpeg_subsampling: Subsampling,
+    pub enum PhotonNoise {
+        /// Poisson, exact at every mean.
+        Exact,
+        /// One normal of the summed variance where more than 400 electrons are expected (skewness below 0.05), Poisson below.
+        Normal,
+        /// No photon noise.
+        Off,
+    }
 }
 
-impl Default for Camera {
-    fn default() -> Self {
-        Self {
-            pixel_um: 6.45.into(),
-            bits: 8.0.into(),
-            full_well_e: 32_600.0.into(),
-            read_noise_e: 138.0.into(),
-            read_noise_rms_e: 0.0.into(),
-            offset_dn: 0.0.into(),
-            glare_removed: 0.0.into(),
-            photon_noise: PhotonNoise::Exact,
-            prnu: 0.007.into(),
-            dsnu_e: 2.0.into(),
-            serial: 1,
-            exposure_s: 0.02.into(),
-            dark_current_e_per_s: 1.0.into(),
-            dark_reference_c: 25.0.into(),
-            temperature_c: 25.0.into(),
-            dark_doubling_c: 8.0.into(),
-            blooming: 0.0.into(),
-            blooming_vertical: 0.95.into(),
-            binning_px: 1.0.into(),
-            binning: Binning::Charge,
-            jpeg_quality: 0.0.into(),
-            jpeg_subsampling: Subsampling::Squares,
-        }
+section! {
+    /// How the sensor's pixels are joined to the picture's.
+    pub enum Binning {
+        /// Their charges are joined and read once, as in a CCD.
+        Charge,
+        /// They are read one by one and averaged, as in CMOS.
+        Digital,
+    }
+}
+
+section! {
+    /// How much of the colour JPEG leaves out.
+    pub enum Subsampling {
+        /// None: 4:4:4.
+        Full,
+        /// Every second column: 4:2:2.
+        Columns,
+        /// Every second column and row: 4:2:0.
+        Squares,
+    }
+}
+
+section! {
+    /// The camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Numbers are those of one pixel of the sensor.
+    pub struct Camera, drawn as pub SceneCamera {
+        /// Side of a pixel of the sensor; `field.magnification` makes it the picture's.
+        pixel_um: Number (undrawn) = 6.45, 1..=100, "µm";
+        /// Bits of a grey level.
+        bits: Count = 8, 8..=16;
+        /// Electrons that a pixel holds, which the largest grey level stands for.
+        full_well_e: Number = 32_600.0, 10..=10000000;
+        /// Standard deviation of the read noise; where pixels differ, its median.
+        read_noise_e: Number = 138.0, 0..=100000, "electrons";
+        /// Root of the mean square of the read noises of pixels that differ, as in CMOS: from `read_noise_e` to 20 times
+        /// that. 0 where all pixels are alike.
+        read_noise_rms_e: Number = 0.0, 0..=100000, "electrons";
+        /// Grey level of a dark pixel.
+        offset_dn: Number = 0.0, 0..=4096;
+        /// Glare that was taken off the picture as its black level, as a share of the light of the empty slide: what is
+        /// dark keeps the noise of the glare.
+        glare_removed: Number = 0.0, 0..=0.8;
+        /// How photons are counted.
+        photon_noise: PhotonNoise = PhotonNoise::Exact;
+        /// Photo response non-uniformity: spread of the pixels' responses as a share of their mean.
+        prnu: Number = 0.007, 0..=0.5;
+        /// Dark signal non-uniformity: spread of the pixels' offsets.
+        dsnu_e: Number = 2.0, 0..=100000, "electrons";
+        /// Which camera of its kind it is: its fixed pattern is the same in all images.
+        serial: u64 = 1, 0..=9007199254740992.0;
+        /// Exposure: how long dark current is gathered. Light is what `background.level` says.
+        exposure_s: Number = 0.02, 0..=1000000, "seconds";
+        /// Dark current at `dark_reference_c`.
+        dark_current_e_per_s: Number = 1.0, 0..=1000000, "electrons per second and pixel";
+        /// Temperature for which the dark current is given.
+        dark_reference_c: Number = 25.0, -200..=150, "°C";
+        /// Temperature of the sensor.
+        temperature_c: Number = 25.0, -200..=150, "°C";
+        /// Warming that doubles the dark current.
+        dark_doubling_c: Number = 8.0, 0.1..=100, "K";
+        /// Share of the charge that a full pixel cannot hold and that blooms into its neighbours; the rest is drained.
+        blooming: Number = 0.0, 0..=1;
+        /// Share of that which stays within its column.
+        blooming_vertical: Number = 0.95, 0..=1;
+        /// Pixels of the sensor along the side of one of the picture.
+        binning_px: Count = 1, 1..=8;
+        /// How they are joined.
+        binning: Binning = Binning::Charge;
+        /// Quality of a JPEG through which the picture has gone, or 0 for none; 8 bits only.
+        jpeg_quality: Count = 0, 0..=100;
+        /// How much of the colour that leaves out.
+        jpeg_subsampling: Subsampling = Subsampling::Squares;
     }
 }
 

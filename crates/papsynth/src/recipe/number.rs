@@ -54,9 +54,18 @@ pub enum Law {
     Choice(Vec<f64>),
 }
 
+/// A number of things: a value that is written out must be whole, one that is drawn from a range is rounded.
+pub type Count = Number;
+
 impl From<f64> for Number {
     fn from(value: f64) -> Self {
         Self::Fixed(value)
+    }
+}
+
+impl From<i32> for Number {
+    fn from(value: i32) -> Self {
+        Self::Fixed(value.into())
     }
 }
 

@@ -4,26 +4,31 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::Recipe;
+use super::whole::Recipe;
 
 /// How long a comment's line may get.
 const COMMENT_WIDTH: usize = 110;
 
-pub(super) fn plain_toml(recipe: &Recipe) -> String {
-    toml::to_string(recipe).expect("every recipe can be written as TOML")
-}
+impl Recipe {
+    /// The recipe as TOML, every field with its meaning as a comment.
+    #[must_use]
+    pub fn to_commented_toml(&self) -> String {
+        let schema = Self::schema();
+        let value = serde_json::to_value(self).expect("every recipe can be written as JSON");
+        let mut out = String::from(
+            "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
+             # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
+             # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with `min` and `max` if wished.\n\n",
+        );
+        table(&mut out, "", &value, &schema, &schema);
+        out
+    }
 
-/// Every field with its meaning above it.
-pub(super) fn commented_toml(recipe: &Recipe) -> String {
-    let schema = Recipe::schema();
-    let value = serde_json::to_value(recipe).expect("every recipe can be written as JSON");
-    let mut out = String::from(
-        "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
-         # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
-         # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with `min` and `max` if wished.\n\n",
-    );
-    table(&mut out, "", &value, &schema, &schema);
-    out
+    /// The recipe as plain TOML.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("every recipe can be written as TOML")
+    }
 }
 
 /// Prints the fields of a table, plain ones first, tables after them.

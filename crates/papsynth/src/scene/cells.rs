@@ -6,14 +6,19 @@ use crate::error::Cause;
 use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
+use crate::recipe::section::named;
 use crate::recipe::{CellMix, Number, Recipe};
 
+use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::draw::FieldNumbers;
+use super::field::Object;
 use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Body, CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Object, View, WeightMap};
+use super::view::View;
+use super::weight::WeightMap;
+use crate::debris::Body;
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(
@@ -25,19 +30,19 @@ pub(super) fn draw_cells(
     stain: &FieldStain<'_>,
 ) -> Result<Vec<Object>, Cause> {
     let counts: Vec<usize> =
-        recipe.cells.iter().map(|(class, mix)| field.count(&format!("cells.{class}.count"), &mix.count)).collect();
+        recipe.cells.iter().map(|(class, mix)| field.count((&format!("cells.{class}.count"), &mix.count))).collect();
     let total = counts.iter().sum();
     if total == 0 {
         return Ok(Vec::new());
     }
     let map = weight_map(&recipe.layout, given, view, field)?;
-    let spacing = field.draw("slide.spacing_um", &recipe.slide.spacing_um);
+    let spacing = field.draw(named!(recipe.slide.spacing_um));
     let mut places = Places::new(&map, total, spacing, view)?;
     let relief = Relief::new(
         view.size_um(),
-        field.draw("slide.depth_um", &recipe.slide.depth_um),
-        field.draw("slide.relief_um", &recipe.slide.relief_um),
-        field.draw("slide.median_um", &recipe.slide.median_um),
+        field.draw(named!(recipe.slide.depth_um)),
+        field.draw(named!(recipe.slide.relief_um)),
+        field.draw(named!(recipe.slide.median_um)),
         field.key.stream("field", 0, "slide.relief").next_u64(),
     );
     let mut cells = Vec::with_capacity(total);
@@ -157,6 +162,7 @@ fn draw_body(
     // Chromatin that takes up more stain varies more: what is typical of a class is the contrast, sd over mean.
     let contrast = normal_at_least(nucleus.chromatin.sd.mean, CONTRAST_SPREAD * nucleus.chromatin.sd.sd, 0.3, rng)
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
+    let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let mut body = NucleusBody {
         radius_um: nucleus_um,
         off_centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
@@ -165,9 +171,9 @@ fn draw_body(
         dyes: [0.0; dye_spectra::DYES],
         texture: contrast * nucleus_absorbance * stain.texture,
         rim: recipe.nucleus.rim.draw(rng),
-        dome: recipe.nucleus.dome.draw(&mut own("nucleus.dome")),
+        dome: own_number(named!(recipe.nucleus.dome)),
         edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
-        clumping: recipe.nucleus.clumping.draw(&mut own("nucleus.clumping")),
+        clumping: own_number(named!(recipe.nucleus.clumping)),
         wedge: {
             let mut rng = own("nucleus.wedge");
             let wedge = recipe.nucleus.wedge.draw(&mut rng);
@@ -218,17 +224,17 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
     let mut wedge_rng = own("cytoplasm.wedge");
     let slope = cytoplasm.wedge.draw(&mut wedge_rng);
     let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
-    let own = |name: &str, number: &Number| number.draw(&mut own(name));
-    let pliable = |name: &str, number: &Number| pliability * own(name, number);
+    let own = |(name, number): (&str, &Number)| number.draw(&mut own(name));
+    let pliable = |named: (&str, &Number)| pliability * own(named);
     CellDetail {
         excess,
-        corners: pliable("cytoplasm.corners", &cytoplasm.corners),
-        notches: random::count(pliable("cytoplasm.notches", &cytoplasm.notches)),
-        tongues: random::count(pliable("cytoplasm.tongues", &cytoplasm.tongues)),
-        wrinkles: random::count(pliable("cytoplasm.wrinkles", &cytoplasm.wrinkles)),
-        wrinkle: own("cytoplasm.wrinkle", &cytoplasm.wrinkle),
-        wrinkle_um: own("cytoplasm.wrinkle_um", &cytoplasm.wrinkle_um),
-        endoplasm: own("cytoplasm.endoplasm", &cytoplasm.endoplasm),
+        corners: pliable(named!(recipe.cytoplasm.corners)),
+        notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
+        tongues: random::count(pliable(named!(recipe.cytoplasm.tongues))),
+        wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
+        wrinkle: own(named!(recipe.cytoplasm.wrinkle)),
+        wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
+        endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         clouds: cytoplasm.clouds.draw(rng),
         clouds_um: cytoplasm.clouds_um.draw(rng),
         flecks: cytoplasm.flecks.draw(rng),
@@ -237,7 +243,7 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         grain: cytoplasm.grain.draw(rng),
         granules: if granular { granules } else { 0.0 },
         fray_um: cytoplasm.fray_um.draw(rng),
-        rim_um: own("cytoplasm.rim_um", &cytoplasm.rim_um),
+        rim_um: own(named!(recipe.cytoplasm.rim_um)),
         wedge,
     }
 }

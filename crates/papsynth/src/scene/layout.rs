@@ -4,10 +4,11 @@ use rand_core::Rng;
 
 use crate::error::Cause;
 use crate::random;
-use crate::recipe::Layout;
+use crate::recipe::section::named;
+use crate::recipe::{Labels, Layout};
 
-use super::View;
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
+use super::view::View;
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
@@ -36,13 +37,13 @@ pub(super) fn weight_map(
     let place = move |[x, y]: [f64; 2]| [x * width_um, y * height_um];
     match layout {
         Layout::Uniform {} => Ok(WeightMap { width: 1, weights: vec![1.0] }),
-        Layout::Clusters { count, radius_um, outside } => {
-            let count = field.count("layout.count", count).max(1);
-            let outside = field.draw("layout.outside", outside);
+        Layout::Clusters(layout) => {
+            let count = field.count(named!("layout", layout.count)).max(1);
+            let outside = field.draw(named!("layout", layout.outside));
             let clusters: Vec<[f64; 3]> = (0..count as u64)
                 .map(|cluster| {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
-                    let radius = radius_um.draw(&mut rng);
+                    let radius = layout.radius_um.draw(&mut rng);
                     [random::between(0.0, width_um, &mut rng), random::between(0.0, height_um, &mut rng), radius]
                 })
                 .collect();
@@ -50,9 +51,9 @@ pub(super) fn weight_map(
             let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
             Ok(WeightMap { width, weights: distances.iter().map(weight).collect() })
         }
-        Layout::Swath { width_um: band, outside } => {
-            let band = field.draw("layout.width_um", band);
-            let outside = field.draw("layout.outside", outside);
+        Layout::Swath(layout) => {
+            let band = field.draw(named!("layout", layout.width_um));
+            let outside = field.draw(named!("layout", layout.outside));
             let mut rng = field.key.stream("field", 0, "layout.swath");
             let angle = random::direction(&mut rng);
             let (nx, ny) = (libm::cos(angle), libm::sin(angle));
@@ -64,9 +65,9 @@ pub(super) fn weight_map(
             }))
         }
         Layout::Map { path } => given.cloned().ok_or_else(|| not_given(path, "an image")),
-        Layout::Labels { path, smooth_um } => {
-            let map = given.ok_or_else(|| not_given(path, "a label image"))?;
-            let smooth = field.draw("layout.smooth_um", smooth_um);
+        Layout::Labels(layout) => {
+            let map = given.ok_or_else(|| not_given(&layout.path, "a label image"))?;
+            let smooth = field.draw(named!("layout", layout.smooth_um));
             smoothed(map, smooth * map.width as f64 / width_um)
         }
     }
@@ -102,7 +103,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 
 /// What is wrong with what a layout names, before anything is drawn.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
-    let (Layout::Map { path } | Layout::Labels { path, .. }) = layout else { return Ok(()) };
+    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
     map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
 }

@@ -13,16 +13,20 @@ use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
 use super::deposit::{DENSEST, Deposit};
-use super::draw::{FieldNumbers, empty, pixel_um};
+use super::draw::{empty, pixel_um};
+use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Object, Plot, Scene, View};
-use crate::debris::{Ground, Sieve};
+use super::strew::strew;
+use super::view::View;
+use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
-use crate::recipe::{GroupForm, Layout, Number, Recipe};
+use crate::recipe::section::named;
+use crate::recipe::{Clusters as ClusterLayout, GroupForm, Layout, Number, Recipe};
 
 /// Side of a plot in pixels.
 pub(crate) const PLOT_PX: i64 = 1024;
@@ -59,8 +63,7 @@ pub(crate) struct Population {
 enum Scatter {
     Anywhere,
     Clusters {
-        count: Number,
-        radius_um: Number,
+        layout: ClusterLayout,
         outside: f64,
         /// Plots that a cluster reaches beyond its own.
         reach: i64,
@@ -115,7 +118,7 @@ impl Population {
     /// The population of a slide whose own key is given, and the slide without anything on it.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
-        let stain = FieldStain::of_slide(recipe, &slide);
+        let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
         let view = View { width: 0, height: 0, pixel_um };
         let scene = empty(recipe, view, &slide, &stain);
@@ -128,12 +131,12 @@ impl Population {
             key,
             pixel_um,
             share: (PLOT_PX * PLOT_PX) as f64 / field_px,
-            spacing_um: slide.draw("slide.spacing_um", &recipe.slide.spacing_um),
+            spacing_um: slide.draw(named!(recipe.slide.spacing_um)),
             deposit: Deposit::draw(&recipe.scan.deposit, &slide),
             scatter: Scatter::Anywhere,
             relief: Relief::new(
-                slide.draw("slide.depth_um", &recipe.slide.depth_um),
-                slide.draw("slide.relief_um", &recipe.slide.relief_um),
+                slide.draw(named!(recipe.slide.depth_um)),
+                slide.draw(named!(recipe.slide.relief_um)),
                 relief_key,
             ),
             sown: Memory::default(),
@@ -159,20 +162,19 @@ impl Population {
         /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
         const PLACES: i64 = 96;
         const ACROSS: i64 = 12;
-        let Layout::Clusters { count, radius_um, outside } = &self.recipe.layout else {
+        let Layout::Clusters(layout) = &self.recipe.layout else {
             return match self.recipe.layout {
                 Layout::Uniform {} => Ok(Scatter::Anywhere),
                 _ => Err(Cause::LayoutOfField),
             };
         };
-        let largest = radius_um.bounds()[1];
+        let largest = layout.radius_um.bounds()[1];
         let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
         if reach > FARTHEST {
             return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
-        let outside = slide.draw("layout.outside", outside);
-        let (count, radius_um) = (count.clone(), radius_um.clone());
-        let mut scatter = Scatter::Clusters { count, radius_um, outside, reach, mean: 1.0 };
+        let outside = slide.draw(named!("layout", layout.outside));
+        let mut scatter = Scatter::Clusters { layout: layout.clone(), outside, reach, mean: 1.0 };
         // The mean over a part of the slide that does not depend on the slide's size.
         let mut sum = 0.0;
         for row in 0..ACROSS {
@@ -195,17 +197,17 @@ impl Population {
 
     /// The clusters that reach into a plot.
     fn clusters(&self, scatter: &Scatter, at: [i64; 2]) -> Vec<Cluster> {
-        let Scatter::Clusters { count, radius_um, reach, .. } = scatter else { return Vec::new() };
+        let Scatter::Clusters { layout, reach, .. } = scatter else { return Vec::new() };
         let mut clusters = Vec::new();
         for row in at[1] - reach..=at[1] + reach {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
-                let wanted = field.draw("layout.count", count) * self.share;
+                let wanted = field.draw(named!("layout", layout.count)) * self.share;
                 let further =
                     random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, "layout.count"));
                 for cluster in 0..wanted as u64 + u64::from(further) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
-                    let radius = radius_um.draw(&mut rng);
+                    let radius = layout.radius_um.draw(&mut rng);
                     let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
                     clusters.push([place[0], place[1], radius]);
                 }
@@ -218,7 +220,7 @@ impl Population {
     fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(&self.scatter, at);
         let (outside, mean) = match self.scatter {
             Scatter::Anywhere => (1.0, 1.0),
@@ -236,7 +238,7 @@ impl Population {
             let path = format!("cells.{name}.count");
             let alone = mix.group.form == GroupForm::Alone;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
-            let wanted = field.draw(&path, &mix.count) * self.share * DENSEST / mean / size;
+            let wanted = field.draw((&path, &mix.count)) * self.share * DENSEST / mean / size;
             let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, &path));
             for _ in 0..wanted as u64 + u64::from(further) {
                 let mut rng = field.key.stream("cell", tried, "origin");
@@ -284,7 +286,7 @@ impl Population {
         let number = number(at);
         let field = FieldNumbers { key: self.key.plot(number) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
         // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
@@ -306,7 +308,7 @@ impl Population {
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
         let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        self.recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects).through(sieve));
+        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
@@ -344,11 +346,6 @@ fn mean_of(number: &Number) -> f64 {
     const DRAWS: u64 = 256;
     let mut rng = Key { seed: 0, index: 0 }.stream("slide", 0, "mean");
     ((0..DRAWS).map(|_| number.draw_count(&mut rng).max(1) as f64).sum::<f64>()) / DRAWS as f64
-}
-
-fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
-    let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
-    dx * dx + dy * dy < distance * distance
 }
 
 impl Relief {

@@ -7,14 +7,15 @@ use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
 use portable_numerics::elementary::exp10_from;
 
+use super::abbe;
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
 use super::lights::{ColouredLight, Group, groups};
 use super::overlap::{Meets, Overlaps};
-use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
+use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
@@ -198,7 +199,7 @@ impl BrightFieldPath {
                     }
                     continue;
                 };
-                let at_px = passed.window.origin.map(|at| at / self.optics.oversampling as i64);
+                let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
                 let factors = passed.bench.factors.iter().zip(&passed.absorbances);
                 for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                     light.multiply(factor, at_px);
@@ -261,7 +262,7 @@ impl BrightFieldPath {
             light.lens.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
-        let n = self.optics.oversampling;
+        let n = self.optics.oversampling as usize;
         let Some(window) = Window::around(phantom.pieces.iter().map(|piece| &piece.absorbance), n) else {
             return Ok(None);
         };

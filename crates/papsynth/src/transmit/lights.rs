@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use optics_psf::{MicroscopeParams, Zernike};
 
-use super::Slide;
 use super::canvas::Mixer;
 use super::lenses::{Lens, Lenses};
+use super::passage::Slide;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
@@ -52,7 +52,7 @@ pub(super) fn groups(
             ..Zernike::default()
         },
         pixel_um: scene.view.pixel_um,
-        oversampling: optics.oversampling,
+        oversampling: optics.oversampling as usize,
         // Glare is added to the finished light: a microscope is remembered whatever the glare of a field.
         stray_light: 0.0,
     };

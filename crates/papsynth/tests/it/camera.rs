@@ -3,7 +3,7 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Binning, CameraPreset, Debris, Illumination, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
+    Binning, Border, CameraPreset, Colour, Debris, Illumination, Light, Mixing, PhotonNoise, Preset, Recipe, Rendition,
 };
 use papsynth::{Engine, Frame, Inputs};
 
@@ -14,7 +14,7 @@ fn empty() -> Recipe {
     recipe.field.height_px = 128.0.into();
     recipe.cells.clear();
     recipe.debris = Debris::none();
-    recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
+    recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
     recipe.background.scatter = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe
@@ -100,7 +100,7 @@ fn jpeg_is_the_last_step() {
         let mut recipe = empty();
         if colour {
             let (mixing, rendition) = (Mixing::Spectral, Rendition::Display);
-            recipe.light = Light::Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.0.into(), rendition };
+            recipe.light = Light::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.0.into(), rendition });
         }
         let plain = frame(&recipe, 0);
         recipe.camera.jpeg_quality = 60.0.into();

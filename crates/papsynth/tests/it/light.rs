@@ -5,7 +5,8 @@
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{
-    Debris, DyeAmounts, Illumination, Imaging, Law, Layout, Light, Mixing, Number, Optics, Preset, Recipe,
+    Border, Colour, Debris, DyeAmounts, Gaussians, Illumination, Imaging, Law, Layout, Light, Microscope, Mixing,
+    Monochrome, Number, Optics, Preset, Recipe,
 };
 use papsynth::recipe::{Rendition, Restore};
 use papsynth::scene::{Body, Kind};
@@ -22,7 +23,7 @@ fn small() -> Recipe {
     for mix in recipe.cells.values_mut() {
         mix.count = 2.0.into();
     }
-    recipe.background.illumination = Illumination::Border { exponent: 0.0.into() };
+    recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
     recipe.background.scatter = 0.0.into();
     recipe.camera.bits = 16.0.into();
     recipe
@@ -37,7 +38,8 @@ fn empty() -> Recipe {
 }
 
 fn set(recipe: &mut Recipe, change: impl FnOnce(Fields<'_>)) {
-    let Optics::BrightField { condenser_na, stray_light, extra_blur_um, imaging, mount_index, .. } = &mut recipe.optics
+    let Optics::BrightField(Microscope { condenser_na, stray_light, extra_blur_um, imaging, mount_index, .. }) =
+        &mut recipe.optics
     else {
         panic!("the default is bright field")
     };
@@ -74,7 +76,7 @@ fn error(a: &[f32], b: &[f32]) -> f64 {
 }
 
 fn colour(recipe: &mut Recipe, mixing: Mixing, rendition: Rendition) {
-    recipe.light = Light::Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.3.into(), rendition };
+    recipe.light = Light::Colour(Colour { lamp_k: 3200.0.into(), mixing, chromatic_um: 0.3.into(), rendition });
 }
 
 #[test]
@@ -109,7 +111,7 @@ fn products_come_near_to_light_carried_from_slab_to_slab_and_gaussians_do_not() 
     for (sigma_z, least) in [(0.25, 0.02), (1.0, 0.08)] {
         // The paper's stage and depth are one; the same focus in the mountant.
         recipe.focus.centre_um = (1.5 * 1.515).into();
-        recipe.optics = Optics::Gaussian { sigma_xy_um: 0.175.into(), sigma_z_um_per_um: sigma_z.into() };
+        recipe.optics = Optics::Gaussian(Gaussians { sigma_xy_um: 0.175.into(), sigma_z_um_per_um: sigma_z.into() });
         let off = error(&light(&recipe), &abbe);
         assert!(off > least, "{sigma_z}: {off}");
     }
@@ -241,18 +243,19 @@ fn one_wavelength_of_the_sixteen_is_the_monochrome_image() {
     // The weighted sum over the lamp's and the sensor's nodes, one monochrome image each.
     let mut recipe = small();
     recipe.debris = empty().debris;
-    recipe.light = Light::Colour {
+    recipe.light = Light::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: Mixing::PerWavelength,
         chromatic_um: 0.0.into(),
         rendition: Rendition::Raw,
-    };
+    });
     let colours = light(&recipe);
     let sensor = dye_spectra::Colour::new(&dye_spectra::ColourParams::default()).unwrap();
     let mut sums = vec![0.0_f64; colours.len()];
     for node in 0..16 {
         let nodes = sensor.channels().each_ref().map(|channel| channel.nodes[node]);
-        recipe.light = Light::Monochrome { wavelength_um: nodes[0].wavelength_um.into(), bandwidth_um: 0.0.into() };
+        recipe.light =
+            Light::Monochrome(Monochrome { wavelength_um: nodes[0].wavelength_um.into(), bandwidth_um: 0.0.into() });
         let grey = light(&recipe);
         for (pixel, value) in sums.chunks_exact_mut(3).zip(&grey) {
             pixel.iter_mut().zip(&nodes).for_each(|(sum, node)| *sum += node.weight * f64::from(*value));
@@ -277,7 +280,7 @@ fn cytoplasm_takes_the_tint_of_its_dyes() {
         recipe.cells = [("intermediate".to_owned(), mix.clone())].into();
         let frame = frame(&recipe, 0);
         let cell = frame.finished.truth.objects.iter().find(|o| o.part == Part::Cytoplasm).unwrap();
-        assert_eq!(cell.tint, tint);
+        assert_eq!(cell.tint_name(), tint);
         let width = frame.finished.scene.view.width;
         let mut sums = [0.0_f64; 3];
         for run in cell.amodal.runs() {
@@ -320,7 +323,7 @@ fn a_grey_stain_is_the_same_at_every_wavelength() {
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.cell_balance = 0.0.into();
     let mut at = |wavelength_um: f64| {
-        recipe.light = Light::Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() };
+        recipe.light = Light::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.01.into() });
         light(&recipe)
     };
     assert_eq!(at(0.45), at(0.65));
@@ -333,7 +336,7 @@ fn nuclei_stand_out_most_near_the_papers_filter() {
     mix.count = 1.0.into();
     recipe.cells = [("intermediate".to_owned(), mix)].into();
     let mut contrast = |wavelength_um: f64| {
-        recipe.light = Light::Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() };
+        recipe.light = Light::Monochrome(Monochrome { wavelength_um: wavelength_um.into(), bandwidth_um: 0.0.into() });
         let frame = frame(&recipe, 0);
         let objects = &frame.finished.truth.objects;
         objects.iter().find(|o| o.part == Part::Nucleus).unwrap().detectability[0]
@@ -369,7 +372,7 @@ fn apertures_beyond_their_medium_are_refused_by_name() {
     };
     let na = |value: f64| {
         move |recipe: &mut Recipe| {
-            if let Optics::BrightField { na, .. } = &mut recipe.optics {
+            if let Optics::BrightField(Microscope { na, .. }) = &mut recipe.optics {
                 *na = value.into();
             }
         }
@@ -379,7 +382,7 @@ fn apertures_beyond_their_medium_are_refused_by_name() {
     let text = problems(&|recipe| set(recipe, |optics| *optics.condenser_na = 1.55.into()));
     assert!(text.contains("optics.condenser_na") && text.contains("less than 1.515"), "{text}");
     let text = problems(&|recipe| {
-        recipe.light = Light::Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() };
+        recipe.light = Light::Monochrome(Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() });
     });
     assert!(text.contains("light.wavelength_um: 0 is outside 0.4 to 0.7"), "{text}");
     let text = problems(&|recipe| {

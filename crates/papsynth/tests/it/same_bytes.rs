@@ -4,7 +4,7 @@
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Layout, Number, Preset, Recipe};
+use papsynth::recipe::{Clusters, Layout, Number, Preset, Recipe};
 use papsynth::scene::Kind;
 use papsynth::truth::{Group, Part};
 use papsynth::{Engine, Error, Frame, Inputs, Threads};
@@ -16,7 +16,7 @@ fn small(preset: Preset) -> Recipe {
     for mix in recipe.cells.values_mut() {
         mix.count = Number::uniform(1.0, 3.0);
     }
-    if let Layout::Clusters { radius_um, .. } = &mut recipe.layout {
+    if let Layout::Clusters(Clusters { radius_um, .. }) = &mut recipe.layout {
         *radius_um = Number::Fixed(15.0);
     }
     recipe.slide.spacing_um = Number::Fixed(4.0);

@@ -1,7 +1,7 @@
 //! Whole slides: no seam, no dependence on tiles, frames, order or the slide's size.
 
 use papsynth::model::Model;
-use papsynth::recipe::{Illumination, Light, Preset, Recipe};
+use papsynth::recipe::{Bowl, Colour, Illumination, Light, Preset, Recipe};
 use papsynth::slide::SlidePart;
 use papsynth::truth::Part;
 use papsynth::{Engine, Inputs, Threads};
@@ -16,7 +16,8 @@ fn recipe() -> Recipe {
 
 /// A slide whose frames are lit alike all over, so that they differ in their noise alone.
 fn even(mut recipe: Recipe) -> Recipe {
-    recipe.background.illumination = Illumination::Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() };
+    recipe.background.illumination =
+        Illumination::Bowl(Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() });
     recipe
 }
 
@@ -44,12 +45,12 @@ fn difference(a: &SlidePart, b: &SlidePart) -> f32 {
 #[test]
 fn frames_join_without_a_seam() {
     let mut colour = recipe();
-    colour.light = Light::Colour {
+    colour.light = Light::Colour(Colour {
         lamp_k: 3200.0.into(),
         mixing: papsynth::recipe::Mixing::Spectral,
         chromatic_um: 0.3.into(),
         rendition: papsynth::recipe::Rendition::Display,
-    };
+    });
     let mut stack = recipe();
     (stack.focus.planes, stack.focus.step_um) = (2.0.into(), 3.0.into());
     let mut paper = Preset::Paper2015.recipe();

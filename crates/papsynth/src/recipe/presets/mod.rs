@@ -2,13 +2,10 @@
 
 mod paper;
 
-use std::collections::BTreeMap;
-
-use super::specimen::defaults;
-use super::{
-    Background, Camera, CellMix, Cytoplasm, Debris, Field, Focus, Group, GroupForm, Layout, Light, Nucleus, Number,
-    Optics, Picture, RECIPE_VERSION, Recipe, Scan, Slide, Stain, TintMix,
-};
+use super::imaging::{Field, Focus, Optics, Picture};
+use super::number::Number;
+use super::specimen::{CellMix, Clusters, Group, GroupForm, Layout, Swath, mix};
+use super::whole::Recipe;
 
 /// A named recipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -150,7 +147,7 @@ fn lsil() -> Recipe {
 fn lesion() -> Recipe {
     let mut recipe = lbc();
     let (count, radius_um) = (Number::uniform(2.0, 6.0), Number::uniform(25.0, 60.0));
-    recipe.layout = Layout::Clusters { count, radius_um, outside: defaults::outside() };
+    recipe.layout = Layout::Clusters(Clusters { count, radius_um, ..Clusters::default() });
     recipe.nucleus.dome = Number::uniform(0.0, 0.6);
     recipe
 }
@@ -215,8 +212,8 @@ impl Recipe {
             fused_noise_skew: 0.02.into(),
             ..self.focus
         };
-        if let Optics::BrightField { extra_blur_um, .. } = &mut self.optics {
-            *extra_blur_um = Number::log_normal(0.36, 0.35);
+        if let Optics::BrightField(microscope) = &mut self.optics {
+            microscope.extra_blur_um = Number::log_normal(0.36, 0.35);
         }
         // What fusing leaves of edges is softer than the lens: specks stay sharper than nuclei and rims.
         self.nucleus.edge_um = Number::uniform(0.05, 0.5);
@@ -234,41 +231,8 @@ impl Recipe {
     }
 }
 
-fn mix<const N: usize>(counts: [(&str, Number); N]) -> BTreeMap<String, CellMix> {
-    let tints = |class: &str| if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
-    let mix = |(class, count): (&str, Number)| {
-        (class.to_owned(), CellMix { count, tints: tints(class), ..CellMix::default() })
-    };
-    counts.into_iter().map(mix).collect()
-}
-
 fn lbc() -> Recipe {
-    Recipe {
-        version: RECIPE_VERSION,
-        field: Field::default(),
-        focus: Focus::default(),
-        scan: Scan::default(),
-        slide: Slide::default(),
-        layout: Layout::Clusters {
-            count: defaults::clusters(),
-            radius_um: defaults::radius_um(),
-            outside: defaults::outside(),
-        },
-        cells: mix([
-            ("intermediate", Number::uniform(8.0, 24.0)),
-            ("superficial", Number::uniform(2.0, 10.0)),
-            ("parabasal", Number::uniform(0.0, 1.5)),
-            ("metaplastic", Number::uniform(0.0, 1.5)),
-        ]),
-        cytoplasm: Cytoplasm::default(),
-        nucleus: Nucleus::default(),
-        stain: Stain::default(),
-        debris: Debris::default(),
-        background: Background::default(),
-        light: Light::default(),
-        optics: Optics::default(),
-        camera: Camera::default(),
-    }
+    Recipe::default()
 }
 
 fn sparse() -> Recipe {
@@ -287,11 +251,11 @@ fn sparse() -> Recipe {
 
 fn dense() -> Recipe {
     let mut recipe = lbc();
-    recipe.layout = Layout::Clusters {
+    recipe.layout = Layout::Clusters(Clusters {
         count: Number::uniform(2.0, 4.0),
         radius_um: Number::uniform(70.0, 130.0),
         outside: 0.2.into(),
-    };
+    });
     recipe.cells = mix([("intermediate", Number::uniform(45.0, 75.0)), ("superficial", Number::uniform(15.0, 30.0))]);
     recipe.slide.depth_um = Number::uniform(5.0, 10.0);
     recipe.slide.stacking_um = 1.5.into();
@@ -302,7 +266,7 @@ fn dense() -> Recipe {
 /// Spread by hand and dried: thick and uneven, material in strands, blood and leukocytes over everything.
 fn conventional() -> Recipe {
     let mut recipe = dense();
-    recipe.layout = Layout::Swath { width_um: Number::uniform(60.0, 140.0), outside: Number::uniform(0.1, 0.3) };
+    recipe.layout = Layout::Swath(Swath { width_um: Number::uniform(60.0, 140.0), outside: Number::uniform(0.1, 0.3) });
     recipe.cells = mix([
         ("intermediate", Number::uniform(35.0, 70.0)),
         ("superficial", Number::uniform(10.0, 30.0)),
@@ -386,7 +350,8 @@ fn trichomonas() -> Recipe {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Seam, Sheet};
+    use super::super::imaging::Gaussians;
+    use super::super::specimen::{Seam, Sheet};
     use super::*;
 
     #[test]
@@ -406,7 +371,7 @@ mod tests {
     fn the_paper_preset_holds_the_published_values() {
         let paper = Preset::Paper2015.recipe();
         assert_eq!(paper.field.pixel_um, 0.25.into());
-        let Optics::Gaussian { sigma_xy_um, sigma_z_um_per_um } = paper.optics else { panic!("{:?}", paper.optics) };
+        let Optics::Gaussian(Gaussians { sigma_xy_um, sigma_z_um_per_um }) = paper.optics else { panic!() };
         assert_eq!((sigma_xy_um, sigma_z_um_per_um), (0.225.into(), 0.25.into()), "0.9 px, 1 px a µm");
         assert_eq!(paper.camera.full_well_e, 17_850.0.into());
         assert_eq!(paper.nucleus.donors, 3.0.into());

@@ -1,10 +1,16 @@
 //! The simulator of the 2015 paper.
 
-use super::super::*;
+use crate::debris::*;
+use crate::recipe::camera::CameraPreset;
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::imaging::{Background, Border, Illumination, Optics};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::*;
+use crate::recipe::whole::Recipe;
 
 /// The values of the paper where it states them, else those of the authors' released code.
 pub(super) fn recipe() -> Recipe {
-    let mut recipe = super::lbc();
+    let mut recipe = Recipe::default();
     recipe.slide = Slide {
         depth_um: 0.4.into(),
         relief_um: 60.0.into(),
@@ -13,8 +19,8 @@ pub(super) fn recipe() -> Recipe {
         spacing_um: 0.0.into(),
         fields: 1,
     };
-    recipe.layout = Layout::Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() };
-    recipe.cells = super::mix([("intermediate", 30.0.into())]);
+    recipe.layout = Layout::Clusters(Clusters { count: 3.0.into(), radius_um: 60.0.into(), outside: 0.1.into() });
+    recipe.cells = mix([("intermediate", 30.0.into())]);
     recipe.cytoplasm = Cytoplasm {
         shape: ShapeSpread::Independent,
         sheet: Sheet::Verlet,
@@ -76,7 +82,7 @@ pub(super) fn recipe() -> Recipe {
     recipe.debris = debris();
     recipe.background = Background {
         level: (235.0 / 255.0).into(),
-        illumination: Illumination::Border { exponent: 0.02.into() },
+        illumination: Illumination::Border(Border { exponent: 0.02.into() }),
         scatter: (10.0 / 255.0).into(),
         scatter_um: 55.0.into(),
     };
@@ -117,7 +123,7 @@ fn debris() -> Debris {
     debris.speckles = Speckles {
         count: 120.0.into(),
         form: SpeckForm::Dilated,
-        dilations: Number::Drawn { law: Law::Choice(vec![0.0, 0.0, 1.0]), min: f64::NEG_INFINITY, max: f64::INFINITY },
+        dilations: Number::choice([0.0, 0.0, 1.0]),
         absorbance: 0.25.into(),
         phase_rad: 0.0.into(),
     };

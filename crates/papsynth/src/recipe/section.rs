@@ -1,0 +1,250 @@
+//! The declaration of sections: each number of a recipe is written once, with its meaning, default, range and unit.
+//!
+//! From a declaration follow the struct with its documentation, its `Default`, how it is read and written, the bounds of
+//! the JSON schema, what [`Recipe::problems`](super::Recipe::problems) checks and, where a section is drawn number by
+//! number, the drawn struct and the names of the streams.
+
+use std::borrow::Cow;
+
+use super::number::Number;
+
+/// The range of a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bounds {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// Whether something is counted: a value that is written out must then be whole.
+    pub(crate) whole: bool,
+}
+
+/// A declared number of a recipe, with the value that the recipe gives it.
+#[derive(Debug, Clone)]
+pub(crate) struct Declared<'a> {
+    /// The field, as a dotted path.
+    pub(crate) path: String,
+    pub(crate) value: Value<'a>,
+    pub(crate) bounds: Bounds,
+}
+
+/// The value of a declared number.
+#[derive(Debug, Clone)]
+pub(crate) enum Value<'a> {
+    /// A number or a distribution.
+    Real(Cow<'a, Number>),
+    /// A whole number, exact beyond 2⁵³.
+    Whole(u64),
+}
+
+impl Declared<'_> {
+    /// What is wrong with the value, if anything: its range, and whether it is whole.
+    pub(crate) fn problems(&self) -> impl Iterator<Item = String> {
+        let Bounds { low, high, whole } = self.bounds;
+        let [range, fraction] = match &self.value {
+            Value::Real(number) => [number.problem(low, high), number.fraction().filter(|_| whole)],
+            Value::Whole(value) => {
+                let outside = *value < low as u64 || *value > high as u64;
+                [outside.then(|| format!("{value} is outside {low} to {high}")), None]
+            }
+        };
+        range.into_iter().chain(fraction)
+    }
+}
+
+/// A part of a recipe whose numbers are declared: a section, a number, or a word.
+pub(crate) trait Part {
+    /// Lists the numbers of the part, which stands at `path`. `bounds` are those of the field, if it is a number.
+    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>);
+}
+
+impl Part for Number {
+    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
+        let value = Value::Real(Cow::Borrowed(self));
+        found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
+    }
+}
+
+impl Part for f64 {
+    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
+        let value = Value::Real(Cow::Owned(Number::Fixed(*self)));
+        found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
+    }
+}
+
+macro_rules! whole {
+    ($($Type:ty),*) => {
+        $(impl Part for $Type {
+            fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
+                let value = Value::Whole(*self as u64);
+                found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
+            }
+        })*
+    };
+}
+whole!(u32, u64, usize);
+
+impl Part for String {
+    fn list<'a>(&'a self, _: &str, _: Option<Bounds>, _: &mut Vec<Declared<'a>>) {}
+}
+
+/// The dotted path of a field of the part at `path`.
+pub(crate) fn within(path: &str, field: &str) -> String {
+    if path.is_empty() { field.to_owned() } else { format!("{path}.{field}") }
+}
+
+/// Declares a section of a recipe, or a choice of words or of sections.
+///
+/// A field is `name: Kind = default, low..=high, "unit";`. `Kind` is [`Number`], [`Count`](super::Count), a plain number,
+/// or the type of a word, a text or another section, which have no range; a section needs no default of its own.
+///
+/// With `drawn as pub Name`, the struct `Name` holds one drawn value for each field, and `draw` draws each from the stream
+/// named after the field's dotted path. A field marked `(undrawn)` is left out, one marked `(last)` follows the others.
+macro_rules! section {
+    ($(#[$meta:meta])* pub struct $Name:ident $(, drawn as $visible:vis $Drawn:ident)? {
+        $($(#[$about:meta])* $field:ident: $Kind:ident $(($mark:ident))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
+    }) => {
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        $(#[$meta])*
+        pub struct $Name {
+            $(
+                $(#[$about])*
+                $($(
+                    #[doc = concat!("From ", stringify!($low), " to ", stringify!($high), $(" ", $unit,)? ".")]
+                    #[schemars(extend("minimum" = $low, "maximum" = $high))]
+                )?)?
+                pub $field: $Kind,
+            )*
+        }
+
+        impl Default for $Name {
+            fn default() -> Self {
+                Self { $($field: section!(@default $Kind $($default)?),)* }
+            }
+        }
+
+        impl $crate::recipe::section::Part for $Name {
+            fn list<'a>(
+                &'a self,
+                path: &str,
+                _: Option<$crate::recipe::section::Bounds>,
+                found: &mut Vec<$crate::recipe::section::Declared<'a>>,
+            ) {
+                $(
+                    let path_of_field = $crate::recipe::section::within(path, stringify!($field));
+                    self.$field.list(&path_of_field, section!(@bounds $Kind $($($low $high)?)?), found);
+                )*
+            }
+        }
+
+        section!(@drawn $Name ($($visible $Drawn)?) [] [] $({
+            [$(#[$about])*] $field $Kind ($($mark)?) ($($($low)?)?)
+        })*);
+    };
+
+    ($(#[$meta:meta])* pub enum $Name:ident { $($(#[$about:meta])* $Word:ident,)* }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum $Name { $($(#[$about])* $Word,)* }
+
+        impl $crate::recipe::section::Part for $Name {
+            fn list<'a>(
+                &'a self,
+                _: &str,
+                _: Option<$crate::recipe::section::Bounds>,
+                _: &mut Vec<$crate::recipe::section::Declared<'a>>,
+            ) {
+            }
+        }
+    };
+
+    ($(#[$meta:meta])* pub enum $Name:ident, by default $Default:ident {
+        $($(#[$about:meta])* $Variant:ident($Section:ident),)*
+    }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+        #[serde(tag = "kind", rename_all = "kebab-case")]
+        pub enum $Name { $($(#[$about])* $Variant($Section),)* }
+
+        impl Default for $Name {
+            fn default() -> Self {
+                Self::$Default(Default::default())
+            }
+        }
+
+        impl $crate::recipe::section::Part for $Name {
+            fn list<'a>(
+                &'a self,
+                path: &str,
+                bounds: Option<$crate::recipe::section::Bounds>,
+                found: &mut Vec<$crate::recipe::section::Declared<'a>>,
+            ) {
+                match self {
+                    $(Self::$Variant(section) => section.list(path, bounds, found),)*
+                }
+            }
+        }
+    };
+
+    (@default Number $default:expr) => { $crate::recipe::number::Number::from($default) };
+    (@default Count $default:expr) => { $crate::recipe::number::Number::from($default) };
+    (@default $Kind:ident $default:expr) => { $default };
+    (@default $Kind:ident) => { <$Kind>::default() };
+
+    (@bounds $Kind:ident) => { None };
+    (@bounds Count $low:literal $high:literal) => {
+        Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: true })
+    };
+    (@bounds $Kind:ident $low:literal $high:literal) => {
+        Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: false })
+    };
+
+    // One field after the other: those that are drawn, then those that follow the others.
+    (@drawn $Name:ident () $($rest:tt)*) => {};
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident (undrawn) $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)*] [$($last)*] $($rest)*);
+    };
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident (last) $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)*] [$($last)* { $about $field $Kind $low }] $($rest)*);
+    };
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident () $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)* { $about $field $Kind $low }] [$($last)*] $($rest)*);
+    };
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*]) => {
+        section!(@struct $Name $drawn $($done)* $($last)*);
+    };
+    (@struct $Name:ident ($visible:vis $Drawn:ident) $({ [$(#[$about:meta])*] $field:ident $Kind:ident $low:tt })*) => {
+        #[doc = concat!("A [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ") with its numbers drawn.")]
+        #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        $visible struct $Drawn { $($(#[$about])* pub $field: section!(@value $Kind),)* }
+
+        impl $Name {
+            /// Draws each number from the stream named after its place: `path` is that of the section.
+            pub(crate) fn draw(&self, path: &str, stream: impl Fn(&str) -> $crate::key::Stream) -> $Drawn {
+                let stream = |field: &str| stream(&$crate::recipe::section::within(path, field));
+                $Drawn { $($field: section!(@draw $Kind $low self.$field, &mut stream(stringify!($field))),)* }
+            }
+        }
+    };
+    (@value Number) => { f64 };
+    (@value Count) => { u32 };
+    (@value $Kind:ident) => { $Kind };
+    (@draw Number $low:tt $number:expr, $rng:expr) => { $number.draw($rng) };
+    (@draw Count ($low:literal) $number:expr, $rng:expr) => { ($number.draw_count($rng) as u32).max($low) };
+    (@draw $Kind:ident $low:tt $value:expr, $rng:expr) => { $value };
+}
+
+/// The name of a number and the number itself: `named!(recipe.slide.depth_um)` is `("slide.depth_um", &…)`, and
+/// `named!(self.count)` is `("count", &…)`. With the path of a section, the name is the dotted path:
+/// `named!("layout", swath.width_um)` is `("layout.width_um", &…)`.
+macro_rules! named {
+    ($section:literal, $owner:ident.$number:ident) => {
+        (concat!($section, ".", stringify!($number)), &$owner.$number)
+    };
+    ($owner:ident.$first:ident $(.$rest:ident)*) => {
+        (concat!(stringify!($first) $(, ".", stringify!($rest))*), &$owner.$first$(.$rest)*)
+    };
+}
+
+pub(crate) use {named, section};

@@ -1,0 +1,153 @@
+//! A number of a recipe is declared once, and everything else follows: adding one touches one place.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::*;
+
+/// Numbers of a recipe; fewer are a section that is listed no more.
+const LEAST: usize = 235;
+
+/// Recipes that have every section and every form of it between them.
+fn recipes() -> [Recipe; 3] {
+    let mut paper = Preset::Paper2015.recipe();
+    paper.layout = Layout::Swath(Swath::default());
+    let mut colour = Recipe::default();
+    colour.light = Light::Colour(Colour::default());
+    colour.layout = Layout::Labels(Labels { path: "labels.png".to_owned(), ..Labels::default() });
+    [Recipe::default(), paper, colour]
+}
+
+/// The recipe with another value at a path, if its type holds it.
+fn with(recipe: &Recipe, path: &str, value: f64) -> Option<Recipe> {
+    let mut whole = serde_json::to_value(recipe).unwrap();
+    let place = whole.pointer_mut(&format!("/{}", path.replace('.', "/"))).unwrap();
+    *place = if value.fract() == 0.0 { json!(value as i64) } else { json!(value) };
+    serde_json::from_value(whole).ok()
+}
+
+/// What the schema says of a field: one for each form of its section that has it.
+fn schemas_of<'s>(root: &'s Value, path: &str) -> Vec<&'s Value> {
+    let resolve = |schema: &'s Value| match schema.get("$ref").and_then(Value::as_str) {
+        Some(name) => root.pointer(name.trim_start_matches('#')).unwrap(),
+        None => schema,
+    };
+    path.split('.').fold(vec![root], |found, name| {
+        let forms = found.into_iter().map(resolve).flat_map(|schema| {
+            let others = schema.get("oneOf").and_then(Value::as_array).into_iter().flatten();
+            std::iter::once(schema).chain(others)
+        });
+        let named = |form: &'s Value| {
+            form.get("properties").and_then(|fields| fields.get(name)).or_else(|| form.get("additionalProperties"))
+        };
+        forms.filter_map(named).filter(|schema| schema.is_object()).collect()
+    })
+}
+
+#[test]
+fn schema_text_and_check_follow_from_a_declaration() {
+    let schema = Recipe::schema();
+    let mut seen = BTreeSet::new();
+    for recipe in recipes() {
+        let text: toml::Table = toml::from_str(&recipe.to_commented_toml()).unwrap();
+        for number in recipe.numbers() {
+            let (path, section::Bounds { low, high, whole }) = (&number.path, number.bounds);
+            if !seen.insert(path.clone()) {
+                continue;
+            }
+            let says = |schema: &&Value| {
+                let bound = |name: &str| schema.get(name).and_then(Value::as_f64);
+                let about = schema.get("description").and_then(Value::as_str).unwrap_or_default();
+                bound("minimum") == Some(low)
+                    && bound("maximum") == Some(high)
+                    && about.contains(&format!("From {low} to {high}"))
+            };
+            assert!(schemas_of(&schema, path).iter().any(says), "{path} in the schema");
+            let mut names = path.split('.');
+            let first = text.get(names.next().unwrap());
+            assert!(names.try_fold(first.unwrap(), |table, name| table.get(name)).is_some(), "{path} in the text");
+
+            let is_integer = matches!(number.value, section::Value::Whole(_));
+            let step = |bound: f64| if whole || is_integer { 1.0 } else { 1e-9 * bound.abs().max(1.0) };
+            // Beyond 2⁵³ the next whole number is two further.
+            let above = (high + step(high)).max(high.next_up());
+            for (value, fits) in [(low - step(low), false), (above, false), (low, true), (high, true)] {
+                let Some(changed) = with(&recipe, path, value) else {
+                    assert!(!fits, "{path} cannot be {value}");
+                    continue;
+                };
+                let told = changed.problems().iter().any(|p| p.field == *path && p.message.contains("is outside"));
+                assert_eq!(told, !fits, "{path} = {value}");
+            }
+            let half = with(&recipe, path, low + 0.5);
+            let told = half.is_none_or(|r| r.problems().iter().any(|p| p.message.contains("not a whole number")));
+            assert_eq!(told, whole || is_integer, "{path} and a half");
+        }
+    }
+    assert!(seen.len() >= LEAST, "{} numbers", seen.len());
+}
+
+/// The sources of the crate without their tests.
+fn sources(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.is_dir() {
+            sources(&entry, found);
+        } else if !entry.ends_with("tests.rs") {
+            let text = fs::read_to_string(&entry).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default().to_owned();
+            found.push((entry, code));
+        }
+    }
+}
+
+/// The name that a line declares a number of.
+fn declared(line: &str) -> Option<&str> {
+    let (name, rest) = line.trim().strip_suffix(';')?.split_once(": ")?;
+    let kind = rest.split(' ').next()?;
+    let is_number = ["Number", "Count", "f64", "u32", "u64", "usize"].contains(&kind);
+    (is_number && rest.contains("..=") && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')).then_some(name)
+}
+
+/// The names of all fields that the schema bounds.
+fn bounded<'s>(schema: &'s Value, found: &mut Vec<&'s str>) {
+    for (name, inner) in schema.as_object().into_iter().flatten() {
+        if name == "properties" {
+            let fields = inner.as_object().into_iter().flatten();
+            found.extend(fields.filter(|(_, field)| field.get("maximum").is_some()).map(|(name, _)| name.as_str()));
+        }
+        bounded(inner, found);
+    }
+    schema.as_array().into_iter().flatten().for_each(|inner| bounded(inner, found));
+}
+
+#[test]
+fn a_number_is_written_in_one_place() {
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let mut declarations: Vec<&str> = files.iter().flat_map(|(_, code)| code.lines().filter_map(declared)).collect();
+    let schema = Recipe::schema();
+    let mut fields = Vec::new();
+    bounded(&schema, &mut fields);
+    declarations.sort_unstable();
+    fields.sort_unstable();
+    assert_eq!(declarations, fields, "each bounded field has one declaration");
+
+    for (file, code) in &files {
+        if file.ends_with("recipe/check.rs") {
+            let is_range = |line: &&str| {
+                let ends = line.split_once(" to ");
+                let digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+                line.contains("..=") || ends.is_some_and(|(a, b)| digit(a.chars().last()) && digit(b.chars().next()))
+            };
+            assert_eq!(code.lines().find(is_range), None, "a range in {}", file.display());
+            continue;
+        }
+        for number in recipes().iter().flat_map(Recipe::numbers) {
+            let is_named = code.contains(&format!("\"{}\"", number.path));
+            assert!(!is_named, "{} names `{}` once more", file.display(), number.path);
+        }
+    }
+}
