@@ -110,14 +110,7 @@ impl Role {
                 Self::Study,
                 Self::Web,
             ],
-            Self::Python => &[
-                Self::Technique,
-                Self::Engine,
-                Self::Dataset,
-                Self::Calibrate,
-                Self::Cloud,
-                Self::Judge,
-            ],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Calibrate, Self::Cloud, Self::Judge],
         }
     }
 }
