@@ -43,11 +43,12 @@ const STEPS: [Step; 12] = [
 ];
 
 /// What takes heavy crates, the heavier readers, other processors, and what is done to publish; at most 80 minutes with everything before.
-const FULL: [Step; 9] = [
+const FULL: [Step; 10] = [
     ("licences", |workspace| chore(workspace, &supply::DENY)),
     ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
     ("heavy docs", |workspace| documentation(workspace.cargo_heavy(&["doc"]))),
     ("heavy tests", |workspace| test::suite(workspace, Workspace::cargo_heavy, &[])),
+    ("feature doc tests", feature_doc_tests),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
     ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("python package", |workspace| chore(workspace, &package::CHORE)),
@@ -56,8 +57,9 @@ const FULL: [Step; 9] = [
 ];
 
 /// Files and folders that require the longer tier, besides the folders of heavy crates and of crates with features that bring them along.
-const COVERED: [&str; 8] = [
+const COVERED: [&str; 9] = [
     "Cargo.lock",
+    "crates/*/src/interop.rs",
     "deny.toml",
     "docs/SLIDES.md",
     "docs/formats",
@@ -104,6 +106,16 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         println!("\n{}", required(workspace))
     }
     Ok(Outcome::Done)
+}
+
+/// Runs doc tests of the technique crates with all features: these convert to types of other libraries.
+fn feature_doc_tests(workspace: &Workspace) -> Result<Outcome> {
+    let mut cargo = workspace.cargo();
+    cargo.args(["test", "--doc", "--all-features"]);
+    for package in deps::pure_crates(workspace).filter(|name| *name != "papsynth") {
+        cargo.args(["--package", package]);
+    }
+    run_cargo(&mut cargo)
 }
 
 /// Where the commit is recorded at which the longer tier last passed.
