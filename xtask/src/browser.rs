@@ -7,10 +7,10 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell, system};
+use crate::{dataset, shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "browser",

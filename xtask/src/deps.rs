@@ -2,9 +2,8 @@
 
 use anyhow::{Result, bail};
 
-use crate::Chore;
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::{HEAVY, Package, Workspace};
 
 pub(crate) const CHORE: Chore = Chore {

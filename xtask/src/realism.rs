@@ -9,10 +9,10 @@ use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell};
+use crate::{dataset, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "realism",
@@ -97,7 +97,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
 
 fn program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
-    command.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--"]);
+    command.args(["run", "--release", "--package", "papsynth-cli", "--"]);
     command
 }
 

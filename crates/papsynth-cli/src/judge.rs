@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits, field_files};
-use papsynth_dataset::write_file;
+use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
+use papsynth_dataset::{field_files, write_file};
 use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
 use rayon::prelude::*;
 

@@ -15,6 +15,7 @@ mod inspect;
 mod interrupt;
 #[cfg(feature = "judge")]
 mod judge;
+#[cfg(feature = "learn")]
 mod learn;
 #[cfg(feature = "judge")]
 mod match_fields;
@@ -24,6 +25,7 @@ mod plan;
 mod preview;
 mod profile;
 mod recipe_file;
+mod render;
 mod report;
 mod rerender;
 mod setup;
@@ -76,6 +78,8 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Init(args) => init::run(&args),
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
+        Verb::Render(args) => render::run(*args),
+        #[cfg(feature = "learn")]
         Verb::Learn(args) => learn::run(&args),
         #[cfg(feature = "calibrate")]
         Verb::Calibrate(args) => calibrate::run(&args),
@@ -114,6 +118,8 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Completions(_) => Err(Failure::left_out("completions")),
         #[cfg(not(feature = "judge"))]
         Verb::Judge(_) | Verb::Match(_) => Err(Failure::left_out("judge")),
+        #[cfg(not(feature = "learn"))]
+        Verb::Learn(_) => Err(Failure::left_out("learn")),
         #[cfg(not(feature = "web"))]
         Verb::Study(_) | Verb::View(_) => Err(Failure::left_out("web")),
     }

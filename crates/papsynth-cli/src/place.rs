@@ -8,21 +8,8 @@ use crate::args::Verb;
 use crate::exit::{Complaint, Failure};
 
 /// The data set at a path or an address.
-#[cfg(feature = "cloud")]
 pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
-    Ok(papsynth_cloud::Bucket::home(path)?)
-}
-
-/// The data set at a path.
-#[cfg(not(feature = "cloud"))]
-pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
-    match Home::is_address(path) {
-        true => {
-            let message = format!("{}: object stores need a build of papsynth with `--features cloud`", path.display());
-            Err(Failure::input(Complaint::new(message)))
-        }
-        false => Ok(Home::from(path)),
-    }
+    Ok(Home::at(path)?)
 }
 
 /// An address where only folders are known would become a folder of that name, and so would one that is mistyped.

@@ -7,8 +7,15 @@ mod generate;
 #[cfg(feature = "judge")]
 mod judge;
 mod layout;
+#[cfg(feature = "learn")]
 mod learn;
-#[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+#[cfg(not(all(
+    feature = "calibrate",
+    feature = "completions",
+    feature = "judge",
+    feature = "learn",
+    feature = "web"
+)))]
 mod left_out;
 mod sets;
 mod share;
@@ -25,15 +32,18 @@ use papsynth::recipe::Preset;
 #[cfg(feature = "calibrate")]
 pub(crate) use calibrate::Calibrate;
 pub(crate) use engine::{EngineArgs, RecipeArgs, threads};
-pub(crate) use generate::{Generate, Preview};
+pub(crate) use generate::{Generate, Preview, Render};
 #[cfg(feature = "judge")]
 pub(crate) use judge::{Judge, Match};
 pub(crate) use layout::LayoutArgs;
+#[cfg(feature = "learn")]
 pub(crate) use learn::Learn;
 #[cfg(not(feature = "calibrate"))]
 use left_out::LeftOut as Calibrate;
 #[cfg(not(feature = "completions"))]
 use left_out::LeftOut as Completions;
+#[cfg(not(feature = "learn"))]
+use left_out::LeftOut as Learn;
 #[cfg(not(feature = "judge"))]
 use left_out::{LeftOut as Judge, LeftOut as Match};
 #[cfg(not(feature = "web"))]
@@ -75,6 +85,7 @@ pub(crate) enum Verb {
     Init(Init),
     Generate(Generate),
     Preview(Preview),
+    Render(Box<Render>),
     Learn(Learn),
     Calibrate(Calibrate),
     Judge(Judge),
@@ -137,7 +148,7 @@ pub(crate) struct Completions {
 mod tests {
     use super::*;
 
-    #[cfg(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web"))]
+    #[cfg(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "learn", feature = "web"))]
     #[test]
     fn the_command_is_sound_and_every_verb_shows_an_example() {
         let mut command = <Cli as clap::CommandFactory>::command();

@@ -6,11 +6,18 @@ mod cli;
 mod hostile;
 #[cfg(feature = "judge")]
 mod judge;
-#[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+#[cfg(not(all(
+    feature = "calibrate",
+    feature = "completions",
+    feature = "judge",
+    feature = "learn",
+    feature = "web"
+)))]
 mod left_out;
 #[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
+mod scenes;
 mod sets;
 mod slide;
 #[cfg(feature = "web")]

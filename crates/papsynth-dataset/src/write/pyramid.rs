@@ -1,18 +1,21 @@
 //! Pages in tiles, each with the same at half the size, and again: viewers of large images read what they show.
 
-use std::io::{Seek, Write};
-
 use tiff::TiffResult;
 use tiff::encoder::{DirectoryEncoder, TiffEncoder, TiffKind, TiffValue};
-use tiff::tags::{PhotometricInterpretation, SampleFormat, Tag};
+use tiff::tags::{SampleFormat, Tag};
 
-use super::tiff::resolution;
+use super::page::{Out, Page, photometric, resolution};
 
 /// Side of a tile.
 const TILE: usize = 512;
 
 /// From this side on an image is written as a pyramid.
-pub(crate) const LARGE: usize = 2048;
+const LARGE: usize = 2048;
+
+/// Whether an image is written as a pyramid.
+pub(crate) fn is_large(width: usize, height: usize) -> bool {
+    width.max(height) >= LARGE
+}
 
 /// Grey levels of 8 or of 16 bits.
 pub(super) trait Level: Copy + Default {
@@ -93,13 +96,10 @@ impl<T: Level> Image<'_, T> {
 }
 
 /// Adds a page and its smaller versions, down to one tile, as sub-images.
-pub(super) fn page<W: Write + Seek, K: TiffKind, T: Level>(
+pub(super) fn page<W: Out, K: TiffKind, T: Level>(
     encoder: &mut TiffEncoder<W, K>,
     levels: &[T],
-    width: usize,
-    channels: usize,
-    pixel_um: f64,
-    description: Option<&str>,
+    &Page { width, channels, pixel_um, text }: &Page,
 ) -> TiffResult<()>
 where
     [T]: TiffValue,
@@ -118,7 +118,7 @@ where
         (half, side) = (image.halved(), side / 2);
     }
     let mut directory = encoder.image_directory()?;
-    if let Some(text) = description {
+    if let Some(text) = text {
         directory.write_tag(Tag::ImageDescription, text)?;
     }
     fill(&mut directory, &whole, pixel_um)?;
@@ -128,7 +128,7 @@ where
     directory.finish()
 }
 
-fn fill<W: Write + Seek, K: TiffKind, T: Level>(
+fn fill<W: Out, K: TiffKind, T: Level>(
     directory: &mut DirectoryEncoder<W, K>,
     image: &Image<T>,
     pixel_um: f64,
@@ -145,13 +145,11 @@ where
             sizes.push(u32::try_from(tile.len() * usize::from(T::BITS) / 8)?);
         }
     }
-    let photometric =
-        if channels == 3 { PhotometricInterpretation::RGB } else { PhotometricInterpretation::BlackIsZero };
     directory.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;
     directory.write_tag(Tag::ImageLength, u32::try_from(height)?)?;
     directory.write_tag(Tag::BitsPerSample, vec![T::BITS; channels].as_slice())?;
     directory.write_tag(Tag::Compression, 1_u16)?;
-    directory.write_tag(Tag::PhotometricInterpretation, photometric.to_u16())?;
+    directory.write_tag(Tag::PhotometricInterpretation, photometric(channels))?;
     directory.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;
     directory.write_tag(Tag::SampleFormat, vec![SampleFormat::Uint.to_u16(); channels].as_slice())?;
     directory.write_tag(Tag::TileWidth, u32::try_from(TILE)?)?;
@@ -178,7 +176,8 @@ mod tests {
             let levels: Vec<u16> = (0..width * height * channels).map(|i| (i * 7919 % 60_013) as u16).collect();
             let mut out = Cursor::new(Vec::new());
             let mut encoder = TiffEncoder::new(&mut out).unwrap();
-            page(&mut encoder, &levels, width, channels, 0.25, Some("text")).unwrap();
+            let head = Page { width, channels, pixel_um: 0.25, text: Some("text") };
+            page(&mut encoder, &levels, &head).unwrap();
             let bytes = out.into_inner();
             let mut decoder = Decoder::new(Cursor::new(&bytes)).unwrap();
             assert!(matches!(decoder.read_image().unwrap(), DecodingResult::U16(read) if read == levels));

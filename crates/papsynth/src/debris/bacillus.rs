@@ -3,14 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Lie, cluster_id, member_number};
+use super::check::Section;
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::tile::{Point, Tile};
 use crate::phantom::wobble::placed;
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +40,8 @@ pub struct Bacilli {
 }
 
 /// A rod-shaped bacterium or a chain of them, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bacillus {
     /// Length of a rod, µm.
     pub length_um: f64,
@@ -75,7 +77,7 @@ impl Default for Bacilli {
 /// Chains have this many rods at most.
 const LONGEST_CHAIN: usize = 4;
 
-impl Kinds for Bacilli {
+impl Kinds<Bacillus> for Bacilli {
     fn none() -> Self {
         Self { clusters: 0.0.into(), ..Self::default() }
     }
@@ -93,7 +95,7 @@ impl Kinds for Bacilli {
         section.phase_rad("phase_rad", &self.phase_rad);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
         for index in 0..ground.count("clusters", &self.clusters) {
             let mut rng = ground.stream(index, "cluster");
             let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
@@ -152,7 +154,7 @@ impl Thing for Bacillus {
         let middle = rods.iter().flatten().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
         let count = (self.rods * (PARTS + 1)) as f64;
         let middle = if self.rods > 1 { middle.map(|sum| sum / count) } else { [0.0; 2] };
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         for point in rods.iter_mut().flatten() {
             *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, site.centre);
         }
@@ -175,7 +177,7 @@ impl Thing for Bacillus {
             1 => area / (site.pixel_um * site.pixel_um),
             _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
         };
-        let dyes = site.scene.dyes.bacillus;
+        let dyes = site.dyes.bacillus;
         Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
     }
 }

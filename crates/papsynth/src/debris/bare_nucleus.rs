@@ -3,16 +3,17 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Bare nuclei: what bacteria leave of intermediate cells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,7 +36,8 @@ pub struct BareNuclei {
 }
 
 /// A bare nucleus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BareNucleus {
     /// Radius of the disc of the same area, µm.
     pub radius_um: f64,
@@ -65,7 +67,7 @@ impl Default for BareNuclei {
     }
 }
 
-impl Kinds for BareNuclei {
+impl Kinds<BareNucleus> for BareNuclei {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -80,7 +82,7 @@ impl Kinds for BareNuclei {
         section.absorbance("shreds", &self.shreds);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
         let dyes = ground.cyanophilic();
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
@@ -145,6 +147,6 @@ impl Thing for BareNucleus {
             let half_width = site.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }
-        nucleus.finish(site.scene.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
+        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
     }
 }

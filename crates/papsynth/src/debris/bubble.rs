@@ -3,13 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Air bubbles in the mountant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -30,7 +31,8 @@ pub struct Bubbles {
 }
 
 /// An air bubble, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bubble {
     /// Radius, µm.
     pub radius_um: f64,
@@ -55,7 +57,7 @@ impl Default for Bubbles {
     }
 }
 
-impl Kinds for Bubbles {
+impl Kinds<Bubble> for Bubbles {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -69,7 +71,7 @@ impl Kinds for Bubbles {
         section.phase_rad("phase_rad", &self.phase_rad);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Bubble>) {
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -112,6 +114,6 @@ impl Thing for Bubble {
             *value = cover[index] * (self.absorbance * steep * steep) as f32;
             index += 1;
         });
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

@@ -3,15 +3,18 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
+use crate::truth::traits::Trait;
 
 /// *Candida*: colonies of pseudohyphae and budding yeasts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -48,7 +51,7 @@ pub struct Candidas {
 }
 
 /// What a piece of *Candida* is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Growth {
     /// A pseudohypha with its branches and buds.
@@ -58,7 +61,8 @@ pub enum Growth {
 }
 
 /// A pseudohypha or a yeast, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Candida {
     /// What it is.
     pub growth: Growth,
@@ -103,7 +107,7 @@ impl Default for Candidas {
     }
 }
 
-impl Kinds for Candidas {
+impl Kinds<Candida> for Candidas {
     fn none() -> Self {
         Self { colonies: 0.0.into(), ..Self::default() }
     }
@@ -125,7 +129,7 @@ impl Kinds for Candidas {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Candida>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count("colonies", &self.colonies) {
             let mut rng = ground.stream(index, "colony");
@@ -231,8 +235,8 @@ impl Thing for Candida {
         }
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         phantom.traits.push(match self.growth {
-            Growth::Hypha => "hypha",
-            Growth::Yeast => "yeast",
+            Growth::Hypha => Trait::Hypha,
+            Growth::Yeast => Trait::Yeast,
         });
         phantom
     }

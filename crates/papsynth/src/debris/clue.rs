@@ -6,14 +6,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Section;
+use super::check::Section;
 use super::paint::{Painting, Stroke};
+use super::site::Site;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Tile;
-use crate::phantom::{Phantom, Pools};
 use crate::random;
-use crate::recipe::Number;
-use crate::scene::{Body, FieldNumbers, Object, Scene};
+use crate::recipe::number::Number;
+use crate::scene::numbers::FieldNumbers;
+use crate::truth::traits::Trait;
 
 /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,7 +36,8 @@ pub struct ClueCells {
 }
 
 /// The coat of a clue cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Coat {
     /// Coccobacilli per µm² where it is dense.
     pub density: f64,
@@ -76,15 +79,15 @@ impl ClueCells {
         section.absorbance("absorbance", &self.absorbance);
     }
 
-    /// Gives cells their coats.
-    pub(super) fn draw(&self, field: &FieldNumbers, objects: &mut [Object]) {
+    /// Gives cells, by their numbers, their coats.
+    pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
         let share = field.draw("debris.clue_cells.share", &self.share);
         if share <= 0.0 {
             return;
         }
-        for object in objects.iter_mut().filter(|object| matches!(object.body, Body::Cell(_))) {
-            let mut rng = field.key.stream("cell", object.number, "coat");
-            object.coat = random::chance(share, &mut rng).then(|| Coat {
+        for (number, coat) in cells {
+            let mut rng = field.key.stream("cell", number, "coat");
+            *coat = random::chance(share, &mut rng).then(|| Coat {
                 density: self.density.draw(&mut rng),
                 cover: self.cover.draw(&mut rng),
                 beyond_um: self.beyond_um.draw(&mut rng),
@@ -113,10 +116,10 @@ const TUFTED: f64 = 0.15;
 const RIM_UM: f64 = 2.0;
 
 /// Lays its coat on a cell.
-pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: &mut Phantom) {
-    let (Some(coat), Some(cell)) = (&object.coat, phantom.pieces.first()) else { return };
-    let mut rng = scene.stream("cell", object, "coat.shape");
-    let pixel_um = scene.grid().pixel_um;
+pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
+    let Some(cell) = phantom.pieces.first() else { return };
+    let (pools, pixel_um) = (site.pools, site.pixel_um);
+    let mut rng = site.stream("coat.shape");
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
     let whole = cell.coverage.clone().repeated(cell.cover_step);
     let corner = whole.origin.map(|at| at as f64);
@@ -161,8 +164,8 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
         let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
         painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
-    *phantom = core::mem::take(phantom).stained(painting.absorbance, scene.dyes.bacillus);
-    phantom.traits.push("clue");
+    *phantom = core::mem::take(phantom).stained(painting.absorbance, site.dyes.bacillus);
+    phantom.traits.push(Trait::Clue);
 }
 
 /// A tile on the place of a wider one.

@@ -3,15 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Cocci and coccobacilli, colony by colony.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,7 +39,8 @@ pub struct Cocci {
 }
 
 /// A colony of cocci, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Colony {
     /// Number of cocci.
     pub cocci: usize,
@@ -72,7 +74,7 @@ impl Default for Cocci {
     }
 }
 
-impl Kinds for Cocci {
+impl Kinds<Colony> for Cocci {
     fn none() -> Self {
         Self { colonies: 0.0.into(), ..Self::default() }
     }
@@ -89,7 +91,7 @@ impl Kinds for Cocci {
         section.phase_rad("phase_rad", &self.phase_rad);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Colony>) {
         for number in 0..ground.count("colonies", &self.colonies) {
             let mut rng = ground.stream(number, "body");
             let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
@@ -148,7 +150,7 @@ impl Thing for Colony {
             let stroke = Stroke::even([at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy], site.px(size * half_width));
             painting.stroke(&stroke, self.absorbance);
         }
-        painting.finish(site.scene.dyes.bacillus, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.bacillus, self.phase_rad, self.absorbance)
     }
 }
 

@@ -3,13 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 
 /// Precipitated dye: dark, angular, refracting grains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -30,7 +32,8 @@ pub struct Crystals {
 }
 
 /// A grain of dye, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Crystal {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -55,7 +58,7 @@ impl Default for Crystals {
     }
 }
 
-impl Kinds for Crystals {
+impl Kinds<Crystal> for Crystals {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -69,7 +72,7 @@ impl Kinds for Crystals {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Crystal>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");

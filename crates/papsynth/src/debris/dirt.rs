@@ -3,14 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 
 /// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
 ///
@@ -39,7 +41,8 @@ pub struct Dirt {
 }
 
 /// A fleck of dirt, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fleck {
     /// Length, µm.
     pub length_um: f64,
@@ -79,7 +82,7 @@ const SCATTER_UM: f64 = 1.2;
 /// Spread of the directions of flecks that lie as their drift does, degrees.
 const ASTRAY_DEG: f64 = 14.0;
 
-impl Kinds for Dirt {
+impl Kinds<Fleck> for Dirt {
     fn none() -> Self {
         Self { drifts: 0.0.into(), ..Self::default() }
     }
@@ -96,7 +99,7 @@ impl Kinds for Dirt {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Fleck>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count("drifts", &self.drifts) {
             let mut rng = ground.stream(index, "drift");

@@ -3,13 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::crystal::shard;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Dust on the cover glass or within the mountant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,7 +28,8 @@ pub struct Dust {
 }
 
 /// A grain of dust, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Grain {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -46,7 +48,7 @@ impl Default for Dust {
     }
 }
 
-impl Kinds for Dust {
+impl Kinds<Grain> for Dust {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -58,7 +60,7 @@ impl Kinds for Dust {
         section.absorbance("absorbance", &self.absorbance);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Grain>) {
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -84,6 +86,6 @@ impl Thing for Grain {
         let outline = site.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
         let mut painting = site.painting(&outline, 0.0);
         painting.fill(&outline, self.absorbance);
-        painting.finish(site.scene.dyes.speckle, 0.0, self.absorbance)
+        painting.finish(site.dyes.speckle, 0.0, self.absorbance)
     }
 }

@@ -3,14 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Fibres of cotton and cloth, in the mountant or on the glass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,7 +35,8 @@ pub struct Fibres {
 }
 
 /// A fibre, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fibre {
     /// Length, µm.
     pub length_um: f64,
@@ -62,7 +64,7 @@ impl Default for Fibres {
     }
 }
 
-impl Kinds for Fibres {
+impl Kinds<Fibre> for Fibres {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -77,7 +79,7 @@ impl Kinds for Fibres {
         section.phase_rad("phase_rad", &self.phase_rad);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Fibre>) {
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -141,6 +143,6 @@ impl Thing for Fibre {
         for ((value, cover), inner) in values {
             *value = self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0));
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

@@ -6,13 +6,14 @@ mod round;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Cluster, Lie, cluster_id, member_number, near};
+use super::check::Section;
+use super::ground::{Cluster, Ground, Lie, cluster_id, member_number, near};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// How the nucleus of a leukocyte is shaped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -59,7 +60,8 @@ pub struct Leukocytes {
 }
 
 /// A white blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Leukocyte {
     /// How the nucleus is shaped.
     pub form: NucleusForm,
@@ -104,7 +106,7 @@ impl Default for Leukocytes {
     }
 }
 
-impl Kinds for Leukocytes {
+impl Kinds<Leukocyte> for Leukocytes {
     fn none() -> Self {
         Self { clusters: 0.0.into(), ..Self::default() }
     }
@@ -125,7 +127,7 @@ impl Kinds for Leukocytes {
         section.absorbance("halo", &self.halo);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Leukocyte>) {
         let dyes = ground.cyanophilic();
         for index in 0..ground.count("clusters", &self.clusters) {
             let mut rng = ground.stream(index, "cluster");

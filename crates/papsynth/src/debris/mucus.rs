@@ -3,15 +3,17 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 
 /// Strands of mucus, bundles of faint fibres.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,7 +40,8 @@ pub struct Mucus {
 }
 
 /// A strand of mucus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Strand {
     /// Length, µm.
     pub length_um: f64,
@@ -72,7 +75,7 @@ impl Default for Mucus {
     }
 }
 
-impl Kinds for Mucus {
+impl Kinds<Strand> for Mucus {
     fn none() -> Self {
         Self { strands: 0.0.into(), ..Self::default() }
     }
@@ -89,7 +92,7 @@ impl Kinds for Mucus {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Strand>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count("strands", &self.strands) {
             let mut rng = ground.stream(number, "body");

@@ -4,14 +4,15 @@ use rand_core::Rng;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::ground::Lie;
+use super::check::Section;
+use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Point, Tile, area};
 use crate::phantom::wobble::{placed, textured, wobbled_circle};
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Objects far outside the depth of the slide ("Out of focus objects").
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,7 +33,8 @@ pub struct OutOfFocus {
 }
 
 /// An object far outside the depth of the slide, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Blob {
     /// Radius, µm.
     pub radius_um: f64,
@@ -57,7 +59,7 @@ impl Default for OutOfFocus {
     }
 }
 
-impl Kinds for OutOfFocus {
+impl Kinds<Blob> for OutOfFocus {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -71,7 +73,7 @@ impl Kinds for OutOfFocus {
         section.absorbance("absorbance", &self.absorbance);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Blob>) {
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -106,7 +108,7 @@ impl Thing for Blob {
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius = site.px(self.radius_um);
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         let shape: Vec<Point> = wobbled_circle(radius, self.alpha, self.beta, &mut rng)
             .iter()
             .map(|p| placed(*p, turn, site.centre))
@@ -115,6 +117,6 @@ impl Thing for Blob {
         coverage.cover(&shape);
         let mut tile = coverage.clone();
         textured(&mut tile, site.centre, NOISE_CELL * radius, 3, NOISE_STRENGTH, self.absorbance, rng.next_u64());
-        Phantom::whole(tile, coverage, area(&shape), site.scene.dyes.nucleus)
+        Phantom::whole(tile, coverage, area(&shape), site.dyes.nucleus)
     }
 }

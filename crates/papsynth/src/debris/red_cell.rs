@@ -3,14 +3,17 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
+use crate::truth::traits::Trait;
 
 /// Red blood cells, in clusters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +42,8 @@ pub struct RedCells {
 }
 
 /// A red blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RedCell {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -72,7 +76,7 @@ impl Default for RedCells {
     }
 }
 
-impl Kinds for RedCells {
+impl Kinds<RedCell> for RedCells {
     fn none() -> Self {
         Self { clusters: 0.0.into(), ..Self::default() }
     }
@@ -90,7 +94,7 @@ impl Kinds for RedCells {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, RedCell>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count("clusters", &self.clusters) {
             let mut rng = ground.stream(index, "cluster");
@@ -158,7 +162,7 @@ impl Thing for RedCell {
         });
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         if self.ghost {
-            phantom.traits.push("ghost");
+            phantom.traits.push(Trait::Ghost);
         }
         phantom
     }

@@ -3,14 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
-use crate::recipe::Number;
+use crate::recipe::number::Number;
 
 /// Scratches in the slide or in the cover glass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,7 +33,8 @@ pub struct Scratches {
 }
 
 /// A scratch, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scratch {
     /// Length, µm.
     pub length_um: f64,
@@ -57,7 +59,7 @@ impl Default for Scratches {
     }
 }
 
-impl Kinds for Scratches {
+impl Kinds<Scratch> for Scratches {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -71,7 +73,7 @@ impl Kinds for Scratches {
         section.phase_rad("phase_rad", &self.phase_rad);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Scratch>) {
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -124,6 +126,6 @@ impl Thing for Scratch {
         for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
             *value = self.absorbance as f32 * cover;
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

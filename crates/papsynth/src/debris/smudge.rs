@@ -3,14 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Painting;
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 
 /// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +41,8 @@ pub struct Smudges {
 }
 
 /// A clump of amorphous debris, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Smudge {
     /// Diameter of the disc of its area before it is frayed, µm.
     pub diameter_um: f64,
@@ -76,7 +79,7 @@ impl Default for Smudges {
     }
 }
 
-impl Kinds for Smudges {
+impl Kinds<Smudge> for Smudges {
     fn none() -> Self {
         Self { count: 0.0.into(), ..Self::default() }
     }
@@ -94,7 +97,7 @@ impl Kinds for Smudges {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Smudge>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count("count", &self.count) {
             let mut rng = ground.stream(number, "body");
@@ -141,7 +144,7 @@ impl Thing for Smudge {
         let reach = 1.0 + (REACH - 1.0) * self.ragged.min(1.5);
         let corners = site.places(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
         let mut painting = site.painting(&corners, 0.0);
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         let (sin, cos) = (libm::sin(turn), libm::cos(turn));
         let (a_px, b_px) = (site.px(a), site.px(b));
         // Where the clump is: 1 in its middle, 0 on its outline, before waves push that in and out.

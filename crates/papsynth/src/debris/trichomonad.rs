@@ -3,16 +3,18 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::Section;
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Section, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::smooth;
 use crate::random;
-use crate::recipe::{DyeAmounts, Number};
+use crate::recipe::number::Number;
+use crate::recipe::specimen::DyeAmounts;
 
 /// Trichomonads, pale pear-shaped flagellates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +41,8 @@ pub struct Trichomonads {
 }
 
 /// A trichomonad, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Trichomonad {
     /// Length, µm.
     pub length_um: f64,
@@ -69,7 +72,7 @@ impl Default for Trichomonads {
     }
 }
 
-impl Kinds for Trichomonads {
+impl Kinds<Trichomonad> for Trichomonads {
     fn none() -> Self {
         Self { groups: 0.0.into(), ..Self::default() }
     }
@@ -86,7 +89,7 @@ impl Kinds for Trichomonads {
         section.dyes("dyes", &self.dyes);
     }
 
-    fn draw(&self, ground: &mut Ground<'_>) {
+    fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count("groups", &self.groups) {
             let mut rng = ground.stream(index, "group");
@@ -179,7 +182,7 @@ impl Thing for Trichomonad {
         // Flagella are no part of its outline: nobody would draw it round them.
         painting
             .finish(self.dyes, 0.0, self.absorbance)
-            .stained(nucleus.absorbance, site.scene.dyes.nucleus)
+            .stained(nucleus.absorbance, site.dyes.nucleus)
             .stained(hairs.absorbance, self.dyes)
     }
 }

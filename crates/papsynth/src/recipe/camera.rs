@@ -4,7 +4,7 @@ use ccd_noise::{Blooming, CameraParams, ReadNoise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Number;
+use super::number::Number;
 
 /// How photons are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

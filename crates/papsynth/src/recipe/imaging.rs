@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Number;
+use super::number::Number;
 
 /// The image: its size and the size of its pixels. Counts of cells and debris are those of a whole field, whatever its size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

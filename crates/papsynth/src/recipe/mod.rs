@@ -4,14 +4,14 @@
 //! [`Model`](crate::model::Model). Lengths are in micrometres, angles in degrees, probabilities from 0 to 1,
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
-mod camera;
+pub(crate) mod camera;
 mod check;
-mod imaging;
-mod number;
+pub(crate) mod imaging;
+pub(crate) mod number;
 mod presets;
 mod print;
 mod scan;
-mod specimen;
+pub(crate) mod specimen;
 
 use std::collections::BTreeMap;
 
@@ -84,6 +84,14 @@ impl Recipe {
     #[must_use]
     pub fn to_toml(&self) -> String {
         print::plain_toml(self)
+    }
+
+    /// The recipe of a TOML text. Whether its numbers are within their ranges is not checked.
+    ///
+    /// # Errors
+    /// If the text is not TOML, or a field is unknown or of another type.
+    pub fn from_toml(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
     }
 
     /// Takes those sections of another recipe whose names are chosen.

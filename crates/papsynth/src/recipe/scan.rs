@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Number;
+use super::number::Number;
 
 /// A whole slide, as a scanner sees it frame by frame (`papsynth slide`); fields do not look at it.
 ///

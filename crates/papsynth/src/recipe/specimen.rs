@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Number;
+use super::number::Number;
 
 /// How deep the cells lie ("Final Image Formation": depth from a median-filtered Perlin image).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -81,7 +81,7 @@ pub enum Layout {
 
 /// What the fields of a layout are where a recipe names its kind alone.
 pub(super) mod defaults {
-    use super::Number;
+    use super::super::number::Number;
 
     pub(crate) fn clusters() -> Number {
         Number::uniform(5.0, 11.0)
