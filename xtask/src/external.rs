@@ -61,7 +61,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ("sixteen-bits", &["--frames", "1", "--camera", "scmos"]),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, dataset::LEAN, &out, own.iter().chain(&SMALL))?;
+        dataset::generate(workspace, &[], &out, own.iter().chain(&SMALL))?;
         shell::run(Command::new(&python).arg(script(workspace, "external.py")?).arg(&out))?;
     }
     let pages = workspace.root.join("docs/formats");
@@ -70,7 +70,8 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         true => (workspace::heavy_features_of("papsynth-cli"), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
         false => (String::new(), LIGHT_FORMATS.to_owned()),
     };
-    let build = [dataset::LEAN, &["--features", &features]].concat();
+    // The features that the browser has as well, so that both share one build.
+    let build = ["--features", features.as_str()];
     let formats = ["--format", formats.as_str()];
     for (name, own) in [
         ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),

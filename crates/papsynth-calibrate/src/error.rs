@@ -56,7 +56,7 @@ pub enum Error {
         expected: [usize; 2],
     },
     /// A frame is not larger than the square whose mean is taken for shading.
-    #[error("{name}: {} x {} pixels; expected more than {least} on each side", found[0], found[1])]
+    #[error("{name}: {} x {} pixels; expected more than {least} pixels on each side", found[0], found[1])]
     Small {
         /// The frame.
         name: String,

@@ -122,7 +122,13 @@ impl Failure {
     }
 
     /// A subcommand of a feature that this program was built without.
-    #[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+    #[cfg(not(all(
+        feature = "calibrate",
+        feature = "completions",
+        feature = "judge",
+        feature = "learn",
+        feature = "web"
+    )))]
     pub(crate) fn left_out(feature: &str) -> Self {
         let message = format!("this subcommand needs a build of papsynth with `--features {feature}`");
         Self::wrong(message, "`cargo install papsynth-cli` builds all subcommands")

@@ -1,4 +1,4 @@
-//! What can be typed after `generate` and `preview`.
+//! What can be typed after `generate`, `preview` and `render`.
 
 use std::ops::Range;
 use std::path::PathBuf;

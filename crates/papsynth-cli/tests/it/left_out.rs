@@ -10,6 +10,7 @@ fn a_subcommand_that_was_left_out_names_its_feature() {
         ("completions bash", "completions", cfg!(feature = "completions")),
         ("judge real synthetic --out report --help", "judge", cfg!(feature = "judge")),
         ("match real --out mine.toml", "judge", cfg!(feature = "judge")),
+        ("learn --class parabasal --out mine.json", "learn", cfg!(feature = "learn")),
         ("study real synthetic", "web", cfg!(feature = "web")),
         ("view fields --port 8080", "web", cfg!(feature = "web")),
     ] {

@@ -6,7 +6,13 @@ mod cli;
 mod hostile;
 #[cfg(feature = "judge")]
 mod judge;
-#[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+#[cfg(not(all(
+    feature = "calibrate",
+    feature = "completions",
+    feature = "judge",
+    feature = "learn",
+    feature = "web"
+)))]
 mod left_out;
 #[cfg(feature = "judge")]
 mod match_fields;
