@@ -5,8 +5,6 @@ use std::io::Write;
 use std::path::Path;
 
 use papsynth::Slide;
-use papsynth::model::Model;
-use papsynth::recipe::Recipe;
 use papsynth_zarr::Shard;
 
 use super::document::{Forms, IMAGE};
