@@ -1,4 +1,4 @@
-use crate::lanes::{Batch, Start, Topology};
+use crate::batch::{Batch, Start, Topology};
 use crate::mesh::Disc;
 use crate::outline::{Inside, Outline};
 use crate::params::check_excess;

@@ -314,7 +314,7 @@ fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::Parts;
+    use crate::sheet::Parts;
     use crate::testing::{angular, area, rng, wavy};
     use crate::{Cloth, ClothParams, View};
 

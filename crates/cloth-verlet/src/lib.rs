@@ -1,6 +1,10 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
+mod batch;
 mod cloth;
+#[cfg(any(feature = "mint", feature = "nalgebra"))]
+mod convert;
 mod crease;
 mod error;
 mod kernel;

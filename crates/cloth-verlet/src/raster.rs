@@ -319,7 +319,7 @@ fn add_piece(line: &mut [Step], column: i32, a: Point, b: Point, [p0, p1, p2]: P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::Parts;
+    use crate::sheet::Parts;
     use crate::testing::{rng, wavy};
     use crate::{Cloth, ClothParams};
     use rand_core::Rng;

@@ -2,7 +2,7 @@
 
 use crate::mesh::Disc;
 use crate::outline::Outline;
-use crate::sheet::{Edge, edges};
+use crate::sheet::{Edge, Parts, edges};
 use crate::{Point, Smoothing, Vertex};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -23,15 +23,6 @@ pub(crate) struct Refinement {
     radius: Arc<Vec<f64>>,
     /// The rim's vertices in order, and the triangle inside each of its sides.
     hem: Vec<(u32, u32)>,
-}
-
-/// A sheet as plain lists, in units of the outline's equivalent radius.
-#[derive(Debug)]
-pub(crate) struct Parts {
-    pub(crate) vertices: Vec<Vertex>,
-    pub(crate) rest: Vec<Point>,
-    pub(crate) radius: Arc<Vec<f64>>,
-    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
 }
 
 fn sorted(a: u32, b: u32) -> [u32; 2] {

@@ -1,6 +1,6 @@
 //! The flat sheet before it is pressed, and the outline's way from there to its shape.
 
-use crate::lanes::Start;
+use crate::batch::Start;
 use crate::mesh::{Disc, cross};
 use crate::outline::{Outline, moments};
 use crate::{ClothParams, Point, Rest, Rng, Solver};

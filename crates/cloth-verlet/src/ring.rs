@@ -2,11 +2,8 @@
 
 use crate::Point;
 use crate::kernel::Real;
-use crate::lanes::{Lane, Node};
+use crate::lanes::{Curve, Lane, Node};
 use std::f64::consts::TAU;
-
-/// A closed curve in every lane.
-pub(crate) type Curve<T, const L: usize> = Vec<[Lane<T, L>; 2]>;
 
 /// Half of the part of the outline that a vertex on the rim looks at for its nearest side: an eighth of the way round.
 const HALF_VIEW: f64 = 0.125;

@@ -1,6 +1,5 @@
 use crate::mesh::cross;
 use crate::outline::distance;
-use crate::refine::Parts;
 use crate::{Point, Vertex};
 use std::sync::Arc;
 
@@ -16,6 +15,15 @@ pub struct Sheet {
     pub(crate) radius: Arc<Vec<f64>>,
     pub(crate) triangles: Arc<Vec<[u32; 3]>>,
     pub(crate) edges: Arc<Vec<Edge>>,
+}
+
+/// A sheet as plain lists, in units of the outline's equivalent radius.
+#[derive(Debug)]
+pub(crate) struct Parts {
+    pub(crate) vertices: Vec<Vertex>,
+    pub(crate) rest: Vec<Point>,
+    pub(crate) radius: Arc<Vec<f64>>,
+    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
 }
 
 /// An edge from `ends[0]` to `ends[1]` with the triangles on its left and right, or [`OUTSIDE`].
@@ -37,6 +45,27 @@ impl Sheet {
     #[must_use]
     pub fn vertices(&self) -> &[Vertex] {
         &self.vertices
+    }
+
+    /// Unit normals of the vertices: the mean of the triangles around each, weighted by their areas; up where the sheet is flat.
+    #[must_use]
+    pub fn normals(&self) -> Vec<Vertex> {
+        let mut normals = vec![[0.0; 3]; self.vertices.len()];
+        for t in self.triangles.iter() {
+            let [a, b, c] = t.map(|v| self.vertices[v as usize]);
+            let (p, q): (Vertex, Vertex) = (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
+            for v in t {
+                for (i, sum) in normals[*v as usize].iter_mut().enumerate() {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    *sum += p[j] * q[k] - p[k] * q[j];
+                }
+            }
+        }
+        for normal in &mut normals {
+            let length = normal.iter().map(|c| c * c).sum::<f64>().sqrt();
+            *normal = if length > 0.0 { normal.map(|c| c / length) } else { [0.0, 0.0, 1.0] };
+        }
+        normals
     }
 
     /// Indices of the triangles' corners.
@@ -123,4 +152,30 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
         }
     }
     edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{rng, wavy};
+    use crate::{Cloth, ClothParams};
+
+    #[test]
+    fn normals_are_those_of_the_triangles_around() {
+        let (up, ridge) = ([0.0, 0.0, 1.0], 0.5_f64.sqrt());
+        let folded = |height: f64| {
+            let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, height], [1.0, 1.0, height], [2.0, 0.5, height]];
+            let rest = vertices.iter().map(|v| [v[0], v[1]]).collect();
+            let triangles = Arc::new(vec![[0, 1, 2], [1, 3, 2]]);
+            Sheet::new(Parts { vertices, rest, radius: Arc::default(), triangles }, None).normals()
+        };
+        assert_eq!(folded(0.0), [up; 4]);
+        let normals = folded(1.0);
+        assert!((normals[0][0] + ridge).abs() < 1e-12 && (normals[0][2] - ridge).abs() < 1e-12);
+        assert_eq!(normals[3], up);
+        assert!(normals[1][0] < 0.0 && normals[1][2] > ridge && normals[1] == normals[2]);
+        let sheet = Cloth::new(&ClothParams { vertices: 300, ..ClothParams::default() }).unwrap();
+        let sheet = sheet.crumple(&wavy(3.0, 0.1), &mut rng(1)).unwrap();
+        assert!(sheet.normals().iter().filter(|n| n[2] > 0.0).count() * 10 > sheet.vertices().len() * 9);
+    }
 }

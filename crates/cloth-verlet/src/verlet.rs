@@ -1,8 +1,9 @@
 //! The paper's solver.
 
 use crate::VerletParams;
+use crate::batch::{Batch, Topology};
 use crate::kernel::{Real, verlet};
-use crate::lanes::{Batch, Binding, Topology, advance, confine, project};
+use crate::lanes::{Binding, advance, confine, project};
 
 impl<T: Real, const L: usize> Batch<T, L> {
     /// The paper's way: Eq. 4 on every vertex and on the outline, distances restored by projection, a ground plane.

@@ -1,8 +1,9 @@
 //! The default solver.
 
 use crate::XpbdParams;
+use crate::batch::{Batch, Topology};
 use crate::kernel::Real;
-use crate::lanes::{Batch, Binding, Topology, advance, confine, project};
+use crate::lanes::{Binding, advance, confine, project};
 
 impl<T: Real, const L: usize> Batch<T, L> {
     /// Small steps of extended position-based dynamics, the rim tied to an outline that eases from start to end.

@@ -4,6 +4,7 @@ use crate::error::{Error, require};
 use crate::params::{ColourParams, Mixing};
 use crate::rows::{self, Terms};
 use crate::srgb;
+use crate::sum::{Term, transmittance};
 
 /// Bands over which lamp times sensitivity is summed: 0.25 nm each, where the sharpest edge of a sensitivity has a
 /// standard deviation of 3.7 nm.
@@ -37,7 +38,7 @@ pub struct Colour {
     channels: [Channel; 3],
     mixing: Mixing,
     /// Absorbance of unit amounts, and weight in each channel.
-    terms: Vec<(Amounts, [f64; 3])>,
+    terms: Vec<Term>,
     rows: Terms,
     to_srgb: [[f64; 3]; 3],
 }
@@ -51,7 +52,7 @@ impl Colour {
     pub fn new(params: &ColourParams) -> Result<Self, Error> {
         params.check()?;
         let channels = channels(params);
-        let spectral: Vec<(Amounts, [f64; 3])> = (0..params.wavelengths)
+        let spectral: Vec<Term> = (0..params.wavelengths)
             .map(|i| {
                 let wavelength_um = channels[0].nodes[i].wavelength_um;
                 let weights = std::array::from_fn(|c| channels[c].nodes[i].weight);
@@ -140,31 +141,12 @@ impl Colour {
     }
 }
 
-/// T_c = Σ_λ w_c(λ)·10^−A(λ)
-pub(crate) fn transmittance(terms: &[(Amounts, [f64; 3])], amounts: &Amounts) -> [f64; 3] {
-    let mut light = [0.0; 3];
-    for (absorbances, weights) in terms {
-        let absorbance: f64 = absorbances.iter().zip(amounts).map(|(a, amount)| a * amount).sum();
-        let power = libm::exp10(-absorbance);
-        for (light, weight) in light.iter_mut().zip(weights) {
-            *light += weight * power;
-        }
-    }
-    light
-}
-
 /// Mean absorbance of each dye over a channel's light, for that channel alone.
-fn mean_term(spectral: &[(Amounts, [f64; 3])], c: usize) -> (Amounts, [f64; 3]) {
+fn mean_term(spectral: &[Term], c: usize) -> Term {
     let mean = |d: usize| spectral.iter().map(|(absorbances, weights)| weights[c] * absorbances[d]).sum();
     let mut weights = [0.0; 3];
     weights[c] = 1.0;
     (std::array::from_fn(mean), weights)
-}
-
-/// Middles of equal bands.
-pub(crate) fn middles(params: &ColourParams, bands: usize) -> impl Iterator<Item = f64> + use<> {
-    let (from, width) = (params.from_um, (params.to_um - params.from_um) / bands as f64);
-    (0..bands).map(move |i| from + (i as f64 + 0.5) * width)
 }
 
 fn channels(params: &ColourParams) -> [Channel; 3] {
@@ -172,7 +154,7 @@ fn channels(params: &ColourParams) -> [Channel; 3] {
         let power = params.lamp.power(wavelength_um);
         params.sensor.sensitivity(wavelength_um).map(|sensitivity| sensitivity * power)
     };
-    let fine: Vec<(f64, [f64; 3])> = middles(params, FINE_BANDS).map(|w| (w, light(w))).collect();
+    let fine: Vec<(f64, [f64; 3])> = params.middles(FINE_BANDS).map(|w| (w, light(w))).collect();
     let total = |c: usize| fine.iter().map(|(_, light)| light[c]).sum::<f64>();
     let strongest = (0..3).map(total).fold(0.0, f64::max);
     std::array::from_fn(|c| {
@@ -180,7 +162,7 @@ fn channels(params: &ColourParams) -> [Channel; 3] {
         let wavelength_um = mean(&|w| w);
         let variance = mean(&|w| (w - wavelength_um) * (w - wavelength_um));
         let at = |w: f64| Node { wavelength_um: w, weight: light(w)[c] };
-        let mut nodes: Vec<Node> = middles(params, params.wavelengths).map(at).collect();
+        let mut nodes: Vec<Node> = params.middles(params.wavelengths).map(at).collect();
         let sum: f64 = nodes.iter().map(|node| node.weight).sum();
         nodes.iter_mut().for_each(|node| node.weight /= sum);
         // An even band of width b has the variance b²/12.

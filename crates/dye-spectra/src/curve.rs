@@ -1,8 +1,8 @@
 use multiversion::multiversion;
 
-use crate::colour::transmittance;
 use crate::dye::{Amounts, DYES};
 use crate::rows::{LANES, Terms, padded};
+use crate::sum::{Term, transmittance};
 
 /// Degree of the polynomials: with `DEEPEST`, an error below 1e-5.
 const DEGREE: usize = 9;
@@ -27,14 +27,14 @@ pub struct Curve {
 
 impl Curve {
     #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
-    pub(crate) fn new(terms: &[(Amounts, [f64; 3])], mix: &Amounts) -> Self {
+    pub(crate) fn new(terms: &[Term], mix: &Amounts) -> Self {
         let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, share)| a * share).sum::<f64>();
         let alone = |absorbances: &Amounts| {
             let mut alone = [0.0; DYES];
             alone[0] = mixed(absorbances);
             alone
         };
-        let terms: Vec<(Amounts, [f64; 3])> = terms.iter().map(|(a, weights)| (alone(a), *weights)).collect();
+        let terms: Vec<Term> = terms.iter().map(|(a, weights)| (alone(a), *weights)).collect();
         let steepest = terms.iter().fold(0.0_f64, |steepest, (a, _)| steepest.max(a[0]));
         // A mixture of nothing absorbs nothing, however much of it there is.
         let most = if steepest > 0.0 { (DEEPEST / steepest).min(f64::from(f32::MAX)) } else { f64::from(f32::MAX) };

@@ -1,6 +1,9 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod colour;
+#[cfg(feature = "image")]
+mod convert;
 mod curve;
 mod dye;
 mod error;
@@ -9,6 +12,7 @@ mod lobe;
 mod params;
 mod rows;
 mod srgb;
+mod sum;
 
 pub use colour::{Channel, Colour, Node};
 pub use curve::Curve;

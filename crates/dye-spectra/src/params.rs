@@ -51,6 +51,12 @@ impl ColourParams {
         require("from_um", from_um, from_um >= 0.40 && from_um < to_um, "at least 0.40 and below to_um")?;
         require("wavelengths", wavelengths as f64, (1..=1024).contains(&wavelengths), "from 1 to 1024")
     }
+
+    /// Middles of equal bands.
+    pub(crate) fn middles(&self, bands: usize) -> impl Iterator<Item = f64> + use<> {
+        let (from, width) = (self.from_um, (self.to_um - self.from_um) / bands as f64);
+        (0..bands).map(move |i| from + (i as f64 + 0.5) * width)
+    }
 }
 
 #[cfg(test)]

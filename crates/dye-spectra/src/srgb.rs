@@ -1,9 +1,9 @@
 //! From the camera's channels to the colours of a screen.
 
-use crate::colour::{middles, transmittance};
 use crate::dye::{Amounts, DYES, Dye, amounts};
 use crate::lobe::{Lobe, lobe, sum};
 use crate::params::ColourParams;
+use crate::sum::{Term, transmittance};
 
 type Matrix = [[f64; 3]; 3];
 
@@ -42,7 +42,7 @@ const RIDGE: f64 = 1e-6;
 
 /// The matrix whose rows add up to 1, so that white stays white, and which best takes the camera's light of stained
 /// smears to what the observer sees.
-pub(crate) fn matrix(params: &ColourParams, spectral: &[(Amounts, [f64; 3])]) -> Matrix {
+pub(crate) fn matrix(params: &ColourParams, spectral: &[Term]) -> Matrix {
     let observer = Observer::new(params);
     let smears = smears();
     let pairs: Vec<[[f64; 3]; 2]> = smears.map(|c| [transmittance(spectral, &c), observer.see(&c)]).collect();
@@ -87,7 +87,7 @@ fn smears() -> impl Iterator<Item = Amounts> {
 /// The standard observer, adapted to the lamp.
 struct Observer {
     /// Absorbance of unit amounts, and weights that give linear sRGB; those of each colour add up to 1.
-    terms: Vec<(Amounts, [f64; 3])>,
+    terms: Vec<Term>,
 }
 
 impl Observer {
@@ -95,7 +95,7 @@ impl Observer {
         let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
         let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
         let mut white = [0.0; 3];
-        for w in middles(&visible, OBSERVER_BANDS) {
+        for w in visible.middles(OBSERVER_BANDS) {
             for (white, seen) in white.iter_mut().zip(seen(w)) {
                 *white += seen;
             }
@@ -110,7 +110,7 @@ impl Observer {
             let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
             (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
         };
-        Self { terms: middles(&visible, OBSERVER_BANDS).map(term).collect() }
+        Self { terms: visible.middles(OBSERVER_BANDS).map(term).collect() }
     }
 
     /// Linear sRGB of stained glass; white is 1.

@@ -1,8 +1,9 @@
 //! From a set of outlines to their statistics.
 
+use crate::coordinates::add_scaled;
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, count_as_f64, resample, signed_area};
-use crate::pca::{add_scaled, dot, principal_axes};
+use crate::pca::{dot, mean_and_sd, mean_of, principal_axes, sd_of};
 use crate::roughness::Fine;
 use crate::sample::Bend;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics};
@@ -200,40 +201,4 @@ fn notable_moments(scores: &[f64]) -> (f64, f64) {
     let kurtosis =
         notable(kurtosis, (24.0 / n).sqrt()).clamp(Bend::least_kurtosis(skewness), PrincipalComponent::MOST_KURTOSIS);
     (skewness, kurtosis)
-}
-
-/// |l| of coordinate k.
-pub(crate) fn order(k: usize, harmonics: usize) -> usize {
-    let place = k / 2;
-    if place < harmonics { harmonics - place } else { place + 1 - harmonics }
-}
-
-/// Descriptors of coordinates, u₀ = 0.
-pub(crate) fn terms(coordinates: &[f64]) -> Vec<Point> {
-    let mut terms: Vec<Point> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
-    terms.insert(terms.len() / 2, [0.0, 0.0]);
-    terms
-}
-
-fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut mean = vec![0.0; rows[0].len()];
-    for row in rows {
-        add_scaled(&mut mean, row, 1.0 / count_as_f64(rows.len()));
-    }
-    mean
-}
-
-/// Standard deviation of each column of rows with mean 0.
-pub(crate) fn sd_of(deviations: &[Vec<f64>]) -> Vec<f64> {
-    let freedom = count_as_f64(deviations.len()) - 1.0;
-    (0..deviations[0].len())
-        .map(|k| (deviations.iter().map(|row| row[k] * row[k]).sum::<f64>() / freedom).sqrt())
-        .collect()
-}
-
-pub(crate) fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-    let n = count_as_f64(values.len());
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, (squares / (n - 1.0)).sqrt())
 }

@@ -4,13 +4,11 @@ use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
 
 use crate::Error;
+use crate::coordinates::{add_scaled, finest_coarse, order, terms};
 use crate::crossing::self_intersects;
 use crate::descriptors::{Descriptors, modulus};
 use crate::dft::multiply;
-use crate::fit::{order, terms};
 use crate::outline::{Point, count_as_f64};
-use crate::pca::add_scaled;
-use crate::roughness::{LEAST_FOR_LOCAL, finest_coarse};
 use crate::sample::Bend;
 use crate::statistics::{Residual, ShapeStatistics};
 use crate::steps::from_steps;
@@ -24,6 +22,9 @@ const FEWEST_CHECKS: usize = 64;
 /// Harmonics of the modulation of roughness, as a share of the curve's: at an eighth (5 of 40) the patches of rough and smooth outline
 /// are as long as real ones.
 const MODULATION_SHARE: usize = 8;
+
+/// Fewest harmonics at which roughness can vary along the outline.
+pub(crate) const LEAST_FOR_LOCAL: usize = 16;
 
 /// A population of shapes, from which new ones are drawn.
 ///

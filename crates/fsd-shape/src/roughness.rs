@@ -1,9 +1,10 @@
 //! Roughness: what the fine detail of outlines has beyond a normal field that is alike from shape to shape and all along the outline.
 
+use crate::coordinates::{finest_coarse, order, terms};
 use crate::descriptors::Descriptors;
-use crate::fit::{mean_and_sd, order, terms};
+use crate::model::LEAST_FOR_LOCAL;
 use crate::outline::count_as_f64;
-use crate::pca::dot;
+use crate::pca::{dot, mean_and_sd};
 use crate::statistics::ShapeStatistics;
 
 /// Places per harmonic at which detail is looked at.
@@ -92,15 +93,6 @@ impl Fine {
 
 /// Growth of the fourth moment at a modulation of 1: (1 + 6 + 3) / 4.
 const GREATEST_GROWTH: f64 = 2.5;
-
-/// Fewest harmonics at which roughness can vary along the outline.
-pub(crate) const LEAST_FOR_LOCAL: usize = 16;
-
-/// Highest |l| that counts as form, not as detail: a fifth of the harmonics. Of 40 that is 8, up to where the components explain
-/// outlines of cells; beyond, the residual does.
-pub(crate) fn finest_coarse(harmonics: usize) -> usize {
-    (harmonics / 5).max(1)
-}
 
 /// ψ₁(x) by recurrence and its asymptotic series; 1e-8 for x >= 1/2.
 fn trigamma(x: f64) -> f64 {

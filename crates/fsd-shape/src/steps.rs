@@ -16,6 +16,7 @@ use crate::outline::count_as_f64;
 const FIRST: usize = 3;
 
 /// Replaces each pair u₁₊ₘ, u₁₋ₘ of coordinates by direction and step.
+#[cfg(any(test, feature = "fit"))]
 pub(crate) fn to_steps(coordinates: &mut [f64]) {
     for m in pairs(coordinates) {
         let (high, low) = places(coordinates, m);
@@ -70,8 +71,8 @@ fn places(coordinates: &[f64], m: usize) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coordinates::terms;
     use crate::descriptors::Descriptors;
-    use crate::fit::terms;
     use crate::outline::{distance, edges};
 
     #[test]

@@ -160,8 +160,14 @@ mod tests {
     #[test]
     fn the_lens_is_the_disc_cut_by_the_disc() {
         let mut lens = Lens::default();
-        let cases =
-            [(0.3, 10.0, 0.0), (0.4, 0.0, 4.0), (0.6, 10.0, 0.0), (0.95, 0.0, 5.0), (0.95, -8.0, 2.0), (1.2, 0.0, 10.0)];
+        let cases = [
+            (0.3, 10.0, 0.0),
+            (0.4, 0.0, 4.0),
+            (0.6, 10.0, 0.0),
+            (0.95, 0.0, 5.0),
+            (0.95, -8.0, 2.0),
+            (1.2, 0.0, 10.0),
+        ];
         for (condenser_na, depth, stage) in cases {
             let params = MicroscopeParams { condenser_na, ..MicroscopeParams::default() };
             let pupil = Pupil::new(&params, 0.57, depth, stage);

@@ -20,6 +20,7 @@ mod plan;
 mod preview;
 mod profile;
 mod recipe_file;
+mod render;
 mod report;
 mod rerender;
 mod setup;
@@ -72,6 +73,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Init(args) => init::run(&args),
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
+        Verb::Render(args) => render::run(*args),
         Verb::Learn(args) => learn::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Judge(args) => judge::run(&args),

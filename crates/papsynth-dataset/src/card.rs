@@ -48,6 +48,9 @@ pub(crate) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
     if dataset.layout.objects_parquet {
         row("objects/*.parquet", "the same with types, and with amodal and visible masks as COCO's run lengths");
     }
+    if dataset.layout.scenes {
+        row("scenes/", "the scene of each frame as JSON, which `papsynth render --scene` images");
+    }
     row("splits.csv", "train, val and test, drawn by field and by slide (fields of a slide share stain and light)");
     row("manifest.json, shards/*.json", "every file with its size and SHA-256; `papsynth verify` checks them");
     if formats.iter().any(|format| format.is_flat()) {

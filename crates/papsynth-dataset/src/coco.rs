@@ -2,7 +2,7 @@
 
 use papsynth::recipe::Recipe;
 use papsynth::scene::{Kind, Tint};
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Truth};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Problem;
@@ -134,7 +134,7 @@ pub(crate) struct Annotation {
     kind: String,
     class: String,
     bethesda: String,
-    traits: String,
+    traits: Traits,
     cluster: u32,
     centre_um: [f64; 2],
     depth_um: f64,
@@ -172,7 +172,7 @@ impl Annotation {
             centre_um: object.centre_um,
             depth_um: object.depth_um,
             stain: object.stain,
-            tint: object.tint.to_owned(),
+            tint: object.tint_name().to_owned(),
             rotation_deg: object.rotation_deg,
             area_um2: object.area_um2,
             centroid: object.amodal.centroid(),
@@ -228,6 +228,8 @@ impl Annotation {
             message: format!("annotation {}: there is no {what} `{}`", self.id, found.escape_default()),
         };
         let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
+        let tint =
+            (!self.tint.is_empty()).then(|| Tint::by_name(&self.tint).ok_or_else(|| unknown("tint", &self.tint)));
         Ok(ObjectTruth {
             id: self.object_id,
             part: self.part,
@@ -239,7 +241,7 @@ impl Annotation {
             centre_um: self.centre_um,
             depth_um: self.depth_um,
             stain: self.stain,
-            tint: Tint::name_of(&self.tint).ok_or_else(|| unknown("tint", &self.tint))?,
+            tint: tint.transpose()?,
             rotation_deg: self.rotation_deg,
             area_um2: self.area_um2,
             truncated: self.truncated,

@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
+use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
 
 use crate::coco::{Category, Document, Image, Info};
@@ -81,6 +82,9 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
         let written = Written::new(folder, layout, &field);
         layout.formats.iter().try_for_each(|format| format.check(&written, &mut shards))?;
         objects.as_mut().map_or(Ok(()), |objects| objects.check(&truth, frame.index))?;
+        if layout.scenes {
+            scene(folder, frame, record.identity.seed)?;
+        }
         let table = table(&truth, frame.index, number == 0)
             .map_err(|e| Error::input(csv)(Problem::Broken { format: "CSV", message: e.to_string() }))?;
         rows.extend(table);
@@ -103,6 +107,18 @@ fn compare(folder: &Folder, layout: &Layout, categories: &[Category], record: &S
     match read::bytes(csv, LIMITS.max_file_bytes)? == rows {
         true => Ok(()),
         false => differs(csv, format!("it is not the table of {}", layout::coco(record.shard))),
+    }
+}
+
+/// Whether the scene of a frame can be read and is that of the frame.
+fn scene(folder: &Folder, frame: &FrameSummary, seed: u64) -> Result<(), Error> {
+    let path = folder.inside(&layout::scene(frame.index))?;
+    let broken = |message: String| Error::input(&path)(Problem::Broken { format: "JSON", message });
+    let text = String::from_utf8(read::bytes(&path, LIMITS.max_file_bytes)?).map_err(|e| broken(e.to_string()))?;
+    let scene = Scene::from_json(&text).map_err(|e| broken(e.to_string()))?;
+    match Geometry::of(&scene) == Geometry::of_summary(frame, seed) {
+        true => Ok(()),
+        false => differs(&path, format!("it is not the scene of image {}", frame.index)),
     }
 }
 

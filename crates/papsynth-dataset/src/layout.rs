@@ -45,6 +45,9 @@ pub struct Layout {
     /// Whether the table of objects is also written as Parquet, with masks; wants the feature `parquet`.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub objects_parquet: bool,
+    /// Whether the scene of every frame is written, as JSON.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub scenes: bool,
 }
 
 impl Default for Layout {
@@ -65,7 +68,13 @@ impl Layout {
         formats.dedup();
         let many = formats.iter().any(|format| format.is_sharded());
         let frames_per_shard = if many { Self::FRAMES_PER_SHARD } else { 1 };
-        Self { formats, frames_per_shard, flatten: Flatten::Top, objects_parquet: crate::parquet::IS_HERE }
+        Self {
+            formats,
+            frames_per_shard,
+            flatten: Flatten::Top,
+            objects_parquet: crate::parquet::IS_HERE,
+            scenes: false,
+        }
     }
 
     /// Why a range of frames cannot be made, if it cannot: it begins within a shard.
@@ -124,7 +133,8 @@ impl fmt::Display for Layout {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let names: Vec<&str> = self.formats.iter().map(|format| format.name()).collect();
         let table = if self.objects_parquet { ", objects also as Parquet" } else { "" };
-        write!(f, "{} with {} a shard, {}{table}", names.join(","), self.frames_per_shard, self.flatten.name())
+        let scenes = if self.scenes { ", with scenes" } else { "" };
+        write!(f, "{} with {} a shard, {}{table}{scenes}", names.join(","), self.frames_per_shard, self.flatten.name())
     }
 }
 
@@ -184,6 +194,11 @@ pub(crate) fn coco(shard: u64) -> String {
 
 pub(crate) fn record(shard: u64) -> String {
     format!("{SHARDS}/{shard:06}.json")
+}
+
+/// Where the scene of a frame lies.
+pub(crate) fn scene(index: u64) -> String {
+    format!("scenes/{index:06}.json")
 }
 
 /// The number of the shard whose record has this file name.

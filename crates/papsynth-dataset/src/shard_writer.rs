@@ -11,7 +11,7 @@ use crate::dataset::{Dataset, read_record};
 use crate::error::Error;
 use crate::files::Output;
 use crate::flatten::Flatten;
-use crate::formats::{Field, Place, Sink};
+use crate::formats::{Field, Files, Place, Sink};
 use crate::layout::{self, Form};
 use crate::parquet::ObjectTable;
 use crate::record::{FORMAT_VERSION, FrameSummary, Geometry, ShardRecord, WRITER};
@@ -24,6 +24,7 @@ pub struct ShardWriter<'a> {
     shard: u64,
     sinks: Vec<Box<dyn Sink + 'a>>,
     truth: TruthFiles,
+    scenes: Files<'a>,
     frame: Option<Begun>,
     done: Vec<FrameSummary>,
 }
@@ -58,7 +59,7 @@ impl<'a> ShardWriter<'a> {
         let place = Place { folder, layout: &dataset.layout, shard };
         let sinks = dataset.layout.formats.iter().map(|format| format.sink(place)).collect::<Result<_, _>>()?;
         let truth = TruthFiles::begin(dataset, shard)?;
-        Ok(Self { dataset, shard, sinks, truth, frame: None, done: Vec::new() })
+        Ok(Self { dataset, shard, sinks, truth, scenes: Files::new(folder), frame: None, done: Vec::new() })
     }
 
     /// Begins the frame of a scene, whose planes will follow.
@@ -134,6 +135,10 @@ impl<'a> ShardWriter<'a> {
             Form::Single => Vec::new(),
             Form::Stack => finished.sharp(),
         };
+        if self.dataset.layout.scenes {
+            let name = layout::scene(finished.scene.key.index);
+            self.scenes.write(&name, finished.scene.to_json().as_bytes())?;
+        }
         self.end_with(&finished.truth, sharp)
     }
 
@@ -165,7 +170,7 @@ impl<'a> ShardWriter<'a> {
         if let Some(frame) = &self.frame {
             return Err(frame.geometry.wrong("is not finished".to_owned()));
         }
-        let mut files = Vec::new();
+        let mut files = self.scenes.written;
         for sink in self.sinks {
             files.extend(sink.close()?);
         }

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use papsynth::key::Key;
 use papsynth::model::Model;
 use papsynth::recipe::{Preset, Recipe, diagnose};
+use papsynth::scene::Scene;
 use papsynth::{Plane, Threads};
 use papsynth_dataset::Layout;
 use papsynth_dataset::memory::{Need, available};
@@ -24,6 +25,9 @@ const LARGEST_RECIPE: u64 = 1 << 20;
 
 /// Largest model that is read.
 const LARGEST_MODEL: u64 = 1 << 28;
+
+/// Largest scene that is read.
+const LARGEST_SCENE: u64 = 1 << 30;
 
 /// Makes the images of one recipe.
 ///
@@ -97,6 +101,9 @@ impl Engine {
     ///     The image in it, 0 to 2**64 - 1.
     /// threads : int
     ///     Threads that work on it, 1 for the calling one alone, 0 for as many as there are processors. The bytes are the same.
+    /// scene : None, dict, str or os.PathLike
+    ///     A scene to image in place of the one of seed and index: as `scene` returns it, or the path of a JSON file that
+    ///     `papsynth generate --scenes` wrote.
     ///
     /// Returns
     /// -------
@@ -105,22 +112,61 @@ impl Engine {
     /// Raises
     /// ------
     /// ValueError
-    ///     If the scene cannot be drawn.
+    ///     If the scene cannot be drawn, or is not valid; names the object and the field.
     /// KeyboardInterrupt
     ///     Between the planes of a stack.
-    #[pyo3(signature = (seed=0, index=0, *, threads=1))]
-    fn render(&self, py: Python<'_>, seed: u64, index: u64, threads: usize) -> PyResult<Frame> {
-        let (key, engine) = (Key { seed, index }, Arc::clone(&self.engine));
+    #[pyo3(signature = (seed=0, index=0, *, threads=1, scene=None))]
+    fn render(
+        &self,
+        py: Python<'_>,
+        seed: u64,
+        index: u64,
+        threads: usize,
+        scene: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Frame> {
+        let given = scene.map(|scene| read_scene(py, scene)).transpose()?;
+        let engine = Arc::clone(&self.engine);
+        let scene = || given.map_or_else(|| engine.scene(Key { seed, index }), Ok);
         let pool = (threads != 1).then(|| pool::of(py, threads)).transpose()?;
         let made = py.detach(|| match pool {
-            None => render(&engine, key, Threads::One),
-            Some(pool) => pool.install(|| render(&engine, key, Threads::All)),
+            None => render(&engine, scene()?, Threads::One),
+            Some(pool) => pool.install(|| render(&engine, scene()?, Threads::All)),
         });
         let frame = made.map_err(|stop| match stop {
             Stop::Engine(error) => error::engine(py, &self.source, &error),
             Stop::Python(error) => error,
         })?;
         Frame::new(py, frame)
+    }
+
+    /// Draws what lies in an image: every object with its place, depth, size and stain, and how it is imaged.
+    ///
+    /// Parameters
+    /// ----------
+    /// seed, index : int
+    ///     As of `render`.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     The scene, which `render` takes back: change it, and render it again.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If the scene cannot be drawn.
+    ///
+    /// Examples
+    /// --------
+    /// >>> engine = papsynth.Engine({"field": {"width_px": 64, "height_px": 48}})
+    /// >>> scene = engine.scene(seed=7)
+    /// >>> scene["objects"][0]["centre_um"] = [8.0, 6.0]
+    /// >>> frame = engine.render(scene=scene)
+    #[pyo3(signature = (seed=0, index=0))]
+    fn scene<'py>(&self, py: Python<'py>, seed: u64, index: u64) -> PyResult<Bound<'py, PyAny>> {
+        let drawn = py.detach(|| self.engine.scene(Key { seed, index }));
+        let scene = drawn.map_err(|error| error::engine(py, &self.source, &error))?;
+        py.import("json")?.call_method1("loads", (scene.to_json(),))
     }
 
     /// SHA-256 of recipe, model and versions: two engines with the same make the same images.
@@ -149,9 +195,9 @@ impl Engine {
 }
 
 /// Makes a frame, and looks between its planes whether Python wants to stop.
-fn render(engine: &papsynth::Engine, key: Key, threads: Threads) -> Result<papsynth::Frame, Stop> {
+fn render(engine: &papsynth::Engine, scene: Scene, threads: Threads) -> Result<papsynth::Frame, Stop> {
     let mut planes: Vec<Plane> = Vec::new();
-    let finished = engine.stream(key, threads, |plane| {
+    let finished = engine.image(scene, threads, |plane| {
         planes.push(plane.clone());
         Python::attach(|py| py.check_signals()).map_err(Stop::Python)
     })?;
@@ -223,14 +269,22 @@ impl Source {
 /// The model that ships, with the classes of a file, or of a dictionary such as `papsynth.learn` returns.
 pub(crate) fn read_model(py: Python<'_>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Model> {
     let Some(model) = model.filter(|model| !model.is_none()) else { return Ok(Model::builtin()) };
-    let (name, text) = if model.is_instance_of::<PyDict>() {
-        let text: String = py.import("json")?.call_method1("dumps", (model,))?.extract()?;
-        ("the model".to_owned(), text)
-    } else {
-        let path: PathBuf = model.extract()?;
-        (path.display().to_string(), read(&path, LARGEST_MODEL)?)
-    };
+    let (name, text) = json(py, model, "the model", LARGEST_MODEL)?;
     Model::builtin().with(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+}
+
+fn read_scene(py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Scene> {
+    let (name, text) = json(py, scene, "the scene", LARGEST_SCENE)?;
+    Scene::from_json(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+}
+
+/// The name and the text of a file, or of a dictionary as JSON.
+fn json(py: Python<'_>, given: &Bound<'_, PyAny>, name: &str, largest: u64) -> PyResult<(String, String)> {
+    if given.is_instance_of::<PyDict>() {
+        return Ok((name.to_owned(), py.import("json")?.call_method1("dumps", (given,))?.extract()?));
+    }
+    let path: PathBuf = given.extract()?;
+    Ok((path.display().to_string(), read(&path, largest)?))
 }
 
 fn read(path: &Path, largest: u64) -> PyResult<String> {

@@ -1,7 +1,7 @@
 //! Frames as pickle keeps them: their arrays, and what is known of each object, its masks as counts of pixels.
 
 use papsynth::scene::{Kind, Tint};
-use papsynth::truth::{Group, ObjectTruth, Part, Truth};
+use papsynth::truth::{Group, ObjectTruth, Part, Truth, UnknownTrait};
 use papsynth_dataset::{Problem, rle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -23,8 +23,17 @@ pub(crate) fn objects(truth: &Truth) -> Vec<Object> {
     let object = |o: &ObjectTruth| {
         let kind = o.kind.name().to_owned();
         (
-            (o.id, o.group().name().to_owned(), kind, o.class.clone(), o.bethesda.clone(), o.traits.clone()),
-            (o.cluster, o.centre_um, o.depth_um, o.stain, o.tint.to_owned(), o.rotation_deg, o.area_um2, o.truncated),
+            (o.id, o.group().name().to_owned(), kind, o.class.clone(), o.bethesda.clone(), o.traits.to_string()),
+            (
+                o.cluster,
+                o.centre_um,
+                o.depth_um,
+                o.stain,
+                o.tint_name().to_owned(),
+                o.rotation_deg,
+                o.area_um2,
+                o.truncated,
+            ),
             (rle::encode(&o.amodal, *width, *height), rle::encode(&o.front, *width, *height)),
             (o.defocus_um.clone(), o.detectability.clone()),
         )
@@ -58,18 +67,19 @@ fn restored(object: Object, [width, height]: [usize; 2], planes: usize) -> PyRes
         Some(Group::Debris) => Part::Whole,
         None => return Err(unknown("group", &group)),
     };
+    let named = (!tint.is_empty()).then(|| Tint::by_name(&tint).ok_or_else(|| unknown("tint", &tint)));
     Ok(ObjectTruth {
         id,
         part,
         kind: Kind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| unknown("kind", &kind))?,
         class,
         bethesda,
-        traits,
+        traits: traits.try_into().map_err(|error: UnknownTrait| damaged(&format!("object {id}: {error}")))?,
         cluster,
         centre_um,
         depth_um,
         stain,
-        tint: Tint::name_of(&tint).ok_or_else(|| unknown("tint", &tint))?,
+        tint: named.transpose()?,
         rotation_deg,
         area_um2,
         truncated,

@@ -431,8 +431,7 @@ fn bright_field<'py>(
     let made = py.detach(|| {
         let params = optics_psf::MicroscopeParams { na, condenser_na, ..Default::default() };
         let microscope = optics_psf::Microscope::new(&params)?;
-        let params =
-            optics_psf::BrightFieldParams { width, height, depths_um: vec![defocus_um], ..Default::default() };
+        let params = optics_psf::BrightFieldParams { width, height, depths_um: vec![defocus_um], ..Default::default() };
         let field = optics_psf::BrightField::new(&microscope, &params)?;
         let mut specimen = field.specimen();
         field.set_absorbance(&mut specimen, 0, &values);

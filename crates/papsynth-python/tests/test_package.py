@@ -62,6 +62,20 @@ def test_truth_agrees_with_itself(frame):
     assert frame.labels is frame.labels, "made once"
 
 
+def test_a_scene_can_be_changed_and_rendered(tmp_path):
+    engine = papsynth.Engine(SMALL)
+    scene = engine.scene(seed=7, index=3)
+    before = engine.render(7, 3)
+    assert np.array_equal(engine.render(scene=scene).image, before.image)
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    assert np.array_equal(papsynth.render(SMALL, scene=tmp_path / "scene.json").image, before.image)
+    scene["objects"][0]["centre_um"] = [5.0, 5.0]
+    assert not np.array_equal(engine.render(scene=scene).image, before.image)
+    scene["objects"][0]["depth_um"] = None
+    with pytest.raises(ValueError, match=r"objects\[0\]"):
+        engine.render(scene=scene)
+
+
 @pytest.mark.skipif(PROGRAM is None, reason="PAPSYNTH does not name the program")
 def test_bytes_are_those_of_the_command_line(tmp_path):
     for preset, words, recipe in ((None, WORDS, SMALL), ("high-grade", [], "high-grade")):

@@ -223,7 +223,7 @@ fn told(truth: &ObjectTruth, is_front: bool) -> Value {
         "depth_um": truth.depth_um,
         "area_um2": truth.area_um2,
         "stain": truth.stain,
-        "tint": truth.tint,
+        "tint": truth.tint_name(),
         "rotation_deg": truth.rotation_deg,
         "truncated": truth.truncated,
         "defocus_um": truth.defocus_um,

@@ -275,6 +275,35 @@ pub enum Cause {
         slide_px: [u32; 2],
     },
 
+    /// A text is not JSON.
+    #[error("this is not a scene of papsynth: {0}")]
+    NotAScene(#[source] serde_json::Error),
+    /// A scene has no list of objects.
+    #[error("objects: expected a list of objects")]
+    NoObjects,
+    /// A text or a truth value, second, stands in place of a number.
+    #[error("{0}: {1} is not a number")]
+    NotANumber(String, String),
+    /// A scene is a frame of a whole slide.
+    #[error("`frame` and `plot` belong to whole slides; only scenes of single fields are read")]
+    SlideScene,
+    /// An object of a scene is not valid.
+    #[error("objects[{index}] (id {id}): {cause}")]
+    Object {
+        /// Its place in the list, from 0.
+        index: usize,
+        /// Its id, as it was written.
+        id: serde_json::Value,
+        /// Why.
+        #[source]
+        cause: Box<Cause>,
+    },
+    /// Two objects of a scene have the same id.
+    #[error("id: another object has the same id")]
+    SameId,
+    /// An object reaches too far for the pixels of its scene; second, how far it may reach.
+    #[error("it reaches {0:.0} µm; with pixels of this size at most {1:.0} µm are accepted")]
+    Reach(f64, f64),
     /// A cell of the scene has a class that the recipe does not have.
     #[error("the scene holds a cell of class `{0}`, which its recipe does not")]
     ForeignClass(String),

@@ -12,6 +12,7 @@ mod error;
 mod frame;
 mod fuse;
 pub mod key;
+#[cfg(feature = "learn")]
 pub mod learn;
 pub mod model;
 mod phantom;

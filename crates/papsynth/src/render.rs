@@ -262,8 +262,8 @@ impl Rendering {
         let grid_um = self.scene.grid().pixel_um;
         let kind = object.body.kind();
         let tint = match &object.body {
-            Body::Cell(body) if piece.part != Part::Nucleus => body.tint.name(),
-            _ => "",
+            Body::Cell(body) if piece.part != Part::Nucleus => Some(body.tint),
+            _ => None,
         };
         let (class, stain) = match &object.body {
             Body::Cell(body) if piece.part == Part::Nucleus => (body.class.as_str(), body.nucleus.absorbance),
@@ -276,7 +276,7 @@ impl Rendering {
             kind,
             class: class.to_owned(),
             bethesda: object.bethesda.clone(),
-            traits: phantom.traits.join(";"),
+            traits: phantom.traits.iter().copied().collect(),
             cluster: object.cluster,
             centre_um: self.scene.place_um(object),
             depth_um: object.depth_um,

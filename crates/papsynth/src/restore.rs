@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use optics_psf::{Border, Gaussian, Scratch};
 
 use crate::error::Cause;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, lay};
 use crate::recipe::Restore;
 use crate::scene::Scene;

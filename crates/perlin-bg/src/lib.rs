@@ -1,10 +1,13 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod background;
 mod error;
 mod fractal;
 mod illumination;
 mod kernel;
+#[cfg(feature = "noise")]
+mod noise_fn;
 mod perlin;
 mod rows;
 mod unit;

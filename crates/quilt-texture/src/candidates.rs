@@ -1,5 +1,5 @@
 use crate::Source;
-use crate::scan::LANES;
+use crate::source::LANES;
 
 /// The places in one source where a patch lies wholly under the mask.
 #[derive(Debug, Clone)]

@@ -1,7 +1,6 @@
-use crate::quilter::Origin;
 use crate::seam::{feather, min_cut};
 use crate::source::ROW_PADDING;
-use crate::{QuiltParams, Seam, Source, Texture};
+use crate::{Origin, QuiltParams, Seam, Source, Texture};
 
 /// The texture while it is being stitched: whole patches, cut to size at the end.
 pub(crate) struct Canvas {

@@ -2,7 +2,7 @@ use multiversion::multiversion;
 use portable_numerics::random::uniform;
 use rand_core::Rng;
 
-use crate::scan::LANES;
+use crate::source::LANES;
 
 /// What a number of random tries would choose, from the costs and weights of all candidates.
 ///

@@ -3,6 +3,8 @@
 
 mod candidates;
 mod canvas;
+#[cfg(feature = "image")]
+mod convert;
 mod distance;
 mod draw;
 mod error;
@@ -12,9 +14,11 @@ mod scan;
 mod seam;
 mod source;
 mod spectral;
+mod texture;
 
 pub use error::Error;
 pub use params::{Acceptance, CentreBias, QuiltParams, Seam, Search};
-pub use quilter::{Origin, Quilter, Texture};
+pub use quilter::Quilter;
 pub use rand_core::Rng;
 pub use source::Source;
+pub use texture::{Origin, Texture};

@@ -5,9 +5,10 @@ use crate::candidates::Candidates;
 use crate::canvas::Canvas;
 use crate::distance::centrality;
 use crate::draw::{below_exp, exp_below, outcome_of_tries, slots_between};
-use crate::scan::{LANES, Laid, Template, Tolerance, scan};
-use crate::source::COVERED;
+use crate::scan::{Laid, Template, Tolerance, scan};
+use crate::source::{COVERED, LANES};
 use crate::spectral::Spectral;
+use crate::texture::Texture;
 use crate::{Acceptance, CentreBias, Error, QuiltParams, Search, Source};
 
 /// Places drawn before one is taken although the weighting is against it: enough for a weight of
@@ -35,27 +36,6 @@ struct Donor<'a> {
     source: &'a Source,
     candidates: Candidates,
     spectral: Option<Spectral>,
-}
-
-/// A synthesised texture.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Texture {
-    /// Row by row from the top, in units of the sources; 0 outside the target.
-    pub pixels: Vec<f32>,
-    /// Where each pixel came from, or most of it where a seam is feathered; `None` outside the
-    /// target.
-    pub origins: Vec<Option<Origin>>,
-    /// Width, px.
-    pub width: usize,
-}
-
-/// A pixel of a source.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Origin {
-    /// Which of the sources given to [`Quilter::new`].
-    pub source: usize,
-    /// Index into the pixels given to [`Source::new`].
-    pub pixel: usize,
 }
 
 /// A place for the upper left pixel of a patch.

@@ -2,9 +2,7 @@ use multiversion::multiversion;
 
 use crate::Source;
 use crate::candidates::Candidates;
-
-/// Candidates compared at once: one vector of AVX-512, two of AVX, four of NEON.
-pub(crate) const LANES: usize = 32;
+use crate::source::LANES;
 
 /// The order in which the pixels of a template are compared, modulo its length: spread over the
 /// whole template first, so that a quarter or half of them suffices to reject most candidates.

@@ -1,8 +1,11 @@
 use crate::Error;
 use crate::distance::centrality;
 
+/// Candidates compared at once: one vector of AVX-512, two of AVX, four of NEON.
+pub(crate) const LANES: usize = 32;
+
 /// Pixels behind the end of each row, so that a block of candidates may be read past it.
-pub(crate) const ROW_PADDING: usize = crate::scan::LANES;
+pub(crate) const ROW_PADDING: usize = LANES;
 
 /// Coverage from which a pixel counts as belonging to the mask.
 pub(crate) const COVERED: f32 = 0.5;

@@ -2,7 +2,8 @@ use num_complex::Complex64;
 use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
 use crate::candidates::Candidates;
-use crate::scan::{LANES, Template};
+use crate::scan::Template;
+use crate::source::LANES;
 use crate::{QuiltParams, Source};
 
 /// Compares a template with all places of one source at once by Fourier transforms:

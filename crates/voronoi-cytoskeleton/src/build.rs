@@ -4,8 +4,8 @@
 //! then a walk around its site: neighbouring edges share a vertex, or the walk goes along the border in between.
 
 use crate::diagram::{Diagram, Edge};
-use crate::error::Error;
-use crate::geometry::{Point, along, dot, sub};
+use crate::error::{Error, require_coordinates};
+use crate::geometry::{Moments, Point, along, dot, sub};
 use crate::window::Window;
 use spade::handles::DirectedEdgeHandle;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
@@ -52,6 +52,42 @@ pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error>
     builder.walk_cells();
     let Builder { vertices, inner, edges, cell_ends, cell_vertices, .. } = builder;
     Ok(Diagram { window, sites, vertices, inner, edges, cell_ends, cell_vertices })
+}
+
+impl Diagram {
+    /// The diagram of `sites` in `window`.
+    ///
+    /// # Errors
+    /// [`Error::Sites`] for no sites or two in one place, [`Error::SiteOutside`], [`Error::Coordinate`].
+    pub fn new(sites: &[Point], window: &Window) -> Result<Self, Error> {
+        require_coordinates("site", sites)?;
+        if let Some(index) = sites.iter().position(|&site| !window.contains(site)) {
+            return Err(Error::SiteOutside { index, point: sites[index] });
+        }
+        build(sites.to_vec(), window.clone())
+    }
+
+    /// Moves every site to the centroid of its cell: one pass of Lloyd's algorithm
+    /// ([doi:10.1137/S0036144599352836](https://doi.org/10.1137/S0036144599352836), the paper's reference 27).
+    ///
+    /// # Differences from the paper
+    /// The centroids are those of the polygons, exact; the released program estimates them from 2000 random points.
+    pub fn relax(&mut self) {
+        let centroids = (0..self.sites.len())
+            .map(|cell| {
+                let site = self.sites[cell];
+                let Moments { area, first, .. } = self.moments(cell);
+                let centroid = [site[0] + first[0] / area, site[1] + first[1] / area];
+                // A cell too thin to have a centroid in floating point keeps its site.
+                if self.window.contains(centroid) { centroid } else { site }
+            })
+            .collect();
+        // Cells are disjoint and convex, so their centroids differ; where rounding makes two of them one, the diagram
+        // is as relaxed as it can be.
+        if let Ok(relaxed) = build(centroids, self.window.clone()) {
+            *self = relaxed;
+        }
+    }
 }
 
 struct Builder<'a> {

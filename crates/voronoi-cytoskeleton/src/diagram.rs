@@ -1,5 +1,3 @@
-use crate::build::build;
-use crate::error::{Error, require_coordinates};
 use crate::geometry::{Moments, Point};
 use crate::window::Window;
 
@@ -30,18 +28,6 @@ pub struct Diagram {
 }
 
 impl Diagram {
-    /// The diagram of `sites` in `window`.
-    ///
-    /// # Errors
-    /// [`Error::Sites`] for no sites or two in one place, [`Error::SiteOutside`], [`Error::Coordinate`].
-    pub fn new(sites: &[Point], window: &Window) -> Result<Self, Error> {
-        require_coordinates("site", sites)?;
-        if let Some(index) = sites.iter().position(|&site| !window.contains(site)) {
-            return Err(Error::SiteOutside { index, point: sites[index] });
-        }
-        build(sites.to_vec(), window.clone())
-    }
-
     /// The window.
     pub fn window(&self) -> &Window {
         &self.window
@@ -92,34 +78,12 @@ impl Diagram {
         self.moments(cell).area
     }
 
-    /// Moves every site to the centroid of its cell: one pass of Lloyd's algorithm
-    /// ([doi:10.1137/S0036144599352836](https://doi.org/10.1137/S0036144599352836), the paper's reference 27).
-    ///
-    /// # Differences from the paper
-    /// The centroids are those of the polygons, exact; the released program estimates them from 2000 random points.
-    pub fn relax(&mut self) {
-        let centroids = (0..self.sites.len())
-            .map(|cell| {
-                let site = self.sites[cell];
-                let Moments { area, first, .. } = self.moments(cell);
-                let centroid = [site[0] + first[0] / area, site[1] + first[1] / area];
-                // A cell too thin to have a centroid in floating point keeps its site.
-                if self.window.contains(centroid) { centroid } else { site }
-            })
-            .collect();
-        // Cells are disjoint and convex, so their centroids differ; where rounding makes two of them one, the diagram
-        // is as relaxed as it can be.
-        if let Ok(relaxed) = build(centroids, self.window.clone()) {
-            *self = relaxed;
-        }
-    }
-
     /// The energy that relaxing lowers: the squared distance to the nearest site, integrated over the window.
     pub fn energy(&self) -> f64 {
         (0..self.sites.len()).map(|cell| self.moments(cell).second).sum()
     }
 
-    fn moments(&self, cell: usize) -> Moments {
+    pub(crate) fn moments(&self, cell: usize) -> Moments {
         Moments::of(self.corners(cell), self.sites[cell])
     }
 }

@@ -1,6 +1,9 @@
 #![doc = include_str!("../README.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod build;
+#[cfg(any(feature = "mint", feature = "nalgebra"))]
+mod convert;
 mod diagram;
 mod draw;
 mod error;

@@ -21,7 +21,8 @@ fn full_lattice_is_the_reference_and_few_points_converge_to_it() {
         let Some(absorbance) = array(&format!("ref_{object}_absorbance")) else { return };
         for z in [0, 2, 5, -3] {
             let Some(reference) = array(&format!("ref_abbe_{object}_nac{name}_z{z:+}")) else { return };
-            let image = |source| abbe(condenser_na, source).image(&[absorbing(-f64::from(z), &absorbance)], 0.0).unwrap();
+            let image =
+                |source| abbe(condenser_na, source).image(&[absorbing(-f64::from(z), &absorbance)], 0.0).unwrap();
             let error = worst(&image(FULL), &reference);
             assert!(error < 1e-9, "{object} {name} {z}: {error}");
             let few = |points| relative(&image(Source::Vogel { points }), &reference);

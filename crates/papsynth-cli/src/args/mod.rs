@@ -51,6 +51,7 @@ pub(crate) enum Verb {
     Init(Init),
     Generate(Generate),
     Preview(Preview),
+    Render(Box<Render>),
     Learn(Learn),
     Calibrate(Calibrate),
     Judge(Judge),
@@ -216,6 +217,33 @@ pub(crate) struct Preview {
     /// Which frame of the data set
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) index: u64,
+}
+
+/// Render one scene, which may have been edited or made by another program.
+///
+/// `papsynth generate --scenes` writes the scene of each frame as JSON. With the same recipe and model an unchanged scene gives the same
+/// image, bit by bit. The image of a focus stack is the one with every object in focus.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth generate my.toml --out fields --frames 8 --scenes
+  papsynth render fields/recipe.toml --scene fields/scenes/000003.json --out again.png
+  papsynth render fields/recipe.toml --model fields/model.json --scene edited.json")]
+pub(crate) struct Render {
+    #[command(flatten)]
+    pub(crate) recipe: RecipeArgs,
+    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
+    #[arg(long, value_name = "FILE")]
+    pub(crate) model: Option<PathBuf>,
+    /// Scene to render; `-` reads standard input
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: PathBuf,
+    /// PNG to write; an older picture is replaced, no other file
+    #[arg(long, value_name = "FILE", default_value = "scene.png")]
+    pub(crate) out: PathBuf,
+    /// Threads to work with; the bytes are the same with any number [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
 }
 
 /// Show what is in a data set.

@@ -17,6 +17,9 @@ pub(crate) struct LayoutArgs {
     pub(crate) format: Vec<Format>,
     #[command(flatten)]
     pub(crate) files: FileArgs,
+    /// Write the scene of each frame too, as scenes/NNNNNN.json, which `papsynth render` reads
+    #[arg(long)]
+    pub(crate) scenes: bool,
 }
 
 /// The same, whatever the formats.
@@ -43,7 +46,7 @@ impl LayoutArgs {
         let many = self.format.is_empty() && frames > Self::MOST_IN_FOLDERS;
         let usual = if many { Format::Webdataset } else { Format::Folder };
         let formats = if self.format.is_empty() { vec![usual] } else { self.format.clone() };
-        (self.files.layout(formats), many)
+        (Layout { scenes: self.scenes, ..self.files.layout(formats) }, many)
     }
 }
 

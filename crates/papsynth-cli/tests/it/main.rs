@@ -6,6 +6,7 @@ mod hostile;
 mod judge;
 mod match_fields;
 mod memory;
+mod scenes;
 mod sets;
 mod slide;
 mod study;

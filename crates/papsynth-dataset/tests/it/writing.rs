@@ -219,7 +219,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
         assert_eq!(get(i, "id"), object.id.to_string());
         assert_eq!(get(i, "area_px"), object.amodal.area().to_string());
         assert_eq!(get(i, "front_area_px"), object.front.area().to_string());
-        assert_eq!(get(i, "traits"), object.traits);
+        assert_eq!(get(i, "traits"), object.traits.to_string());
         assert_eq!(get(i, "truncated"), object.truncated.to_string());
         assert_eq!(get(i, "depth_um").parse(), Ok(object.depth_um));
         let list: Vec<f64> = get(i, "detectability").split(';').map(|v| v.parse().unwrap()).collect();

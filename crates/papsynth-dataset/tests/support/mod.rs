@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
 use papsynth::scene::{
-    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics, View,
+    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
+    Tint, View,
 };
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, front_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
@@ -136,12 +137,12 @@ fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &
         kind,
         class: class.to_owned(),
         bethesda: if kind == Kind::Cell { "NILM".to_owned() } else { String::new() },
-        traits: "flap;pyknotic".to_owned(),
+        traits: [Trait::Flap, Trait::Pyknotic].into_iter().collect(),
         cluster: 1,
         centre_um: [3.25, 7.5],
         depth_um,
         stain: 0.3,
-        tint: if part == Part::Cytoplasm { "cyanophilic" } else { "" },
+        tint: (part == Part::Cytoplasm).then_some(Tint::Cyanophilic),
         rotation_deg: 12.5,
         area_um2: amodal.area() as f64 / 16.0,
         truncated: amodal.bounds().is_some_and(|b| b.x == 0),

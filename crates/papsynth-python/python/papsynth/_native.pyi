@@ -7,7 +7,15 @@ from numpy.typing import NDArray
 
 class Engine:
     def __new__(cls, recipe: Any = None, model: dict[str, Any] | str | PathLike[str] | None = None) -> Engine: ...
-    def render(self, seed: int = 0, index: int = 0, *, threads: int = 1) -> Frame: ...
+    def render(
+        self,
+        seed: int = 0,
+        index: int = 0,
+        *,
+        threads: int = 1,
+        scene: dict[str, Any] | str | PathLike[str] | None = None,
+    ) -> Frame: ...
+    def scene(self, seed: int = 0, index: int = 0) -> dict[str, Any]: ...
     @property
     def recipe(self) -> str: ...
     @property

@@ -69,7 +69,7 @@ def engine(recipe=None, model=None) -> _native.Engine:
     return made
 
 
-def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: int = 1) -> _native.Frame:
+def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: int = 1, scene=None) -> _native.Frame:
     """Makes an image or focus stack, and its truth.
 
     Parameters
@@ -84,6 +84,9 @@ def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: i
         A model, such as `papsynth.learn` returns, or the path of a model or class file, laid over the model that ships.
     threads : int
         Threads that work on it; 0 for as many as there are processors. The bytes are the same.
+    scene : None, dict, str or os.PathLike
+        A scene to image in place of the one of seed and index: as `Engine.scene` returns it, perhaps changed, or the path of a
+        JSON file that ``papsynth generate --scenes`` wrote.
 
     Returns
     -------
@@ -99,8 +102,8 @@ def render(recipe=None, seed: int = 0, index: int = 0, *, model=None, threads: i
     MemoryError
         If a frame of the recipe may need more memory than there is, where the system tells.
     ValueError
-        If the scene cannot be drawn, or the model cannot be used.
+        If the scene cannot be drawn or is not valid, or the model cannot be used.
     OverflowError, TypeError
         If seed or index are no whole numbers in their range.
     """
-    return engine(recipe, model).render(seed, index, threads=threads)
+    return engine(recipe, model).render(seed, index, threads=threads, scene=scene)

@@ -1,13 +1,13 @@
 //! Rod-shaped bacteria ("Bacilli"): short bent lines of even width with round ends, some in chains.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::ground::{Lie, cluster_id, member_number};
+use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Thing};
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::tile::{Point, Tile};
 use crate::phantom::wobble::placed;
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 use crate::random;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
@@ -39,7 +39,8 @@ section! {
 }
 
 /// A rod-shaped bacterium or a chain of them, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bacillus {
     /// Length of a rod, µm.
     pub length_um: f64,
@@ -58,8 +59,8 @@ pub struct Bacillus {
 /// Chains have this many rods at most.
 const LONGEST_CHAIN: usize = 4;
 
-impl Kinds for Bacilli {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Bacillus> for Bacilli {
+    fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
         for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "cluster");
             let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
@@ -118,7 +119,7 @@ impl Thing for Bacillus {
         let middle = rods.iter().flatten().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
         let count = (self.rods * (PARTS + 1)) as f64;
         let middle = if self.rods > 1 { middle.map(|sum| sum / count) } else { [0.0; 2] };
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         for point in rods.iter_mut().flatten() {
             *point = placed([point[0] - middle[0], point[1] - middle[1]], turn, site.centre);
         }
@@ -141,7 +142,7 @@ impl Thing for Bacillus {
             1 => area / (site.pixel_um * site.pixel_um),
             _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
         };
-        let dyes = site.scene.dyes.bacillus;
+        let dyes = site.dyes.bacillus;
         Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
     }
 }

@@ -1,12 +1,12 @@
 //! Bare nuclei: nuclei of intermediate cells that have lost their cytoplasm but for faint shreds.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
@@ -35,7 +35,8 @@ section! {
 }
 
 /// A bare nucleus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BareNucleus {
     /// Radius of the disc of the same area, µm.
     pub radius_um: f64,
@@ -51,8 +52,8 @@ pub struct BareNucleus {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for BareNuclei {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<BareNucleus> for BareNuclei {
+    fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
         let dyes = ground.cyanophilic();
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
@@ -117,6 +118,6 @@ impl Thing for BareNucleus {
             let half_width = site.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }
-        nucleus.finish(site.scene.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
+        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
     }
 }

@@ -1,11 +1,11 @@
 //! Air bubbles in the mountant: circles as bright as the field, with a dark rim that throws the light out.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::recipe::number::{Count, Number};
@@ -30,7 +30,8 @@ section! {
 }
 
 /// An air bubble, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Bubble {
     /// Radius, µm.
     pub radius_um: f64,
@@ -42,8 +43,8 @@ pub struct Bubble {
     pub phase_rad: f64,
 }
 
-impl Kinds for Bubbles {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Bubble> for Bubbles {
+    fn draw(&self, ground: &mut Ground<'_, Bubble>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -86,6 +87,6 @@ impl Thing for Bubble {
             *value = cover[index] * (self.absorbance * steep * steep) as f32;
             index += 1;
         });
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

@@ -1,18 +1,19 @@
 //! *Candida*: pseudohyphae, long and septate with constrictions and branches, and budding yeasts.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
+use crate::truth::traits::Trait;
 
 section! {
     /// *Candida*: colonies of pseudohyphae and budding yeasts.
@@ -49,7 +50,7 @@ section! {
 }
 
 /// What a piece of *Candida* is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Growth {
     /// A pseudohypha with its branches and buds.
@@ -59,7 +60,8 @@ pub enum Growth {
 }
 
 /// A pseudohypha or a yeast, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Candida {
     /// What it is.
     pub growth: Growth,
@@ -83,8 +85,8 @@ pub struct Candida {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Candidas {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Candida> for Candidas {
+    fn draw(&self, ground: &mut Ground<'_, Candida>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.colonies)) {
             let mut rng = ground.stream(index, "colony");
@@ -190,8 +192,8 @@ impl Thing for Candida {
         }
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         phantom.traits.push(match self.growth {
-            Growth::Hypha => "hypha",
-            Growth::Yeast => "yeast",
+            Growth::Hypha => Trait::Hypha,
+            Growth::Yeast => Trait::Yeast,
         });
         phantom
     }

@@ -3,16 +3,18 @@
 //! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
 //! cell's row in the truth has the trait `clue`.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::paint::{Painting, Stroke};
+use super::site::Site;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Tile;
-use crate::phantom::{Phantom, Pools};
 use crate::random;
 use crate::recipe::number::Number;
 use crate::recipe::section::{named, section};
-use crate::scene::{Body, FieldNumbers, Object, Scene};
+use crate::scene::numbers::FieldNumbers;
+use crate::truth::traits::Trait;
 
 section! {
     /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
@@ -33,7 +35,8 @@ section! {
 }
 
 /// The coat of a clue cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Coat {
     /// Coccobacilli per µm² where it is dense.
     pub density: f64,
@@ -48,15 +51,15 @@ pub struct Coat {
 }
 
 impl ClueCells {
-    /// Gives cells their coats.
-    pub(super) fn draw(&self, field: &FieldNumbers, objects: &mut [Object]) {
+    /// Gives cells, by their numbers, their coats.
+    pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
         let share = field.draw(named!("debris.clue_cells", self.share));
         if share <= 0.0 {
             return;
         }
-        for object in objects.iter_mut().filter(|object| matches!(object.body, Body::Cell(_))) {
-            let mut rng = field.key.stream("cell", object.number, "coat");
-            object.coat = random::chance(share, &mut rng).then(|| Coat {
+        for (number, coat) in cells {
+            let mut rng = field.key.stream("cell", number, "coat");
+            *coat = random::chance(share, &mut rng).then(|| Coat {
                 density: self.density.draw(&mut rng),
                 cover: self.cover.draw(&mut rng),
                 beyond_um: self.beyond_um.draw(&mut rng),
@@ -85,10 +88,10 @@ const TUFTED: f64 = 0.15;
 const RIM_UM: f64 = 2.0;
 
 /// Lays its coat on a cell.
-pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: &mut Phantom) {
-    let (Some(coat), Some(cell)) = (&object.coat, phantom.pieces.first()) else { return };
-    let mut rng = scene.stream("cell", object, "coat.shape");
-    let pixel_um = scene.grid().pixel_um;
+pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
+    let Some(cell) = phantom.pieces.first() else { return };
+    let (pools, pixel_um) = (site.pools, site.pixel_um);
+    let mut rng = site.stream("coat.shape");
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
     let whole = cell.coverage.clone().repeated(cell.cover_step);
     let corner = whole.origin.map(|at| at as f64);
@@ -133,8 +136,8 @@ pub(crate) fn cover(scene: &Scene, pools: &Pools<'_>, object: &Object, phantom: 
         let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
         painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
-    *phantom = core::mem::take(phantom).stained(painting.absorbance, scene.dyes.bacillus);
-    phantom.traits.push("clue");
+    *phantom = core::mem::take(phantom).stained(painting.absorbance, site.dyes.bacillus);
+    phantom.traits.push(Trait::Clue);
 }
 
 /// A tile on the place of a wider one.

@@ -1,13 +1,13 @@
 //! Cocci and coccobacilli: round bacteria in pairs, chains and clouds. A colony is one object.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::number::{Count, Number};
@@ -38,7 +38,8 @@ section! {
 }
 
 /// A colony of cocci, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Colony {
     /// Number of cocci.
     pub cocci: usize,
@@ -56,8 +57,8 @@ pub struct Colony {
     pub phase_rad: f64,
 }
 
-impl Kinds for Cocci {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Colony> for Cocci {
+    fn draw(&self, ground: &mut Ground<'_, Colony>) {
         for number in 0..ground.count(named!(self.colonies)) {
             let mut rng = ground.stream(number, "body");
             let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
@@ -116,7 +117,7 @@ impl Thing for Colony {
             let stroke = Stroke::even([at[0] - dx, at[1] - dy], [at[0] + dx, at[1] + dy], site.px(size * half_width));
             painting.stroke(&stroke, self.absorbance);
         }
-        painting.finish(site.scene.dyes.bacillus, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.bacillus, self.phase_rad, self.absorbance)
     }
 }
 

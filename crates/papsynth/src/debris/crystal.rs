@@ -1,11 +1,11 @@
 //! Precipitated dye: dark, angular, refracting grains.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
@@ -31,7 +31,8 @@ section! {
 }
 
 /// A grain of dye, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Crystal {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -43,8 +44,8 @@ pub struct Crystal {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Crystals {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Crystal> for Crystals {
+    fn draw(&self, ground: &mut Ground<'_, Crystal>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");

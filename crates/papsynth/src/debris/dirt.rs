@@ -1,12 +1,12 @@
 //! The faint dirt of the background: flecks of a micrometre or two, many of them, hardly darker than empty slide.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
@@ -40,7 +40,8 @@ section! {
 }
 
 /// A fleck of dirt, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fleck {
     /// Length, µm.
     pub length_um: f64,
@@ -64,8 +65,8 @@ const SCATTER_UM: f64 = 1.2;
 /// Spread of the directions of flecks that lie as their drift does, degrees.
 const ASTRAY_DEG: f64 = 14.0;
 
-impl Kinds for Dirt {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Fleck> for Dirt {
+    fn draw(&self, ground: &mut Ground<'_, Fleck>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.drifts)) {
             let mut rng = ground.stream(index, "drift");

@@ -1,12 +1,12 @@
 //! Dust on the glass, so far from the cells that only its shade is seen.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::crystal::shard;
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
@@ -26,7 +26,8 @@ section! {
 }
 
 /// A grain of dust, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Grain {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -34,8 +35,8 @@ pub struct Grain {
     pub absorbance: f64,
 }
 
-impl Kinds for Dust {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Grain> for Dust {
+    fn draw(&self, ground: &mut Ground<'_, Grain>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -61,6 +62,6 @@ impl Thing for Grain {
         let outline = site.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
         let mut painting = site.painting(&outline, 0.0);
         painting.fill(&outline, self.absorbance);
-        painting.finish(site.scene.dyes.speckle, 0.0, self.absorbance)
+        painting.finish(site.dyes.speckle, 0.0, self.absorbance)
     }
 }

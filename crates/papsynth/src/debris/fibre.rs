@@ -1,12 +1,12 @@
 //! Fibres of cotton and cloth: long, of even width, sharply bounded, with refracting edges.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::number::{Count, Number};
@@ -33,7 +33,8 @@ section! {
 }
 
 /// A fibre, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fibre {
     /// Length, µm.
     pub length_um: f64,
@@ -47,8 +48,8 @@ pub struct Fibre {
     pub phase_rad: f64,
 }
 
-impl Kinds for Fibres {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Fibre> for Fibres {
+    fn draw(&self, ground: &mut Ground<'_, Fibre>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -112,6 +113,6 @@ impl Thing for Fibre {
         for ((value, cover), inner) in values {
             *value = self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0));
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

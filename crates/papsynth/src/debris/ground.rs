@@ -1,25 +1,41 @@
-//! The slide on which debris is strewn: where its cells lie, and the clusters that lie among them.
+//! The slide on which debris of one kind is strewn: where its cells lie, and the clusters that lie among them.
 
-use super::{ClueCells, Kind};
 use crate::key::Stream;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
-use crate::scene::{Body, FieldNumbers, FieldStain, Object, View};
+use crate::scene::numbers::FieldNumbers;
+use crate::scene::stain::FieldStain;
+use crate::scene::view::View;
 
-/// A field whose cells have their places, and to which objects are added kind by kind.
-pub(crate) struct Ground<'a> {
-    field: &'a FieldNumbers,
-    stain: &'a FieldStain<'a>,
-    size_um: [f64; 2],
-    cells: Vec<CellPlace>,
-    /// The name of the kind that is drawn, and of its section.
+/// A field whose cells have their places.
+pub(crate) struct Field<'a> {
+    pub(crate) view: View,
+    pub(crate) numbers: &'a FieldNumbers,
+    pub(crate) stain: &'a FieldStain<'a>,
+    pub(crate) cells: Vec<CellPlace>,
+    /// What may lie on a part of a slide: how much there is relative to a field, and where it stays.
+    pub(crate) sieve: Option<Sieve<'a>>,
+}
+
+/// A field on which objects of one kind are strewn.
+pub(crate) struct Ground<'a, T> {
+    field: &'a Field<'a>,
+    /// The name of the kind, and of its section.
     kind: &'static str,
     section: &'static str,
     lies_on_glass: bool,
-    /// What may lie on a part of a slide: how much there is relative to a field, and where it stays.
-    sieve: Option<Sieve<'a>>,
-    objects: &'a mut Vec<Object>,
+    pub(super) strewn: Vec<Strewn<T>>,
+}
+
+/// An object that was strewn, and what it is.
+pub(crate) struct Strewn<T> {
+    /// Its number within its kind.
+    pub(crate) number: u64,
+    /// Its cluster; 0 if it is alone.
+    pub(crate) cluster: u32,
+    pub(crate) lie: Lie,
+    pub(crate) thing: T,
 }
 
 /// What is strewn on a part of a slide.
@@ -33,10 +49,10 @@ pub(crate) struct Sieve<'a> {
 }
 
 /// Where a cell lies, for what lies on it.
-struct CellPlace {
-    centre_um: [f64; 2],
-    depth_um: f64,
-    radius_um: f64,
+pub(crate) struct CellPlace {
+    pub(crate) centre_um: [f64; 2],
+    pub(crate) depth_um: f64,
+    pub(crate) radius_um: f64,
 }
 
 /// Where a cluster lies, and how wide it is.
@@ -47,10 +63,10 @@ pub(super) struct Cluster {
 }
 
 /// Where an object lies.
-pub(super) struct Lie {
-    pub(super) centre_um: [f64; 2],
-    pub(super) depth_um: f64,
-    pub(super) rotation_deg: f64,
+pub(crate) struct Lie {
+    pub(crate) centre_um: [f64; 2],
+    pub(crate) depth_um: f64,
+    pub(crate) rotation_deg: f64,
 }
 
 /// Height of what lies on a cell above the cell's middle, µm.
@@ -59,98 +75,61 @@ const ON_TOP_UM: f64 = 0.8;
 /// Share of what lies with a cell that lies beneath it.
 const BENEATH: f64 = 0.25;
 
-impl<'a> Ground<'a> {
-    pub(crate) fn new(
-        view: View,
-        field: &'a FieldNumbers,
-        stain: &'a FieldStain<'a>,
-        objects: &'a mut Vec<Object>,
-    ) -> Self {
-        let place = |object: &Object| match &object.body {
-            Body::Cell(body) => {
-                let (centre_um, depth_um) = (object.centre_um, object.depth_um);
-                Some(CellPlace { centre_um, depth_um, radius_um: body.radius_um })
-            }
-            _ => None,
-        };
-        let cells = objects.iter().filter_map(place).collect();
-        Self {
-            field,
-            stain,
-            size_um: view.size_um(),
-            cells,
-            kind: "",
-            section: "",
-            lies_on_glass: false,
-            sieve: None,
-            objects,
-        }
-    }
-
-    /// The same for a part of a slide.
-    pub(crate) fn through(self, sieve: Sieve<'a>) -> Self {
-        Self { sieve: Some(sieve), ..self }
-    }
-
-    /// Gives cells their coats.
-    pub(super) fn dress(&mut self, clue_cells: &ClueCells) {
-        clue_cells.draw(self.field, self.objects);
-    }
-
-    pub(super) fn begin(&mut self, kind: Kind, section: &'static str) {
-        (self.kind, self.section, self.lies_on_glass) = (kind.name(), section, kind.lies_on_glass());
+impl<'a, T> Ground<'a, T> {
+    pub(super) fn new(field: &'a Field<'a>, kind: &'static str, section: &'static str, lies_on_glass: bool) -> Self {
+        Self { field, kind, section, lies_on_glass, strewn: Vec::new() }
     }
 
     /// A number of the section that is drawn once a field, as a count.
     pub(super) fn count(&self, (name, number): (&str, &Number)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
-        let Some(sieve) = &self.sieve else { return self.field.count((&path, number)) as u64 };
+        let Some(sieve) = &self.field.sieve else { return self.field.numbers.count((&path, number)) as u64 };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        let wanted = self.field.draw((&path, number)).max(0.0) * sieve.share * more;
-        let further = random::chance(wanted - wanted.floor(), &mut self.field.key.stream("field", 1, &path));
+        let wanted = self.field.numbers.draw((&path, number)).max(0.0) * sieve.share * more;
+        let further = random::chance(wanted - wanted.floor(), &mut self.field.numbers.key.stream("field", 1, &path));
         wanted as u64 + u64::from(further)
     }
 
     /// The stream of a purpose of one object of the kind.
     pub(super) fn stream(&self, number: u64, purpose: &str) -> Stream {
-        self.field.key.stream(self.kind, number, purpose)
+        self.field.numbers.key.stream(self.kind, number, purpose)
     }
 
     /// Dyes as this field was stained.
     pub(super) fn dyes(&self, dyes: &DyeAmounts) -> dye_spectra::Amounts {
-        self.stain.balanced(dyes)
+        self.field.stain.balanced(dyes)
     }
 
     /// How strongly the field's nuclei are stained.
     pub(super) fn nuclear_stain(&self) -> f64 {
-        self.stain.nucleus
+        self.field.stain.nucleus
     }
 
     /// Dyes of pale cytoplasm.
     pub(super) fn cyanophilic(&self) -> dye_spectra::Amounts {
-        self.stain.cyanophilic()
+        self.field.stain.cyanophilic()
     }
 
     /// Any place of the field.
     pub(super) fn anywhere(&self, rng: &mut Stream) -> [f64; 2] {
-        let [width, height] = self.size_um;
+        let [width, height] = self.field.view.size_um();
         [random::between(0.0, width, rng), random::between(0.0, height, rng)]
     }
 
     /// A place and depth on a cell or anywhere.
     pub(super) fn spot(&self, on_cells: &Number, rng: &mut Stream) -> ([f64; 2], f64) {
         let Cluster { centre_um, depth_um, .. } = self.cluster(on_cells, &Number::Fixed(0.0), rng);
-        (centre_um, depth_um - Self::beneath_um(rng))
+        (centre_um, depth_um - beneath_um(rng))
     }
 
     /// A cluster on a cell or anywhere.
     pub(super) fn cluster(&self, on_cells: &Number, radius_um: &Number, rng: &mut Stream) -> Cluster {
         let on_cell = random::chance(on_cells.draw(rng), rng);
         let radius_um = radius_um.draw(rng);
-        let cell = random::below(self.cells.len(), rng);
+        let cell = random::below(self.field.cells.len(), rng);
         let (angle, distance) = (random::direction(rng), random::uniform(rng).sqrt());
         let anywhere = self.anywhere(rng);
-        match self.cells.get(cell) {
+        match self.field.cells.get(cell) {
             Some(cell) if on_cell => {
                 let reach = distance * cell.radius_um * 0.9;
                 let centre_um =
@@ -161,33 +140,15 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// How far below the top of a cell something lies that is strewn with it: mostly not at all, sometimes beneath it.
-    fn beneath_um(rng: &mut Stream) -> f64 {
-        if random::chance(BENEATH, rng) { 2.0 * ON_TOP_UM } else { 0.0 }
-    }
-
     /// Lets an object lie there; what is alone is of cluster 0.
-    pub(super) fn add(&mut self, number: u64, cluster: u32, lie: Lie, thing: impl Into<Body>) {
-        let Lie { centre_um, depth_um, rotation_deg } = lie;
-        let body: Body = thing.into();
-        if let Some(sieve) = self.sieve.as_ref().filter(|_| !self.lies_on_glass) {
-            let mut rng = self.field.key.stream(self.kind, number, "stays");
-            if !random::chance((sieve.stays)(centre_um), &mut rng) {
+    pub(super) fn add(&mut self, number: u64, cluster: u32, lie: Lie, thing: T) {
+        if let Some(sieve) = self.field.sieve.as_ref().filter(|_| !self.lies_on_glass) {
+            let mut rng = self.stream(number, "stays");
+            if !random::chance((sieve.stays)(lie.centre_um), &mut rng) {
                 return;
             }
         }
-        self.objects.push(Object {
-            id: 0,
-            number,
-            cluster,
-            plot: None,
-            centre_um,
-            depth_um,
-            rotation_deg,
-            bethesda: String::new(),
-            coat: None,
-            body,
-        });
+        self.strewn.push(Strewn { number, cluster, lie, thing });
     }
 }
 
@@ -222,4 +183,9 @@ pub(super) fn member_number(cluster: u64, member: u64) -> u64 {
 pub(super) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
     dx * dx + dy * dy < distance * distance
+}
+
+/// How far below the top of a cell something lies that is strewn with it: mostly not at all, sometimes beneath it.
+fn beneath_um(rng: &mut Stream) -> f64 {
+    if random::chance(BENEATH, rng) { 2.0 * ON_TOP_UM } else { 0.0 }
 }

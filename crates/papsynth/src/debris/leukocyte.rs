@@ -3,13 +3,13 @@
 mod neutrophil;
 mod round;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::ground::{Cluster, Lie, cluster_id, member_number, near};
+use super::ground::{Cluster, Ground, Lie, cluster_id, member_number, near};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Thing};
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::random;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
@@ -59,7 +59,8 @@ section! {
 }
 
 /// A white blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Leukocyte {
     /// How the nucleus is shaped.
     pub form: NucleusForm,
@@ -83,8 +84,8 @@ pub struct Leukocyte {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Leukocytes {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Leukocyte> for Leukocytes {
+    fn draw(&self, ground: &mut Ground<'_, Leukocyte>) {
         let dyes = ground.cyanophilic();
         for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "cluster");

@@ -14,7 +14,8 @@ mod crystal;
 mod dirt;
 mod dust;
 mod fibre;
-mod ground;
+pub(crate) mod ground;
+mod kind;
 mod leukocyte;
 mod mucus;
 mod out_of_focus;
@@ -28,9 +29,9 @@ mod trichomonad;
 
 use serde::{Deserialize, Serialize};
 
-use crate::phantom::{Phantom, Pools};
+use crate::phantom::piece::Phantom;
 use crate::recipe::section::section;
-use crate::scene::{CellBody, Object, Scene};
+use crate::scene::cell::CellBody;
 
 pub use bacillus::{Bacilli, Bacillus};
 pub use bare_nucleus::{BareNuclei, BareNucleus};
@@ -43,7 +44,6 @@ pub use crystal::{Crystal, Crystals};
 pub use dirt::{Dirt, Fleck};
 pub use dust::{Dust, Grain};
 pub use fibre::{Fibre, Fibres};
-pub(crate) use ground::{Ground, Sieve};
 pub use leukocyte::{Leukocyte, Leukocytes, NucleusForm};
 pub use mucus::{Mucus, Strand};
 pub use out_of_focus::{Blob, OutOfFocus};
@@ -53,25 +53,9 @@ pub use smudge::{Smudge, Smudges};
 pub use speckle::{SpeckForm, Speckle, Speckles};
 pub use trichomonad::{Trichomonad, Trichomonads};
 
-use site::Site;
-
-/// A section of the recipe: how many objects of a kind there are, and what they are like.
-trait Kinds {
-    /// Draws every object of a field.
-    fn draw(&self, ground: &mut Ground<'_>);
-}
-
-/// The numbers drawn of one object.
-trait Thing {
-    /// The strength of its stain.
-    fn absorbance(&self) -> f64;
-
-    /// How far it may reach from its middle, µm, where pixels have that size.
-    fn reach_um(&self, pixel_um: f64) -> f64;
-
-    /// What it absorbs where it lies.
-    fn phantom(&self, site: &Site<'_>) -> Phantom;
-}
+use ground::{Field, Ground, Strewn};
+use kind::{Kinds, Thing};
+pub(crate) use site::Site;
 
 macro_rules! kinds {
     ($($(#[$doc:meta])* $field:ident: $Section:ident { $count:ident } => $Kind:ident($Thing:ident), $name:literal;)*) => {
@@ -94,7 +78,7 @@ macro_rules! kinds {
         }
 
         /// What an object is, its numbers drawn.
-        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "kind", rename_all = "kebab-case")]
         pub enum Body {
             /// An epithelial cell.
@@ -147,6 +131,14 @@ macro_rules! kinds {
                 }
             }
 
+            /// What it absorbs; nothing of cells, which are made together.
+            pub(crate) fn phantom(&self, site: &Site<'_>) -> Option<Phantom> {
+                match self {
+                    Self::Cell(_) => None,
+                    $(Self::$Kind(thing) => Some(thing.phantom(site)),)*
+                }
+            }
+
             /// The strength of its stain: of a cell that of its cytoplasm.
             pub(crate) fn absorbance(&self) -> f64 {
                 match self {
@@ -155,12 +147,6 @@ macro_rules! kinds {
                 }
             }
         }
-
-        $(impl From<$Thing> for Body {
-            fn from(thing: $Thing) -> Self {
-                Self::$Kind(thing)
-            }
-        })*
 
         impl Debris {
             /// A slide with nothing but cells.
@@ -172,22 +158,18 @@ macro_rules! kinds {
                 }
             }
 
-            /// Draws everything that lies on a slide with these cells.
-            pub(crate) fn draw(&self, ground: &mut Ground<'_>) {
-                ground.dress(&self.clue_cells);
-                $(
-                    ground.begin(Kind::$Kind, stringify!($field));
-                    self.$field.draw(ground);
-                )*
-            }
-        }
-
-        /// What an object absorbs; nothing of cells, which are made together.
-        pub(crate) fn phantom(scene: &Scene, pools: &Pools<'_>, object: &Object) -> Option<Phantom> {
-            let site = Site::new(scene, pools, object);
-            match &object.body {
-                Body::Cell(_) => None,
-                $(Body::$Kind(thing) => Some(thing.phantom(&site)),)*
+            /// Draws everything that lies on a slide with these cells, kind by kind.
+            pub(crate) fn draw(&self, field: &Field<'_>) -> Vec<Strewn<Body>> {
+                let mut strewn = Vec::new();
+                $({
+                    let kind = Kind::$Kind;
+                    let mut ground = Ground::new(field, kind.name(), stringify!($field), kind.lies_on_glass());
+                    self.$field.draw(&mut ground);
+                    strewn.extend(ground.strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| {
+                        Strewn { number, cluster, lie, thing: Body::$Kind(thing) }
+                    }));
+                })*
+                strewn
             }
         }
     };

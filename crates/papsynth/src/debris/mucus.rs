@@ -1,12 +1,12 @@
 //! Strands of mucus: long bundles of faint parallel fibres.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::random;
@@ -39,7 +39,8 @@ section! {
 }
 
 /// A strand of mucus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Strand {
     /// Length, µm.
     pub length_um: f64,
@@ -57,8 +58,8 @@ pub struct Strand {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Mucus {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Strand> for Mucus {
+    fn draw(&self, ground: &mut Ground<'_, Strand>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count(named!(self.strands)) {
             let mut rng = ground.stream(number, "body");

@@ -1,12 +1,12 @@
 //! Objects far outside the depth of the slide ("Out of focus objects"): shaped and textured like leukocytes.
 
 use rand_core::Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::ground::Lie;
+use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Point, Tile, area};
 use crate::phantom::wobble::{placed, textured, wobbled_circle};
 use crate::random;
@@ -32,7 +32,8 @@ section! {
 }
 
 /// An object far outside the depth of the slide, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Blob {
     /// Radius, µm.
     pub radius_um: f64,
@@ -44,8 +45,8 @@ pub struct Blob {
     pub absorbance: f64,
 }
 
-impl Kinds for OutOfFocus {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Blob> for OutOfFocus {
+    fn draw(&self, ground: &mut Ground<'_, Blob>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -80,7 +81,7 @@ impl Thing for Blob {
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius = site.px(self.radius_um);
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         let shape: Vec<Point> = wobbled_circle(radius, self.alpha, self.beta, &mut rng)
             .iter()
             .map(|p| placed(*p, turn, site.centre))
@@ -89,6 +90,6 @@ impl Thing for Blob {
         coverage.cover(&shape);
         let mut tile = coverage.clone();
         textured(&mut tile, site.centre, NOISE_CELL * radius, 3, NOISE_STRENGTH, self.absorbance, rng.next_u64());
-        Phantom::whole(tile, coverage, area(&shape), site.scene.dyes.nucleus)
+        Phantom::whole(tile, coverage, area(&shape), site.dyes.nucleus)
     }
 }

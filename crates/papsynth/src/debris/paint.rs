@@ -2,9 +2,9 @@
 
 use dye_spectra::Amounts;
 
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::pools::{Look, Pool, SIDE, Texels};
 use crate::phantom::tile::{Point, Tile};
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 
 /// An object that is being painted.
 pub(super) struct Painting {

@@ -1,17 +1,18 @@
 //! Red blood cells: discs with a pale middle, and the ghosts that are left of them.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
+use crate::truth::traits::Trait;
 
 section! {
     /// Red blood cells, in clusters.
@@ -40,7 +41,8 @@ section! {
 }
 
 /// A red blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct RedCell {
     /// Diameter, µm.
     pub diameter_um: f64,
@@ -56,8 +58,8 @@ pub struct RedCell {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for RedCells {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<RedCell> for RedCells {
+    fn draw(&self, ground: &mut Ground<'_, RedCell>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "cluster");
@@ -125,7 +127,7 @@ impl Thing for RedCell {
         });
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         if self.ghost {
-            phantom.traits.push("ghost");
+            phantom.traits.push(Trait::Ghost);
         }
         phantom
     }

@@ -1,12 +1,12 @@
 //! Scratches in the glass: long, thin, straight and interrupted lines.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Point;
 use crate::random;
 use crate::recipe::number::{Count, Number};
@@ -32,7 +32,8 @@ section! {
 }
 
 /// A scratch, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scratch {
     /// Length, µm.
     pub length_um: f64,
@@ -44,8 +45,8 @@ pub struct Scratch {
     pub phase_rad: f64,
 }
 
-impl Kinds for Scratches {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Scratch> for Scratches {
+    fn draw(&self, ground: &mut Ground<'_, Scratch>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -98,6 +99,6 @@ impl Thing for Scratch {
         for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
             *value = self.absorbance as f32 * cover;
         }
-        painting.finish(site.scene.dyes.speckle, self.phase_rad, self.absorbance)
+        painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

@@ -1,32 +1,39 @@
 //! What the phantom of one object is made with.
 
-use crate::debris::paint::Painting;
-use crate::key::Stream;
-use crate::phantom::Pools;
+use super::paint::Painting;
+use crate::key::{Key, Stream};
+use crate::phantom::pools::Pools;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::placed;
-use crate::scene::{Object, Scene};
+use crate::scene::imaging::SceneDyes;
+use crate::scene::view::View;
 
 /// Where an object lies, and what its phantom may use.
-pub(super) struct Site<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) object: &'a Object,
-    pub(super) pools: &'a Pools<'a>,
+pub(crate) struct Site<'a> {
+    pub(crate) dyes: SceneDyes,
+    /// The image and its pixels.
+    pub(crate) view: View,
+    /// Points of the grid along the side of a pixel.
+    pub(crate) oversampling: usize,
+    /// The key of the object's streams, its kind and its number.
+    pub(crate) key: Key,
+    pub(crate) kind: &'static str,
+    pub(crate) number: u64,
+    pub(crate) pools: &'a Pools<'a>,
     /// Size of a point of the grid, µm.
-    pub(super) pixel_um: f64,
-    /// Its middle on the grid.
-    pub(super) centre: Point,
+    pub(crate) pixel_um: f64,
+    /// Its middle.
+    pub(crate) centre_um: [f64; 2],
+    /// The same on the grid.
+    pub(crate) centre: Point,
+    /// Direction it is turned to, degrees.
+    pub(crate) rotation_deg: f64,
 }
 
-impl<'a> Site<'a> {
-    pub(super) fn new(scene: &'a Scene, pools: &'a Pools<'a>, object: &'a Object) -> Self {
-        let grid = scene.grid();
-        Self { scene, object, pools, pixel_um: grid.pixel_um, centre: grid.to_px(object.centre_um) }
-    }
-
+impl Site<'_> {
     /// The object's own stream for a purpose.
     pub(super) fn stream(&self, purpose: &str) -> Stream {
-        self.scene.stream(self.object.body.kind().name(), self.object, purpose)
+        self.key.stream(self.kind, self.number, purpose)
     }
 
     /// A length in points of the grid.
@@ -37,7 +44,7 @@ impl<'a> Site<'a> {
     /// Where a point of the object lies, given in µm from its middle before it is turned.
     pub(super) fn place(&self, point_um: Point) -> Point {
         let point = point_um.map(|um| self.px(um));
-        placed(point, self.object.rotation_deg.to_radians(), self.centre)
+        placed(point, self.rotation_deg.to_radians(), self.centre)
     }
 
     /// The same for a curve.

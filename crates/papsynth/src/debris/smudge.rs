@@ -1,12 +1,12 @@
 //! Amorphous debris: greyish, granular, irregular clumps and shreds, frayed at their rims.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::paint::Painting;
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::recipe::dyes::DyeAmounts;
@@ -40,7 +40,8 @@ section! {
 }
 
 /// A clump of amorphous debris, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Smudge {
     /// Diameter of the disc of its area before it is frayed, µm.
     pub diameter_um: f64,
@@ -60,8 +61,8 @@ pub struct Smudge {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Smudges {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Smudge> for Smudges {
+    fn draw(&self, ground: &mut Ground<'_, Smudge>) {
         let dyes = ground.dyes(&self.dyes);
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
@@ -108,7 +109,7 @@ impl Thing for Smudge {
         let reach = 1.0 + (REACH - 1.0) * self.ragged.min(1.5);
         let corners = site.places(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
         let mut painting = site.painting(&corners, 0.0);
-        let turn = site.object.rotation_deg.to_radians();
+        let turn = site.rotation_deg.to_radians();
         let (sin, cos) = (libm::sin(turn), libm::cos(turn));
         let (a_px, b_px) = (site.px(a), site.px(b));
         // Where the clump is: 1 in its middle, 0 on its outline, before waves push that in and out.

@@ -1,12 +1,12 @@
 //! Specks of dust and stain ("Speckles"): a pixel, extended by one in a random direction, then dilated.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::ground::Lie;
+use super::ground::{Ground, Lie};
+use super::kind::{Kinds, Thing};
 use super::site::Site;
-use super::{Ground, Kinds, Thing};
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
 use crate::phantom::tile::Tile;
-use crate::phantom::{LEAST_ABSORBANCE, Phantom};
 use crate::random;
 use crate::recipe::number::{Count, Number};
 use crate::recipe::section::{named, section};
@@ -39,7 +39,8 @@ section! {
 }
 
 /// A speck of dust or stain, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Speckle {
     /// How it was grown.
     pub form: SpeckForm,
@@ -51,8 +52,8 @@ pub struct Speckle {
     pub phase_rad: f64,
 }
 
-impl Kinds for Speckles {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Speckle> for Speckles {
+    fn draw(&self, ground: &mut Ground<'_, Speckle>) {
         for number in 0..ground.count(named!(self.count)) {
             let mut rng = ground.stream(number, "body");
             let centre_um = ground.anywhere(&mut rng);
@@ -80,9 +81,9 @@ impl Thing for Speckle {
 
     fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
-        let pixel = site.scene.oversampling() as f64;
+        let pixel = site.oversampling as f64;
         // Its pixels are those of the image, whatever grid it is drawn on.
-        let [x, y] = site.scene.view.to_px(site.object.centre_um).map(libm::round);
+        let [x, y] = site.view.to_px(site.centre_um).map(libm::round);
         let [dx, dy] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][random::below(4, &mut rng)];
         let seeds = [[x, y], [x + dx, y + dy]];
         let to_grid = |p: [f64; 2]| p.map(|v| (v + 0.5) * pixel - 0.5);
@@ -111,6 +112,6 @@ impl Thing for Speckle {
         for value in &mut tile.values {
             *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
         }
-        Phantom::whole(tile, coverage, area, site.scene.dyes.speckle).refracting(self.phase_rad, self.absorbance)
+        Phantom::whole(tile, coverage, area, site.dyes.speckle).refracting(self.phase_rad, self.absorbance)
     }
 }

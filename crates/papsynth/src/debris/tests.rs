@@ -8,7 +8,8 @@ use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::pools::PoolMaker;
 use crate::recipe::{Number, Optics, Preset, Recipe};
-use crate::scene;
+use crate::scene::{self, Object, Scene};
+use crate::truth::traits::Trait;
 
 const KEY: Key = Key { seed: 17, index: 3 };
 
@@ -33,9 +34,9 @@ fn draw(debris: &Debris) -> Scene {
 
 /// The phantoms of everything but cells.
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
-    let maker = PoolMaker::new().unwrap();
+    let maker = PoolMaker::new();
     let pools = maker.make(scene.key);
-    let made = |object: &Object| Some((object.body.kind(), phantom(scene, &pools, object)?));
+    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &pools, object)?));
     scene.objects.iter().filter_map(made).collect()
 }
 
@@ -197,8 +198,8 @@ fn a_coat_follows_its_cell() {
     let rows = |frame: &crate::Frame| frame.finished.truth.objects.clone();
     for (coated, bare) in rows(&coated).iter().zip(&rows(&bare)) {
         assert_eq!(coated.amodal, bare.amodal, "a coat is no part of the cell's outline");
-        assert!(coated.traits.split(';').any(|word| word == "clue"), "{}", coated.traits);
-        assert!(!bare.traits.contains("clue"));
+        assert!(coated.traits.contains(Trait::Clue), "{}", coated.traits);
+        assert!(!bare.traits.contains(Trait::Clue));
     }
     let sum = |frame: &crate::Frame| frame.planes[0].noise_free.iter().map(|v| f64::from(*v)).sum::<f64>();
     assert!(sum(&coated) < sum(&bare), "bacteria absorb");
@@ -276,11 +277,11 @@ fn hardly_anything_reaches_farther_than_it_says() {
         let mut debris = Debris::none();
         counted(&mut debris, kind, 150.0);
         let scene = draw(&debris);
-        let maker = PoolMaker::new().unwrap();
+        let maker = PoolMaker::new();
         let pools = maker.make(scene.key);
         let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
         for object in &scene.objects {
-            let Some(phantom) = phantom(&scene, &pools, object) else { continue };
+            let Some(phantom) = crate::phantom::debris(&scene, &pools, object) else { continue };
             let says = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
             let share = reach_um(&scene, object, &phantom) / says;
             (told, most) = (told + 1, most.max(share));

@@ -1,12 +1,12 @@
 //! Trichomonads: pale pear-shaped flagellates with a small, spindle-shaped nucleus.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
-use super::{Kinds, Thing};
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::smooth;
@@ -40,7 +40,8 @@ section! {
 }
 
 /// A trichomonad, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Trichomonad {
     /// Length, µm.
     pub length_um: f64,
@@ -54,8 +55,8 @@ pub struct Trichomonad {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds for Trichomonads {
-    fn draw(&self, ground: &mut Ground<'_>) {
+impl Kinds<Trichomonad> for Trichomonads {
+    fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.groups)) {
             let mut rng = ground.stream(index, "group");
@@ -148,7 +149,7 @@ impl Thing for Trichomonad {
         // Flagella are no part of its outline: nobody would draw it round them.
         painting
             .finish(self.dyes, 0.0, self.absorbance)
-            .stained(nucleus.absorbance, site.scene.dyes.nucleus)
+            .stained(nucleus.absorbance, site.dyes.nucleus)
             .stained(hairs.absorbance, self.dyes)
     }
 }

@@ -6,63 +6,20 @@ mod cell;
 mod chromatin;
 mod form;
 mod nucleus;
+pub(crate) mod piece;
 pub(crate) mod pools;
 mod studio;
 pub(crate) mod tile;
 pub(crate) mod wobble;
 
-use std::borrow::Cow;
-
-use dye_spectra::Amounts;
-
-use crate::debris;
+use crate::debris::{Site, cover};
 use crate::error::Cause;
 use crate::profile::Stage;
-use crate::scene::{Body, Object, Scene, View};
-use crate::truth::Part;
+use crate::scene::{Body, CellBody, Object, Scene, View};
 
+pub(crate) use piece::{Phantom, Piece};
 pub(crate) use pools::Pools;
 pub(crate) use studio::Studio;
-use tile::Tile;
-
-/// A part of an object, in its own tile.
-#[derive(Debug, Clone)]
-pub(crate) struct Piece {
-    /// Which part it is.
-    pub(crate) part: Part,
-    /// What it absorbs along the light's path when it is in focus, decadic.
-    pub(crate) absorbance: Tile,
-    /// Share that its in-focus outline covers of each square of so many grid points a side.
-    pub(crate) coverage: Tile,
-    pub(crate) cover_step: usize,
-    /// Area within its outline, also outside the image, px².
-    pub(crate) area_px: f64,
-    /// Whether its absorbance was taken from an image, and has been through optics already.
-    pub(crate) imaged: bool,
-    /// What stains it, where its absorbance is 1.
-    pub(crate) dyes: Amounts,
-    /// How late light comes, radians, where its absorbance is 1.
-    pub(crate) phase_rad: f64,
-}
-
-impl Piece {
-    /// The share of each of the camera's pixels that its outline covers, with `n` grid points along a pixel.
-    pub(crate) fn cover_of_pixels(&self, n: usize) -> Cow<'_, Tile> {
-        match n / self.cover_step {
-            1 => Cow::Borrowed(&self.coverage),
-            finer => Cow::Owned(self.coverage.coarsened(finer)),
-        }
-    }
-}
-
-/// What an object absorbs.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Phantom {
-    /// Its parts, from the outside in.
-    pub(crate) pieces: Vec<Piece>,
-    /// Variants that its shape shows, for the truth.
-    pub(crate) traits: Vec<&'static str>,
-}
 
 /// Makes the phantoms of a run of objects.
 ///
@@ -74,7 +31,7 @@ pub(crate) fn make(
     pools: &Pools<'_>,
     objects: &[&Object],
 ) -> Result<Vec<Phantom>, Cause> {
-    let cells: Vec<(&Object, &crate::scene::CellBody)> = objects
+    let cells: Vec<(&Object, &CellBody)> = objects
         .iter()
         .filter_map(|object| match &object.body {
             Body::Cell(body) => Some((*object, &**body)),
@@ -84,18 +41,38 @@ pub(crate) fn make(
     let mut made = cell::make(studio, scene, pools, &cells)?;
     studio.watch.time(Stage::Debris, || {
         for ((object, _), phantom) in cells.iter().zip(&mut made) {
-            debris::cover(scene, pools, object, phantom);
+            if let Some(coat) = &object.coat {
+                cover(coat, &site(scene, pools, object), phantom);
+            }
         }
         let mut cells = made.into_iter();
-        let mut phantom = |object: &&Object| {
-            debris::phantom(scene, pools, object).or_else(|| cells.next()).expect("a phantom was made of every cell")
-        };
+        let mut phantom =
+            |object: &&Object| debris(scene, pools, object).or_else(|| cells.next()).expect("every cell was made");
         Ok(objects.iter().map(&mut phantom).collect())
     })
 }
 
-/// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.
-pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
+/// The phantom of an object that is no cell.
+pub(crate) fn debris(scene: &Scene, pools: &Pools<'_>, object: &Object) -> Option<Phantom> {
+    object.body.phantom(&site(scene, pools, object))
+}
+
+fn site<'a>(scene: &Scene, pools: &'a Pools<'a>, object: &Object) -> Site<'a> {
+    let grid = scene.grid();
+    Site {
+        dyes: scene.dyes,
+        view: scene.view,
+        oversampling: scene.oversampling(),
+        key: scene.key_of(object),
+        kind: object.body.kind().name(),
+        number: object.number,
+        pools,
+        pixel_um: grid.pixel_um,
+        centre_um: object.centre_um,
+        centre: grid.to_px(object.centre_um),
+        rotation_deg: object.rotation_deg,
+    }
+}
 
 /// Number of objects that are worth making together: the lanes of a batch of sheets.
 pub(crate) const BATCH: usize = 16;
@@ -116,45 +93,6 @@ impl Phantom {
                 }
             }
         }
-        self
-    }
-
-    /// A phantom without parts of its own.
-    pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
-        let piece = Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        };
-        Self { pieces: vec![piece], traits: Vec::new() }
-    }
-
-    /// The same, through which light comes late.
-    pub(crate) fn refracting(mut self, phase_rad: f64, absorbance: f64) -> Self {
-        for piece in &mut self.pieces {
-            piece.phase_rad = phase_rad / absorbance.max(LEAST_ABSORBANCE);
-        }
-        self
-    }
-
-    /// The same with something in it that other dyes stain: it counts as part of the whole.
-    pub(crate) fn stained(mut self, absorbance: Tile, dyes: Amounts) -> Self {
-        let coverage = Tile { origin: absorbance.origin, width: 1, values: vec![0.0] };
-        self.pieces.push(Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px: 0.0,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        });
         self
     }
 }

@@ -3,15 +3,17 @@
 use optics_psf::{Border, Gaussian, Method};
 
 use super::chromatin::standardise;
+use super::form;
+use super::piece::Piece;
 use super::studio::{ClassStudio, Studio};
 use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
-use super::{Piece, form};
 use crate::error::Cause;
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::{CellBody, NucleusBody, Object, Scene};
-use crate::truth::Part;
+use crate::scene::cell::{CellBody, NucleusBody};
+use crate::scene::field::{Object, Scene};
+use crate::truth::part::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
 const POINTS: usize = 64;

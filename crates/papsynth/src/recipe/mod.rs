@@ -14,7 +14,7 @@ mod presets;
 mod print;
 pub(crate) mod scan;
 pub(crate) mod section;
-mod specimen;
+pub(crate) mod specimen;
 #[cfg(test)]
 mod tests;
 mod whole;

@@ -216,6 +216,7 @@ macro_rules! section {
     (@struct $Name:ident ($visible:vis $Drawn:ident) $({ [$(#[$about:meta])*] $field:ident $Kind:ident $low:tt })*) => {
         #[doc = concat!("A [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ") with its numbers drawn.")]
         #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
         $visible struct $Drawn { $($(#[$about])* pub $field: section!(@value $Kind),)* }
 
         impl $Name {

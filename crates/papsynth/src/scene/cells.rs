@@ -9,12 +9,16 @@ use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{CellMix, Number, Recipe};
 
+use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::draw::FieldNumbers;
+use super::field::Object;
 use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Body, CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Object, View, WeightMap};
+use super::view::View;
+use super::weight::WeightMap;
+use crate::debris::Body;
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(

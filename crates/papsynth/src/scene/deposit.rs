@@ -3,7 +3,7 @@
 use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
 use crate::recipe::Deposit as Section;
 use crate::recipe::scan::SceneDeposit;
 

@@ -1,36 +1,20 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
-use crate::debris::Ground;
 use crate::error::{Cause, Error};
-use crate::key::{Key, Stream};
+use crate::key::Key;
 use crate::model::Model;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Illumination, Light, Number, Optics, Picture, Recipe};
+use crate::recipe::{Illumination, Light, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
-use super::stain::{FieldStain, slide_of};
-use super::{Fusion, Restoration, Scene, SceneBackground, SceneIllumination, SceneLight, SceneOptics, View, WeightMap};
-
-/// Draws numbers that belong to a whole field, each from a stream named after its place in the recipe: giving one of
-/// them a distribution changes none of the others.
-pub(crate) struct FieldNumbers {
-    pub(crate) key: Key,
-}
-
-impl FieldNumbers {
-    pub(super) fn stream(&self, path: &str) -> Stream {
-        self.key.stream("field", 0, path)
-    }
-
-    pub(crate) fn draw(&self, (path, number): (&str, &Number)) -> f64 {
-        number.draw(&mut self.stream(path))
-    }
-
-    pub(crate) fn count(&self, (path, number): (&str, &Number)) -> usize {
-        number.draw_count(&mut self.stream(path))
-    }
-}
+use super::field::Scene;
+use super::imaging::{Fusion, Restoration, SceneBackground, SceneIllumination, SceneLight, SceneOptics};
+use super::numbers::FieldNumbers;
+use super::stain::FieldStain;
+use super::strew::strew;
+use super::view::View;
+use super::weight::WeightMap;
 
 /// Draws what lies on the slide and how it is imaged.
 ///
@@ -46,9 +30,9 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         pixel_um: pixel_um(recipe, &field),
     };
     let fail = |cause| Error::Image { index: key.index, cause };
-    let stain = FieldStain::draw(recipe, &field);
+    let stain = FieldStain::draw(&recipe.stain, &field, slide_of(recipe, key));
     let mut objects = draw_cells(recipe, model, weight_map, view, &field, &stain).map_err(fail)?;
-    recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects));
+    strew(&recipe.debris, view, &field, &stain, None, &mut objects);
     if u32::try_from(objects.len()).is_err() {
         return Err(fail(Cause::TooManyObjects(objects.len())));
     }
@@ -56,6 +40,11 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         object.id = id;
     }
     Ok(Scene { objects, slide: slide_of(recipe, key), ..empty(recipe, view, &field, &stain) })
+}
+
+/// The number of the slide that an image shows.
+fn slide_of(recipe: &Recipe, key: Key) -> u64 {
+    key.index / recipe.slide.fields.max(1) as u64
 }
 
 /// The view without anything on it: how it is imaged.

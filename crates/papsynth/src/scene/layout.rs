@@ -7,8 +7,8 @@ use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{Labels, Layout};
 
-use super::View;
-use super::draw::FieldNumbers;
+use super::numbers::FieldNumbers;
+use super::view::View;
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.

@@ -13,11 +13,14 @@ use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
 use super::deposit::{DENSEST, Deposit};
-use super::draw::{FieldNumbers, empty, pixel_um};
+use super::draw::{empty, pixel_um};
+use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
+use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::{Object, Plot, Scene, View};
-use crate::debris::{Ground, Sieve};
+use super::strew::strew;
+use super::view::View;
+use crate::debris::ground::Sieve;
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -115,7 +118,7 @@ impl Population {
     /// The population of a slide whose own key is given, and the slide without anything on it.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
-        let stain = FieldStain::of_slide(recipe, &slide);
+        let stain = FieldStain::of_slide(&recipe.stain, &slide);
         let pixel_um = pixel_um(recipe, &slide);
         let view = View { width: 0, height: 0, pixel_um };
         let scene = empty(recipe, view, &slide, &stain);
@@ -217,7 +220,7 @@ impl Population {
     fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(&self.scatter, at);
         let (outside, mean) = match self.scatter {
             Scatter::Anywhere => (1.0, 1.0),
@@ -283,7 +286,7 @@ impl Population {
         let number = number(at);
         let field = FieldNumbers { key: self.key.plot(number) };
         let slide = FieldNumbers { key: self.key };
-        let stain = FieldStain::of_slide(&self.recipe, &slide);
+        let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
         // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
@@ -305,7 +308,7 @@ impl Population {
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
         let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        self.recipe.debris.draw(&mut Ground::new(view, &field, &stain, &mut objects).through(sieve));
+        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });

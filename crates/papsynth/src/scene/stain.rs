@@ -5,20 +5,18 @@ use rand_core::Rng;
 
 use crate::key::Key;
 use crate::random;
+use crate::recipe::dyes::DyeAmounts;
+use crate::recipe::number::Number;
 use crate::recipe::section::named;
-use crate::recipe::{DyeAmounts, Number, Recipe, TintMix};
+use crate::recipe::specimen::{Stain, TintMix};
 
-use super::draw::FieldNumbers;
-use super::{SceneDyes, Tint};
-
-/// The number of the slide that an image shows.
-pub(super) fn slide_of(recipe: &Recipe, key: Key) -> u64 {
-    key.index / recipe.slide.fields.max(1) as u64
-}
+use super::cell::Tint;
+use super::imaging::SceneDyes;
+use super::numbers::FieldNumbers;
 
 /// The stain of a field.
 pub(crate) struct FieldStain<'a> {
-    recipe: &'a Recipe,
+    stain: &'a Stain,
     /// Factor on the absorbance of cytoplasm.
     pub(super) cytoplasm: f64,
     /// Factor on the absorbance of nuclei.
@@ -30,16 +28,16 @@ pub(crate) struct FieldStain<'a> {
 }
 
 impl<'a> FieldStain<'a> {
-    pub(super) fn draw(recipe: &'a Recipe, field: &FieldNumbers) -> Self {
-        Self::of(recipe, field, &FieldNumbers { key: Key { index: slide_of(recipe, field.key), ..field.key } })
+    pub(super) fn draw(stain: &'a Stain, field: &FieldNumbers, slide: u64) -> Self {
+        Self::of(stain, field, &FieldNumbers { key: Key { index: slide, ..field.key } })
     }
 
     /// The stain of a whole slide, whose key is its own.
-    pub(super) fn of_slide(recipe: &'a Recipe, slide: &FieldNumbers) -> Self {
-        Self::of(recipe, slide, slide)
+    pub(super) fn of_slide(stain: &'a Stain, slide: &FieldNumbers) -> Self {
+        Self::of(stain, slide, slide)
     }
 
-    fn of(recipe: &'a Recipe, field: &FieldNumbers, slide: &FieldNumbers) -> Self {
+    fn of(stain: &'a Stain, field: &FieldNumbers, slide: &FieldNumbers) -> Self {
         let of_slide = |(name, number): (&str, &Number)| number.draw(&mut slide.key.stream("slide", 0, name));
         let mut balance = [1.0; DYES];
         let mut shift = |sd: f64, rng: &mut crate::key::Stream| {
@@ -47,21 +45,21 @@ impl<'a> FieldStain<'a> {
                 *factor *= libm::exp(sd * random::normal(rng));
             }
         };
-        shift(of_slide(named!(recipe.stain.slide_balance)), &mut slide.key.stream("slide", 0, "stain.balance"));
-        shift(field.draw(named!(recipe.stain.field_balance)), &mut field.key.stream("field", 0, "stain.balance"));
+        shift(of_slide(named!("stain", stain.slide_balance)), &mut slide.key.stream("slide", 0, "stain.balance"));
+        shift(field.draw(named!("stain", stain.field_balance)), &mut field.key.stream("field", 0, "stain.balance"));
         Self {
-            recipe,
-            cytoplasm: of_slide(named!(recipe.stain.slide_cytoplasm))
-                * field.draw(named!(recipe.stain.field_cytoplasm)),
-            nucleus: of_slide(named!(recipe.stain.slide_nucleus)) * field.draw(named!(recipe.stain.field_nucleus)),
-            texture: field.draw(named!(recipe.stain.field_texture)),
+            stain,
+            cytoplasm: of_slide(named!("stain", stain.slide_cytoplasm))
+                * field.draw(named!("stain", stain.field_cytoplasm)),
+            nucleus: of_slide(named!("stain", stain.slide_nucleus)) * field.draw(named!("stain", stain.field_nucleus)),
+            texture: field.draw(named!("stain", stain.field_texture)),
             balance,
         }
     }
 
     /// The dyes of what is no epithelial cell.
     pub(super) fn debris(&self) -> SceneDyes {
-        let stain = &self.recipe.stain;
+        let stain = self.stain;
         SceneDyes {
             nucleus: self.balanced(&stain.nucleus),
             bacillus: self.balanced(&stain.bacillus),
@@ -72,12 +70,12 @@ impl<'a> FieldStain<'a> {
 
     /// The dyes of pale cytoplasm.
     pub(crate) fn cyanophilic(&self) -> Amounts {
-        self.balanced(&self.recipe.stain.cyanophilic)
+        self.balanced(&self.stain.cyanophilic)
     }
 
     /// The tint of a cell, and the dyes of its cytoplasm and its nucleus.
     pub(super) fn cell<R: Rng + ?Sized>(&self, tints: &TintMix, rng: &mut R) -> (Tint, Amounts, Amounts) {
-        let stain = &self.recipe.stain;
+        let stain = self.stain;
         let weights = [&tints.cyanophilic, &tints.eosinophilic, &tints.orangeophilic].map(|weight| weight.draw(rng));
         let at = random::uniform(rng) * weights.iter().sum::<f64>();
         let (tint, dyes) = if at < weights[0] || weights[1] + weights[2] == 0.0 {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use optics_psf::{Abbe, AbbeParams, Factor, Lattice, Layer, Microscope, Source, fast_length};
 
-use super::Slide;
 use super::canvas::{Canvas, Mixer, Window};
 use super::lenses::Lens;
+use super::passage::Slide;
 use crate::error::Cause;
 use crate::scene::{SceneMicroscope, View};
 
@@ -27,10 +27,10 @@ pub(super) fn image(
     let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));
     let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
-    let layers = layers(slide, optics.slab_um, light, frame)?;
     let params =
         AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
     let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
+    let layers = layers(slide, optics.slab_um, light, frame)?;
     let whole = abbe.image(&layers, stage_um)?;
     let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
     let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();

@@ -7,14 +7,15 @@ use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
 use portable_numerics::elementary::exp10_from;
 
+use super::abbe;
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lenses::Lenses;
 use super::lights::{ColouredLight, Group, groups};
 use super::overlap::{Meets, Overlaps};
-use super::{BAND, Band, FocusAt, Light, Passage, Slide, abbe};
+use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Tile;
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{Scene, SceneLight, SceneMicroscope, View};

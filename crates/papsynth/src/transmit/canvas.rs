@@ -4,8 +4,8 @@ use dye_spectra::{Amounts, Colour, DYES};
 use multiversion::multiversion;
 use portable_numerics::elementary::exp10_from;
 
+use crate::phantom::piece::{Phantom, Piece};
 use crate::phantom::tile::{Tile, lay_at};
-use crate::phantom::{Phantom, Piece};
 use crate::truth::{COVERED, Part};
 
 /// How dyes become absorbance.

@@ -7,11 +7,11 @@ use multiversion::multiversion;
 use optics_psf::{Border, Gaussian, Method, Scratch};
 use portable_numerics::elementary::exp10_from;
 
-use super::{BAND, Band, FocusAt, Light, Passage, Slide};
+use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
+use crate::phantom::piece::{Phantom, Piece};
 use crate::phantom::tile::{TileRef, lay};
-use crate::phantom::{Phantom, Piece};
 use crate::scene::{Scene, SceneLight};
 use crate::threads::{self, Threads};
 use crate::truth::Mask;

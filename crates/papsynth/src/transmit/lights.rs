@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use optics_psf::{MicroscopeParams, Zernike};
 
-use super::Slide;
 use super::canvas::Mixer;
 use super::lenses::{Lens, Lenses};
+use super::passage::Slide;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};

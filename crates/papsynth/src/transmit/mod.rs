@@ -10,79 +10,24 @@ mod gaussian;
 mod lenses;
 mod lights;
 mod overlap;
+mod passage;
 
 use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, Scatter};
 use rand_core::Rng;
 
 use crate::error::Cause;
-use crate::phantom::Phantom;
 use crate::scene::{Scene, SceneIllumination, SceneOptics};
 use crate::threads::Threads;
-use crate::truth::Mask;
 
 use bright_field::BrightFieldPath;
 use gaussian::GaussianPath;
 pub(crate) use lenses::Lenses;
-
-/// Rows that go from light to grey levels together: few enough to stay in the cache of one core.
-pub(crate) const BAND: usize = 32;
-
-/// Which plane is in focus.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum FocusAt {
-    /// The stage stands here, µm.
-    Stage(f64),
-    /// Every object its own: the all-in-focus image.
-    Everywhere,
-}
-
-/// What is imaged: a scene, its phantoms, and the complete masks of their pieces.
-#[derive(Clone, Copy)]
-pub(crate) struct Slide<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) phantoms: &'a [Phantom],
-    pub(crate) masks: &'a [Vec<Mask>],
-}
+pub(crate) use passage::{BAND, Band, FocusAt, Light, Passage, Slide};
 
 /// What all planes of one scene share.
 pub(crate) enum LightPath {
     Gaussian(Box<GaussianPath>),
     BrightField(Box<BrightFieldPath>),
-}
-
-/// Rows of the light of one channel of a plane, as fractions of full scale.
-pub(crate) struct Band<'a> {
-    /// The first row.
-    pub(crate) first: usize,
-    /// 10^(I_b − I_p) before the spread in the image plane, where that spread is a step of its own; else empty.
-    pub(crate) sharp: &'a [f32],
-    /// The same after it, channel by channel.
-    pub(crate) spread: &'a mut [&'a mut [f32]],
-}
-
-/// Memory for the light of a plane.
-#[derive(Debug, Default)]
-pub(crate) struct Light {
-    /// I_b of Eq. 10: the logarithm of the empty slide's light, as a fraction of full scale.
-    empty_log10: Vec<f32>,
-    /// Of each channel of the picture: the absorbance, or what the objects let through; then the light.
-    channels: Vec<Vec<f32>>,
-    /// What the objects let through of light that is imaged by itself, and pictures of it.
-    lights: Vec<optics_psf::Light>,
-    pictures: Vec<Vec<f32>>,
-    /// Rows of the empty slide's light.
-    empty: Vec<f32>,
-    bands: Vec<Vec<f32>>,
-    scratch: optics_psf::Scratch,
-}
-
-/// What is known of a plane once light has come through the objects.
-#[derive(Debug, Default)]
-pub(crate) struct Passage {
-    /// Of each piece of each phantom, in their order, for each channel: its mean absorbance over its mask.
-    pub(crate) absorbances: Vec<Vec<f64>>,
-    /// Pixels where optics would have given less light than there can be, and a least one was put in its place.
-    pub(crate) floored: usize,
 }
 
 impl LightPath {

@@ -12,7 +12,7 @@ use optics_psf::{Gaussian, Method, Scratch};
 
 use super::canvas::{Window, add};
 use crate::error::Cause;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, TileRef, lay};
 use crate::threads::{self, Threads};
 

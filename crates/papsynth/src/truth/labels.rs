@@ -1,7 +1,8 @@
 //! What follows from the masks: front-most masks, label maps, layers.
 
 use super::mask::{Mask, Run, next};
-use super::{Group, Truth};
+use super::object::Truth;
+use super::part::Group;
 
 /// The id of an object at each pixel, 0 where there is none.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! Layers: objects of a kind that nobody counts are one row of the truth.
 
-use super::{Mask, ObjectTruth};
+use super::mask::Mask;
+use super::object::ObjectTruth;
 
 /// The same rows, but one for all objects of each kind that is a layer: its mask is that of all of them, its numbers
 /// are their means, its id that of the first.

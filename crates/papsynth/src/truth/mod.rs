@@ -5,120 +5,14 @@
 mod labels;
 mod layer;
 mod mask;
-
-use crate::scene::Kind;
+mod object;
+pub(crate) mod part;
+pub(crate) mod traits;
 
 pub(crate) use labels::fronts;
 pub use labels::{LabelMap, front_masks};
 pub(crate) use layer::with_layers;
 pub use mask::{Bounds, Mask, Run};
-
-/// Coverage from which on a pixel belongs to a mask.
-pub const COVERED: f32 = 0.5;
-
-/// Which part of an object a mask belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Part {
-    /// The whole cell: its cytoplasm, and the nucleus within it.
-    Cytoplasm,
-    /// The nucleus of a cell. It carries the id of its cell.
-    Nucleus,
-    /// An object that has no parts.
-    Whole,
-}
-
-/// The groups within which an object is nearer to the objective than another, each with a label map of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Group {
-    /// The cytoplasm of cells.
-    Cytoplasm,
-    /// The nuclei of cells.
-    Nucleus,
-    /// Everything that is no epithelial cell.
-    Debris,
-}
-
-impl Group {
-    /// All groups, in the order of their label maps.
-    pub const ALL: [Self; 3] = [Self::Cytoplasm, Self::Nucleus, Self::Debris];
-
-    /// The name of the group, as it stands in file names.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cytoplasm => "cytoplasm",
-            Self::Nucleus => "nucleus",
-            Self::Debris => "debris",
-        }
-    }
-}
-
-/// What is known of one object, or of one part of a cell.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ObjectTruth {
-    /// Id within the image, from 1; nucleus and cytoplasm of a cell share it.
-    pub id: u32,
-    /// Which part of the object this row is about.
-    pub part: Part,
-    /// What kind of object it is.
-    pub kind: Kind,
-    /// Class: of cells the class in the model, of all others the name of their kind.
-    pub class: String,
-    /// Bethesda category of that class, where it has one ("NILM", "HSIL", …).
-    pub bethesda: String,
-    /// Variants drawn for this object, such as "pyknotic" or "flap", separated by semicolons.
-    pub traits: String,
-    /// The cluster it was placed with (from 1), or 0 if it was placed alone.
-    pub cluster: u32,
-    /// Place of its middle, µm from the image's upper left corner.
-    pub centre_um: [f64; 2],
-    /// Depth, µm; positive towards the objective, 0 in the middle of the slide.
-    pub depth_um: f64,
-    /// Strength of its stain: the mean decadic absorbance it was given, at 0.57 µm where its dyes have the amounts of a
-    /// usual stain.
-    pub stain: f64,
-    /// The tint of a cytoplasm ("cyanophilic", "eosinophilic", "orangeophilic"); of all else empty.
-    pub tint: &'static str,
-    /// Direction it was turned to, degrees.
-    pub rotation_deg: f64,
-    /// Area of the whole object, also of what lies outside the image, µm².
-    pub area_um2: f64,
-    /// Whether part of it lies outside the image.
-    pub truncated: bool,
-    /// Its complete mask: coverage of its in-focus outline of at least one half, whatever lies over it.
-    pub amodal: Mask,
-    /// Its front-most mask: the pixels where it is nearest to the objective within its group.
-    pub front: Mask,
-    /// Distance from what is in focus in each plane, µm (`Scene::in_focus_um(plane) − depth`).
-    pub defocus_um: Vec<f64>,
-    /// How detectable it is in each plane: mean contrast over its mask, in units of the noise of one pixel there.
-    pub detectability: Vec<f64>,
-}
-
-impl ObjectTruth {
-    /// The group within which its front-most mask counts.
-    #[must_use]
-    pub fn group(&self) -> Group {
-        match self.part {
-            Part::Cytoplasm => Group::Cytoplasm,
-            Part::Nucleus => Group::Nucleus,
-            Part::Whole => Group::Debris,
-        }
-    }
-}
-
-/// What is known of one image.
-///
-/// [Label maps](Self::labels) and [layers](Self::layers) follow from the masks and are made when asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Truth {
-    /// Columns of the image.
-    pub width: usize,
-    /// Rows of the image.
-    pub height: usize,
-    /// One row for every object and every part of a cell, by id and part; objects without a pixel in the image are left out,
-    /// and all objects of a [layer](Kind::is_layer) share one.
-    pub objects: Vec<ObjectTruth>,
-}
+pub use object::{ObjectTruth, Truth};
+pub use part::{COVERED, Group, Part};
+pub use traits::{Trait, Traits, UnknownTrait};

@@ -280,7 +280,7 @@ fn cytoplasm_takes_the_tint_of_its_dyes() {
         recipe.cells = [("intermediate".to_owned(), mix.clone())].into();
         let frame = frame(&recipe, 0);
         let cell = frame.finished.truth.objects.iter().find(|o| o.part == Part::Cytoplasm).unwrap();
-        assert_eq!(cell.tint, tint);
+        assert_eq!(cell.tint_name(), tint);
         let width = frame.finished.scene.view.width;
         let mut sums = [0.0_f64; 3];
         for run in cell.amodal.runs() {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::Window;
 use core::f64::consts::TAU;
 use noise::{NoiseFn, Perlin as Rival};
 use portable_numerics::random::between;

@@ -4,11 +4,12 @@ use super::Leukocyte;
 use crate::debris::paint::{Painting, Stroke};
 use crate::debris::site::Site;
 use crate::key::Stream;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::pools::Look;
 use crate::phantom::tile::{Point, Tile};
 use crate::phantom::wobble::{placed, smooth, wobbled_circle};
 use crate::random;
+use crate::truth::traits::Trait;
 
 /// Corners of a cytoplasm's outline before it is smoothed, and points between two of them.
 const CORNERS: usize = 14;
@@ -95,9 +96,9 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
         *cover = cover.max(*inside);
     }
     let mut phantom =
-        painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).stained(nucleus.absorbance, site.scene.dyes.nucleus);
+        painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).stained(nucleus.absorbance, site.dyes.nucleus);
     if leukocyte.degenerated {
-        phantom.traits.push("degenerated");
+        phantom.traits.push(Trait::Degenerated);
     }
     phantom
 }

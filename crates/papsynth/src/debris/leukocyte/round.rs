@@ -4,7 +4,7 @@ use rand_core::Rng;
 
 use super::Leukocyte;
 use crate::debris::site::Site;
-use crate::phantom::Phantom;
+use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Point, Tile, area};
 use crate::phantom::wobble::{placed, textured, wobbled_circle};
 
@@ -23,7 +23,7 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let Leukocyte { alpha, beta, absorbance, halo, .. } = *leukocyte;
     let mut rng = site.stream("shape");
     let centre = site.centre;
-    let turn = site.object.rotation_deg.to_radians();
+    let turn = site.rotation_deg.to_radians();
     let radius = site.px(leukocyte.radius_um);
     let place = |shape: Vec<Point>| -> Vec<Point> { shape.iter().map(|p| placed(*p, turn, centre)).collect() };
     let shape = place(wobbled_circle(radius, alpha, beta, &mut rng));
@@ -44,7 +44,7 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
         *cover = cover.max(*inside);
     }
     let whole = coverage.values.iter().map(|share| f64::from(*share)).sum();
-    Phantom::whole(tile, coverage, whole, site.scene.dyes.nucleus)
+    Phantom::whole(tile, coverage, whole, site.dyes.nucleus)
 }
 
 /// Makes a nucleus thicker in its middle.

@@ -10,7 +10,7 @@ use crate::phantom::studio::Studio;
 use crate::phantom::tile::{Point, Tile, grown};
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::scene::CellBody;
+use crate::scene::cell::CellBody;
 
 /// Radius of a granule, µm (the standard deviation of its absorbance).
 const GRANULE_UM: f64 = 0.28;

@@ -9,14 +9,16 @@ mod wrinkles;
 use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
+use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
 use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
-use crate::phantom::{Phantom, Piece};
 use crate::phantom::{form, nucleus};
 use crate::profile::Stage;
-use crate::scene::{CellBody, Fold, FoldForm, Object, Scene};
-use crate::truth::Part;
+use crate::scene::cell::{CellBody, Fold, FoldForm};
+use crate::scene::field::{Object, Scene};
+use crate::truth::part::Part;
+use crate::truth::traits::Trait;
 
 /// Points of a cell's outline before its rim is roughened.
 const POINTS: usize = 180;
@@ -192,12 +194,12 @@ fn finish(
     }
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
-    let strength = body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE) as f32;
+    let strength = body.cytoplasm_absorbance.max(LEAST_ABSORBANCE) as f32;
     absorbance.values.iter_mut().zip(&coverage.values).for_each(|(value, cover)| *value *= cover * strength);
     let step = scene.grid().width / scene.sheet_grid().width;
     let area_px = coverage.sum() * (step * step) as f64;
     let absorbance = absorbance.refined(step);
-    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(crate::phantom::LEAST_ABSORBANCE);
+    let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(LEAST_ABSORBANCE);
     let cytoplasm = Piece {
         part: Part::Cytoplasm,
         absorbance,
@@ -211,16 +213,16 @@ fn finish(
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
-fn traits(body: &CellBody) -> Vec<&'static str> {
+fn traits(body: &CellBody) -> Vec<Trait> {
     let fold = body.fold.map(|fold| match fold.form {
-        FoldForm::Flap => "flap",
-        FoldForm::Roll => "rolled",
-        FoldForm::Cigar => "folded",
+        FoldForm::Flap => Trait::Flap,
+        FoldForm::Roll => Trait::Rolled,
+        FoldForm::Cigar => Trait::Folded,
     });
-    let koilocytic = body.halo.map(|_| "koilocytic");
-    let granular = (body.detail.granules > 0.0).then_some("granular");
-    let pyknotic = body.nucleus.pyknotic.then_some("pyknotic");
-    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some("wrinkled");
+    let koilocytic = body.halo.map(|_| Trait::Koilocytic);
+    let granular = (body.detail.granules > 0.0).then_some(Trait::Granular);
+    let pyknotic = body.nucleus.pyknotic.then_some(Trait::Pyknotic);
+    let wrinkled = (body.nucleus.wrinkle > 0.0).then_some(Trait::Wrinkled);
     [fold, koilocytic, granular, pyknotic, wrinkled].into_iter().flatten().collect()
 }
 

@@ -3,7 +3,7 @@
 use crate::key::Stream;
 use crate::phantom::tile::{Point, area};
 use crate::random;
-use crate::scene::CellDetail;
+use crate::scene::cell::CellDetail;
 
 /// Corners of the polygon that a flattened cell comes near to: from, and how many more at most.
 const CORNERS: [usize; 2] = [5, 5];

@@ -8,7 +8,7 @@ use portable_numerics::elementary::exp_f32;
 use super::super::tile::{Point, Tile};
 use crate::key::Stream;
 use crate::random;
-use crate::scene::CellDetail;
+use crate::scene::cell::CellDetail;
 
 /// Distance of the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;

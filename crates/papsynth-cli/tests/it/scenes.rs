@@ -1,0 +1,61 @@
+//! Scenes written, edited and rendered.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::support::{Bench, TINY};
+
+#[test]
+fn a_scene_that_is_not_changed_gives_the_same_image_bit_by_bit() {
+    let bench = Bench::new("scenes");
+    for (name, more, image) in [
+        ("plain", "", "images"),
+        ("colour", "--set light.kind=colour --set camera.bits=8", "images"),
+        ("stack", "--set focus.planes=3 --set focus.step_um=1.5", "all-in-focus"),
+    ] {
+        let run = format!("generate --out {name} --frames 2 --seed 11 --scenes {more} {TINY}");
+        bench.good(&run);
+        for index in 0..2 {
+            let scene = format!("{name}/scenes/{index:06}.json");
+            bench.good(&format!("render {name}/recipe.toml --model {name}/model.json --scene {scene} --out again.png"));
+            let bytes = |path: &str| fs::read(bench.path(path)).unwrap();
+            assert!(bytes("again.png") == bytes(&format!("{name}/{image}/{index:06}.png")), "{name} {index}");
+        }
+        // The scenes belong to the data set: they are verified, and made again.
+        bench.good(&format!("verify {name} --frames 2"));
+        let path = bench.path(&format!("{name}/scenes/000001.json"));
+        let good = fs::read(&path).unwrap();
+        fs::write(&path, b"{}").unwrap();
+        assert_eq!(bench.run(&format!("verify {name} --frames 2")).code, 2);
+        bench.good(&run);
+        assert!(fs::read(&path).unwrap() == good);
+    }
+}
+
+#[test]
+fn an_edited_scene_is_rendered_and_an_invalid_one_is_refused_by_object_and_field() {
+    let bench = Bench::new("edited-scenes");
+    bench.good(&format!("generate --out set --frames 1 --scenes {TINY}"));
+    let text = fs::read_to_string(bench.path("set/scenes/000000.json")).unwrap();
+    let mut scene: Value = serde_json::from_str(&text).unwrap();
+    let mut render = |field: &str, to: Value| {
+        let before = scene["objects"][0][field].clone();
+        scene["objects"][0][field] = to;
+        fs::write(bench.path("edited.json"), scene.to_string()).unwrap();
+        scene["objects"][0][field] = before;
+        bench.run("render set/recipe.toml --scene edited.json --out edited.png")
+    };
+    assert_eq!(render("centre_um", vec![4.0, 4.0].into()).code, 0);
+    let bytes = |path: &str| fs::read(bench.path(path)).unwrap();
+    assert!(bytes("edited.png") != bytes("set/images/000000.png"));
+    for (field, to, said) in [
+        ("depth_um", Value::from("deep"), "objects[0] (id 1): depth_um: \"deep\" is not a number"),
+        ("centre_um", vec![1e300, 0.0].into(), "objects[0] (id 1): centre_um: 1000"),
+        ("colour", "red".into(), "objects[0] (id 1): unknown field `colour`"),
+        ("id", Value::Null, "objects[0] (id null)"),
+    ] {
+        let run = render(field, to);
+        assert!(run.code == 2 && run.err.contains(said), "{field}: {}", run.err);
+    }
+}

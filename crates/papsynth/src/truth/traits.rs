@@ -1,0 +1,106 @@
+//! Variants that the shapes of objects show.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+macro_rules! traits {
+    ($($(#[$doc:meta])* $Name:ident = $name:literal,)*) => {
+        /// A variant that the shape of an object shows.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Trait {
+            $($(#[$doc])* $Name,)*
+        }
+
+        impl Trait {
+            /// All traits, in the order in which they are written.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$Name),*];
+
+            /// The name of the trait.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Name => $name,)*
+                }
+            }
+        }
+    };
+}
+
+traits! {
+    /// Part of the cell lies flat on it.
+    Flap = "flap",
+    /// Part of the cell is rolled up.
+    Rolled = "rolled",
+    /// Both sides of the cell are folded to its middle.
+    Folded = "folded",
+    /// The cytoplasm is cleared around the nucleus.
+    Koilocytic = "koilocytic",
+    /// The cytoplasm holds keratohyalin granules.
+    Granular = "granular",
+    /// The nucleus is small, dark and without structure.
+    Pyknotic = "pyknotic",
+    /// The nucleus is wrinkled.
+    Wrinkled = "wrinkled",
+    /// Bacteria cover the cell.
+    Clue = "clue",
+    /// A red blood cell that has lost its haemoglobin.
+    Ghost = "ghost",
+    /// A pseudohypha.
+    Hypha = "hypha",
+    /// A yeast.
+    Yeast = "yeast",
+    /// A leukocyte with a smudged nucleus.
+    Degenerated = "degenerated",
+}
+
+/// The traits of an object. As text their names stand between semicolons, in the order of [`Trait::ALL`].
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Traits(BTreeSet<Trait>);
+
+/// A text that is not a name of a [`Trait`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no trait `{}`", .0.escape_default())]
+pub struct UnknownTrait(String);
+
+impl Traits {
+    /// Whether a trait is among them.
+    #[must_use]
+    pub fn contains(&self, one: Trait) -> bool {
+        self.0.contains(&one)
+    }
+}
+
+impl FromIterator<Trait> for Traits {
+    fn from_iter<I: IntoIterator<Item = Trait>>(traits: I) -> Self {
+        Self(traits.into_iter().collect())
+    }
+}
+
+impl fmt::Display for Traits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<&str> = self.0.iter().map(|one| one.name()).collect();
+        f.write_str(&names.join(";"))
+    }
+}
+
+impl From<Traits> for String {
+    fn from(traits: Traits) -> Self {
+        traits.to_string()
+    }
+}
+
+impl TryFrom<String> for Traits {
+    type Error = UnknownTrait;
+
+    fn try_from(text: String) -> Result<Self, UnknownTrait> {
+        let named = |name: &str| {
+            let found = Trait::ALL.into_iter().find(|one| one.name() == name);
+            found.ok_or_else(|| UnknownTrait(name.to_owned()))
+        };
+        text.split(';').filter(|name| !name.is_empty()).map(named).collect()
+    }
+}
