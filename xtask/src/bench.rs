@@ -8,9 +8,9 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::Workspace;
-use crate::{Chore, peers, shell};
+use crate::{peers, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "bench",
@@ -18,7 +18,7 @@ pub(crate) const CHORE: Chore = Chore {
     about: "runs the benches of all crates, counts instructions, or races against good programs of others",
     details: "--save keeps the figures under a name, --against compares with such a name, FILTER picks benches by name.\n\
               `counts` counts the instructions of small works under valgrind and fails where one takes 2 % more than \
-              benches/counts.toml keeps for this compiler; --bless writes that file.\n\
+              benches/counts.json keeps for this compiler; --bless writes that file.\n\
               `peers` does the works of a table in our way and in a good program of others, in turn on one thread of this machine, and \
               prints times, ratios and what is wanted; nothing is asserted. --only runs the rows whose names begin so, --repetitions says how \
               often both sides are measured in turn (5), --record adds a line to benches/history.jsonl and draws docs/performance.svg.\n\
@@ -36,9 +36,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     let save = arguments.option("--save")?;
     let against = arguments.option("--against")?;
     // Named one by one, since the test harness of a library does not know criterion's arguments.
-    // Those that count instructions know neither.
-    let packages = workspace.packages.iter().filter(|package| package.name != counts::PACKAGE);
-    let benches = packages.flat_map(|package| &package.targets).filter(|(kind, _)| kind == "bench");
+    let benches = workspace.packages.iter().flat_map(|package| &package.targets).filter(|(kind, _)| kind == "bench");
     let mut command = workspace.cargo();
     command.args(["bench", "--workspace"]);
     for (_, name) in benches {

@@ -7,10 +7,10 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell, system};
+use crate::{dataset, shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "browser",
@@ -29,12 +29,12 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "goog
 
 fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
-    let script = |package: &str| -> Result<PathBuf> {
-        let script = workspace.root.join("crates").join(package).join("tests/browser.py");
+    let script = |name: &str| -> Result<PathBuf> {
+        let script = workspace.root.join("crates/papsynth-web/tests").join(name);
         ensure!(script.exists(), "{} is missing", workspace.shown(&script));
         Ok(script)
     };
-    let (study, view) = (script("papsynth-study")?, script("papsynth-view")?);
+    let (study, view) = (script("browser_study.py")?, script("browser_view.py")?);
     let python = match Python::system() {
         Python::Ready(python) => python,
         Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
@@ -45,15 +45,16 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let folder = workspace.target.join("browser");
     let (synthetic, other, real) = (folder.join("synthetic"), folder.join("other"), folder.join("real"));
     let small = ["--frames", "2", "--set", "field.width_px=640", "--set", "field.height_px=520"];
-    dataset::generate(workspace, &synthetic, small)?;
+    dataset::generate(workspace, &[], &synthetic, small)?;
     // What stands for real: pictures without truth, of another preset. Whether it is makes no difference to the page.
-    dataset::generate(workspace, &other, small.iter().chain(&["--preset", "high-grade", "--seed", "1"]))?;
+    dataset::generate(workspace, &[], &other, small.iter().chain(&["--preset", "high-grade", "--seed", "1"]))?;
     copy_pictures(&other.join("images"), &real)?;
     let program = workspace.target.join("release").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
     ensure!(program.exists(), "{} was not built", workspace.shown(&program));
     let stack = folder.join("stack");
     dataset::generate(
         workspace,
+        &[],
         &stack,
         small.iter().chain(&["--set", "focus.planes=5", "--set", "focus.step_um=1.5"]),
     )?;

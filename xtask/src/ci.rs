@@ -1,40 +1,54 @@
 //! Everything that has to pass before a change is taken.
 
+use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::{Outcome, in_ci};
-use crate::workspace::Workspace;
-use crate::{
-    Chore, bench, browser, covered, dataset, deps, equations, external, hashes, package, publish, shell, supply, test,
-    wasm,
-};
+use crate::chore::{Chore, Outcome, in_ci};
+use crate::workspace::{Workspace, heavy_packages};
+use crate::{bench, browser, dataset, deps, equations, external, hashes, package, publish, shell, supply, test, wasm};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "ci",
-    usage: "[--full | --changed]",
-    about: "everything that has to pass before a change is taken, at most 25 minutes on 2 cores from nothing",
+    usage: "[--full]",
+    about: "everything that has to pass before a change is taken, at most 20 minutes on 2 cores from nothing",
     details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study and the viewer in a browser, wasm32. With --full the crates that take long to build, every reader there is, packages, Python, clusters, and what other processors give; if all passes, .ci/full records what of \
-              the workspace that covers. With --changed that too, but only where it differs from what .ci/full records. All steps run even if one fails; each tells its time. Where CI \
+              readers, the study and the viewer in a browser, wasm32. With --full the crates that take long to build, every reader there is, licences, packages, Python, clusters, and what other processors give: \
+              required before a release and after a change to a file that the longer tier covers. These are listed at the end of every run without --full: \
+              the files that differ from the commit at which --full last passed, which is recorded in the target folder. All steps run even if one fails; each tells its time. Where CI \
               is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
     run,
 };
 
 type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
 
+/// Cheap ones first. The golden images are part of the tests.
+const STEPS: [Step; 12] = [
+    ("format", |workspace| run_cargo(workspace.cargo().args(["fmt", "--all", "--check"]))),
+    ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
+    ("equations", |workspace| chore(workspace, &equations::CHORE)),
+    ("real material", |_| real_material()),
+    ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
+    ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),
+    ("tests", |workspace| chore(workspace, &test::CHORE)),
+    ("data set", |workspace| chore(workspace, &dataset::CHORE)),
+    ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
+    ("external readers", |workspace| chore(workspace, &external::CHORE)),
+    ("browser", |workspace| chore(workspace, &browser::CHORE)),
+    ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
+];
+
 /// What takes heavy crates, the heavier readers, other processors, and what is done to publish; at most 80 minutes with everything before.
-const FULL: [Step; 8] = [
-    ("heavy lints", |workspace| {
-        run_cargo(workspace.cargo_heavy("clippy").args(["--all-targets", "--", "-D", "warnings"]))
-    }),
-    ("heavy docs", |workspace| {
-        run_cargo(workspace.cargo_heavy("doc").args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
-    }),
-    ("heavy tests", |workspace| run_cargo(&mut workspace.cargo_heavy("test"))),
+const FULL: [Step; 10] = [
+    ("licences", |workspace| chore(workspace, &supply::DENY)),
+    ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
+    ("heavy docs", |workspace| documentation(workspace.cargo_heavy(&["doc"]))),
+    ("heavy tests", |workspace| test::suite(workspace, Workspace::cargo_heavy, &[])),
+    ("feature doc tests", feature_doc_tests),
     ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
     ("packages", |workspace| chore(workspace, &publish::CHORE)),
     ("python package", |workspace| chore(workspace, &package::CHORE)),
@@ -42,34 +56,27 @@ const FULL: [Step; 8] = [
     ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
 ];
 
-/// Cheap ones first. The golden images are part of the tests.
-const STEPS: [Step; 13] = [
-    ("format", |workspace| cargo(workspace, &["fmt", "--all", "--check"])),
-    ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
-    ("equations", |workspace| chore(workspace, &equations::CHORE)),
-    ("real material", |_| real_material()),
-    ("lints", |workspace| {
-        let features = workspace.light_features();
-        let mut command = workspace.cargo_light("clippy");
-        run_cargo(command.args(["--all-targets", "--features", &features, "--", "-D", "warnings"]))
-    }),
-    ("documentation", documentation),
-    ("tests", |workspace| chore(workspace, &test::CHORE)),
-    ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
-    ("data set", |workspace| chore(workspace, &dataset::CHORE)),
-    ("external readers", |workspace| chore(workspace, &external::CHORE)),
-    ("browser", |workspace| chore(workspace, &browser::CHORE)),
-    ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
-    ("licences", licences),
+/// Files and folders that require the longer tier, besides the folders of heavy crates and of crates with features that bring them along.
+const COVERED: [&str; 9] = [
+    "Cargo.lock",
+    "crates/*/src/interop.rs",
+    "deny.toml",
+    "docs/SLIDES.md",
+    "docs/formats",
+    "fixtures/hashes.txt",
+    "hashes",
+    "xtask/src/external.rs",
+    "xtask/src/package.rs",
 ];
 
+fn covered() -> Vec<String> {
+    let crates = heavy_packages().into_iter().map(|package| format!("crates/{package}"));
+    COVERED.map(str::to_owned).into_iter().chain(crates).collect()
+}
+
 fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let (mut full, changed) = (arguments.flag("--full"), arguments.flag("--changed"));
+    let full = arguments.flag("--full");
     arguments.finish()?;
-    if changed && !full {
-        full = covered::has_changed(workspace)?;
-        println!("what --full covers {} since it last passed", if full { "has changed" } else { "has not changed" });
-    }
     let mut table = String::new();
     let mut failed = Vec::new();
     let mut total = Duration::ZERO;
@@ -94,9 +101,58 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         bail!("failed: {}", failed.join(", "));
     }
     if full {
-        covered::record(workspace)?;
+        record(workspace)?
+    } else {
+        println!("\n{}", required(workspace))
     }
     Ok(Outcome::Done)
+}
+
+/// Runs doc tests of the technique crates with all features: these convert to types of other libraries.
+fn feature_doc_tests(workspace: &Workspace) -> Result<Outcome> {
+    let mut cargo = workspace.cargo();
+    cargo.args(["test", "--doc", "--all-features"]);
+    for package in deps::pure_crates(workspace).filter(|name| *name != "papsynth") {
+        cargo.args(["--package", package]);
+    }
+    run_cargo(&mut cargo)
+}
+
+/// Where the commit is recorded at which the longer tier last passed.
+fn recorded(workspace: &Workspace) -> PathBuf {
+    workspace.target.join("ci-full-passed")
+}
+
+/// What Git prints of the files that the longer tier covers.
+fn git(workspace: &Workspace, words: &[&str]) -> Result<String> {
+    shell::output(Command::new("git").args(words).arg("--").args(covered()).current_dir(&workspace.root))
+}
+
+fn record(workspace: &Workspace) -> Result<()> {
+    if !git(workspace, &["status", "--porcelain"])?.is_empty() {
+        println!("\nNot recorded: files that --full covers have uncommitted changes.");
+        return Ok(());
+    }
+    let path = recorded(workspace);
+    let commit = git(workspace, &["rev-list", "--max-count=1", "HEAD"])?;
+    fs::write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Whether the longer tier is required, and by which files.
+fn required(workspace: &Workspace) -> String {
+    let Ok(commit) = fs::read_to_string(recorded(workspace)) else {
+        return format!("--full has not passed here. It covers:\n{}", covered().join("\n"));
+    };
+    let commit = commit.trim();
+    match git(workspace, &["diff", "--name-only", commit]) {
+        Ok(files) if files.is_empty() => {
+            format!("--full is not required: no file that it covers has changed since it passed at commit {commit}")
+        }
+        Ok(files) => {
+            format!("--full is required: these files have changed since it passed at commit {commit}:\n{files}")
+        }
+        Err(error) => format!("--full may be required: {error}"),
+    }
 }
 
 #[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no image")]
@@ -107,10 +163,6 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 
 fn chore(workspace: &Workspace, chore: &Chore) -> Result<Outcome> {
     (chore.run)(workspace, Arguments::new(Vec::new()))
-}
-
-fn cargo(workspace: &Workspace, arguments: &[&str]) -> Result<Outcome> {
-    run_cargo(workspace.cargo().args(arguments))
 }
 
 fn run_cargo(command: &mut Command) -> Result<Outcome> {
@@ -138,17 +190,11 @@ fn real_material() -> Result<Outcome> {
     }
 }
 
-fn documentation(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = workspace.cargo_light("doc");
-    // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    command.args(["--lib", "--no-deps", "--features", &workspace.light_features()]);
-    run_cargo(command.env("RUSTDOCFLAGS", "-D warnings"))
+fn lints(mut clippy: Command) -> Result<Outcome> {
+    run_cargo(clippy.args(["--all-targets", "--", "-D", "warnings"]))
 }
 
-fn licences(workspace: &Workspace) -> Result<Outcome> {
-    if !shell::answers(workspace.cargo().args(["deny", "--version"])) {
-        // Advisories alone are left out then.
-        return supply::check(workspace);
-    }
-    cargo(workspace, &["deny", "check"])
+fn documentation(mut doc: Command) -> Result<Outcome> {
+    // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
+    run_cargo(doc.args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }

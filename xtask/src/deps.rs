@@ -2,9 +2,8 @@
 
 use anyhow::{Result, bail};
 
-use crate::Chore;
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::{HEAVY, Package, Workspace};
 
 pub(crate) const CHORE: Chore = Chore {
@@ -12,7 +11,7 @@ pub(crate) const CHORE: Chore = Chore {
     usage: "",
     about: "checks who depends on whom in the workspace, and draws it",
     details: "The numerics know no one here, technique crates the numerics alone, the engine knows both, the data set the engine and kinds of files, which know \
-              no one, the study and the viewer the data set and the server on loopback, which knows no one, the judge nobody, who reads recipes the engine, the program and the Python package all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
+              no one, the study and the calibration the data set, the pages the data set and the study, the judge nobody, who reads recipes the engine, the program and the Python package all of them, the benches what they time, the hashes the engine, the chores nobody. Dependencies of tests count too, so \
               that every crate can be taken, tested and published alone.",
     run,
 };
@@ -27,14 +26,13 @@ enum Role {
     /// Knows how a kind of file is laid out, and nothing of what is in it.
     Container,
     Dataset,
-    /// Data sets somewhere else than on this machine.
-    Cloud,
     Judge,
     Match,
-    /// Talks with a browser on the same machine, and knows nothing of what about.
-    Loopback,
     Study,
-    View,
+    /// Pages in a browser on the same machine.
+    Web,
+    /// Measures microscopes and cameras.
+    Calibrate,
     Program,
     /// Another front: what the program is to a shell.
     Python,
@@ -44,7 +42,7 @@ enum Role {
 }
 
 /// Every crate has its place here; a new one needs a line, and a reason in ARCHITECTURE.md.
-const PLACES: [(&str, Role); 26] = [
+const PLACES: [(&str, Role); 23] = [
     ("portable-numerics", Role::Numerics),
     ("fsd-shape", Role::Technique),
     ("quilt-texture", Role::Technique),
@@ -57,13 +55,11 @@ const PLACES: [(&str, Role); 26] = [
     ("ccd-noise", Role::Technique),
     ("papsynth", Role::Engine),
     ("papsynth-zarr", Role::Container),
-    ("papsynth-parquet", Role::Container),
     ("papsynth-dataset", Role::Dataset),
-    ("papsynth-cloud", Role::Cloud),
     ("papsynth-judge", Role::Judge),
-    ("papsynth-loopback", Role::Loopback),
     ("papsynth-study", Role::Study),
-    ("papsynth-view", Role::View),
+    ("papsynth-calibrate", Role::Calibrate),
+    ("papsynth-web", Role::Web),
     ("papsynth-match", Role::Match),
     ("papsynth-cli", Role::Program),
     ("papsynth-python", Role::Python),
@@ -80,35 +76,35 @@ impl Role {
     /// Whom a crate in this place may depend on.
     fn may_know(self) -> &'static [Self] {
         match self {
-            // Who judges must not know what is judged, nor a kind of file what lies in it, nor a server what it serves.
-            Self::Numerics | Self::Container | Self::Loopback | Self::Chores => &[],
+            // Who judges must not know what is judged, nor a kind of file what lies in it.
+            Self::Numerics | Self::Container | Self::Chores => &[],
             Self::Technique | Self::Judge => &[Self::Numerics],
             Self::Engine => &[Self::Numerics, Self::Technique],
             // It must run where files and threads do not.
             Self::Hashes => &[Self::Engine],
             Self::Dataset => &[Self::Engine, Self::Container],
-            Self::Cloud => &[Self::Dataset],
             // It simulates with the one and measures with the other.
             Self::Match => &[Self::Numerics, Self::Engine, Self::Judge],
             // It shows files, whoever made them.
-            Self::Study => &[Self::Numerics, Self::Dataset, Self::Loopback],
-            // The same, and groups of truth are the engine's.
-            Self::View => &[Self::Engine, Self::Dataset, Self::Loopback],
+            Self::Study => &[Self::Numerics, Self::Dataset],
+            // It shows files and a study, and groups of truth are the engine's.
+            Self::Web => &[Self::Engine, Self::Dataset, Self::Study],
+            // It fits with techniques, finds regions as label images are read, and writes sections of recipes.
+            Self::Calibrate => &[Self::Numerics, Self::Technique, Self::Engine, Self::Dataset],
             // They time what is called from outside.
             Self::Benches => &[Self::Technique, Self::Engine, Self::Dataset],
-            // It measures microscopes and cameras, which are no business of the engine.
+            // Errors of the techniques name options of its calibration.
             Self::Program => &[
                 Self::Technique,
                 Self::Engine,
                 Self::Dataset,
-                Self::Cloud,
                 Self::Judge,
                 Self::Match,
-                Self::Loopback,
+                Self::Calibrate,
                 Self::Study,
-                Self::View,
+                Self::Web,
             ],
-            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Cloud, Self::Judge],
+            Self::Python => &[Self::Technique, Self::Engine, Self::Dataset, Self::Calibrate, Self::Judge],
         }
     }
 }
@@ -135,7 +131,7 @@ fn unusual(workspace: &Workspace) -> impl Iterator<Item = String> {
     let crates = workspace.root.join("crates");
     workspace.packages.iter().filter(move |package| package.folder.starts_with(&crates)).filter_map(|package| {
         let name = &package.name;
-        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == name);
+        let is_heavy = HEAVY.iter().any(|heavy| heavy.package == Some(name));
         match (is_heavy, workspace.usual.contains(name)) {
             (true, true) => Some(format!("`{name}` is heavy and must not be among the default-members: Cargo.toml")),
             (false, false) => Some(format!("`{name}` must be among the default-members: Cargo.toml")),

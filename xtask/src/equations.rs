@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::Chore;
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::Workspace;
 
 pub(crate) const CHORE: Chore = Chore {
@@ -114,116 +113,63 @@ fn sources(folder: &Path) -> Result<Vec<PathBuf>> {
 /// Everything a source file cites, down to its tests.
 fn citations(text: &str) -> Vec<Citation> {
     let mut found = Vec::new();
-    let mut scope = Scope::default();
-    let mut documentation = String::new();
-    let mut module = String::new();
+    let mut cite = |text: &str, (item, line): &(String, usize), place| {
+        let citation = |equation| Citation { equation, item: item.clone(), line: *line, place };
+        found.extend(numbers(text).into_iter().map(citation));
+    };
+    // The type or impl around this place, and the item that began last with its line.
+    let (mut owner, mut item) = (String::new(), (String::new(), 0));
+    let (mut documentation, mut module) = (String::new(), String::new());
     let mut in_attribute = false;
-    let mut lines = text.lines().zip(1..).peekable();
-    while let Some((line, number)) = lines.next() {
+    for (line, number) in text.lines().zip(1..).take_while(|(line, _)| *line != "mod tests {") {
         let code = line.trim_start();
-        let next = lines.peek().map_or("", |(next, _)| next.trim());
-        if code == "#[cfg(test)]" && next.starts_with("mod ") && next.ends_with('{') {
-            break;
-        }
         if let Some(words) = code.strip_prefix("//!") {
-            module.push_str(words);
-            module.push('\n');
+            module = module + words + "\n";
         } else if let Some(words) = code.strip_prefix("///") {
-            documentation.push_str(words);
-            documentation.push('\n');
+            documentation = documentation + words + "\n";
         } else if in_attribute || code.starts_with("#[") {
             in_attribute = !code.ends_with(']');
         } else {
-            let indent = line.len() - code.len();
-            if let Some(item) = scope.enter(code, indent, number, !documentation.is_empty()) {
-                let cited = numbers(&documentation).into_iter().filter(|_| item.counts);
-                found.extend(cited.map(|equation| Citation {
-                    equation,
-                    item: item.name.clone(),
-                    line: number,
-                    place: Place::Documentation,
-                }));
+            if let Some((keyword, name)) = beginning(code, !documentation.is_empty()) {
+                if code.len() == line.len() {
+                    let owns = matches!(keyword, "struct" | "enum" | "trait" | "impl" | "mod");
+                    owner = if owns { name.clone() } else { String::new() };
+                    item = (if keyword == "impl" { name } else { format!("{keyword} {name}") }, number);
+                } else {
+                    let outer = if owner.is_empty() { keyword.to_owned() + " " } else { format!("{owner}::") };
+                    item = (outer + &name, number);
+                }
+                cite(&documentation, &item, Place::Documentation);
             }
             if !code.is_empty() {
                 documentation.clear();
             }
             if let Some((_, comment)) = code.split_once("//") {
-                let (item, line) = scope.item.clone();
-                found.extend(numbers(comment).into_iter().map(|equation| Citation {
-                    equation,
-                    item: item.clone(),
-                    line,
-                    place: Place::Inside(number),
-                }));
+                cite(comment, &item, Place::Inside(number));
             }
         }
     }
-    found.extend(numbers(&module).into_iter().map(|equation| Citation {
-        equation,
-        item: "(the module)".into(),
-        line: 1,
-        place: Place::Heading,
-    }));
+    cite(&module, &("(the module)".to_owned(), 1), Place::Heading);
     found
 }
 
-/// Where in a file we are.
-#[derive(Default)]
-struct Scope {
-    /// Types and impls around this place, by how far they are indented.
-    owners: Vec<(usize, String)>,
-    /// The item that began last, and its line.
-    item: (String, usize),
-}
-
-struct Item {
-    name: String,
-    /// Whether it can stand for an equation: a field cannot.
-    counts: bool,
-}
-
-impl Scope {
-    /// Reads a line of code; returns the item that begins here. Fields and variants are seen only if `documented`.
-    fn enter(&mut self, code: &str, indent: usize, line: usize, documented: bool) -> Option<Item> {
-        let mut words = code;
-        loop {
-            let rest =
-                ["pub(crate) ", "pub(super) ", "pub ", "const fn", "unsafe ", "async "].into_iter().find_map(|word| {
-                    let rest = words.strip_prefix(word)?;
-                    Some(if word == "const fn" { words.strip_prefix("const ")? } else { rest })
-                });
-            match rest {
-                Some(rest) => words = rest,
-                None => break,
-            }
-        }
-        let keyword = ["fn", "struct", "enum", "trait", "impl", "type", "const", "static", "mod", "macro_rules!"];
-        let keyword = keyword
-            .into_iter()
-            .find(|&keyword| words.strip_prefix(keyword).is_some_and(|rest| rest.starts_with([' ', '<'])));
-        let name = match keyword {
-            Some("impl") => owner_of_impl(words),
-            Some(keyword) => identifier(words[keyword.len()..].trim_start()),
-            None => identifier(words),
-        };
-        if name.is_empty() || (keyword.is_none() && !documented) {
-            return None;
-        }
-        self.owners.retain(|(outer, _)| *outer < indent);
-        let full = match (self.owners.last(), keyword) {
-            (Some((_, owner)), _) => format!("{owner}::{name}"),
-            (None, Some("impl") | None) => name.clone(),
-            (None, Some(keyword)) => format!("{keyword} {name}"),
-        };
-        if matches!(keyword, Some("struct" | "enum" | "trait" | "impl" | "mod")) {
-            self.owners.push((indent, name.clone()));
-        }
-        // A struct or an enum is not where a line computes something, and a field is no item.
-        let counts = keyword.is_some() || name.starts_with(char::is_uppercase);
-        if counts {
-            self.item = (full.clone(), line);
-        }
-        Some(Item { name: full, counts })
+/// The keyword and the name of the item that begins with a line of code. A variant is seen only if it is `documented`, and has no keyword;
+/// a field is no item.
+fn beginning(code: &str, documented: bool) -> Option<(&'static str, String)> {
+    const BEFORE: [&str; 5] = ["pub(crate) ", "pub(super) ", "pub ", "unsafe ", "async "];
+    const KEYWORDS: [&str; 10] =
+        ["fn", "struct", "enum", "trait", "impl", "type", "const", "static", "mod", "macro_rules!"];
+    let mut words = code;
+    while let Some(rest) = BEFORE.iter().find_map(|word| words.strip_prefix(word)) {
+        words = rest;
+    }
+    words = words.strip_prefix("const ").filter(|rest| rest.starts_with("fn ")).unwrap_or(words);
+    let item = KEYWORDS.iter().find_map(|keyword| Some((*keyword, words.strip_prefix(keyword)?)));
+    match item.filter(|(_, rest)| rest.starts_with([' ', '<'])) {
+        Some(("impl", _)) => Some(("impl", owner_of_impl(words))),
+        Some((keyword, rest)) => Some((keyword, identifier(rest.trim_start()))),
+        None if documented && words.starts_with(char::is_uppercase) => Some(("", identifier(words))),
+        None => None,
     }
 }
 

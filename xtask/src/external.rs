@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Error, Result, bail, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::{self, Workspace};
-use crate::{Chore, dataset, shell, supply};
+use crate::{dataset, shell, supply};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "external",
@@ -61,7 +61,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ("sixteen-bits", &["--frames", "1", "--camera", "scmos"]),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, &out, own.iter().chain(&SMALL))?;
+        dataset::generate(workspace, dataset::LEAN, &out, own.iter().chain(&SMALL))?;
         shell::run(Command::new(&python).arg(script(workspace, "external.py")?).arg(&out))?;
     }
     let pages = workspace.root.join("docs/formats");
@@ -70,6 +70,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         true => (workspace::heavy_features_of("papsynth-cli"), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
         false => (String::new(), LIGHT_FORMATS.to_owned()),
     };
+    let build = [dataset::LEAN, &["--features", &features]].concat();
     let formats = ["--format", formats.as_str()];
     for (name, own) in [
         ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),
@@ -77,7 +78,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ("all-colour", &[colour.as_slice(), &["--camera", "scmos", "--flatten", "max"]].concat()),
     ] {
         let out = folder.join(name);
-        dataset::generate_with(workspace, &features, &out, own.iter().chain(&SMALL).chain(&formats))?;
+        dataset::generate(workspace, &build, &out, own.iter().chain(&SMALL).chain(&formats))?;
         shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
         written.push(out);
     }
@@ -95,7 +96,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
             "--set",
             "field.height_px=1000",
         ];
-        dataset::generate_with(workspace, &features, &out, own)?;
+        dataset::generate(workspace, &build, &out, own)?;
         heavier(workspace, &written, &pages)?;
         train(workspace, &written)?;
         read_zarr(workspace, written.iter().chain([&out]), &pages)?;
@@ -109,12 +110,7 @@ fn bill_of_materials(workspace: &Workspace) -> Result<()> {
         Python::Ready(python) => python,
         Python::Missing(reason) => bail!("{reason}"),
     };
-    let path = supply::write(workspace)?;
-    let first = std::fs::read(&path)?;
-    ensure!(
-        std::fs::read(supply::write(workspace)?)? == first,
-        "the bill of materials differs from one run to the next"
-    );
+    let path = supply::bill(workspace)?.map_err(Error::msg)?;
     const VALIDATE: &str = "import sys
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
@@ -181,7 +177,7 @@ fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBu
 fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     let _ = std::fs::remove_dir_all(out);
     let mut cargo = workspace.cargo();
-    cargo.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--features"]);
+    cargo.args(["run", "--release", "--package", "papsynth-cli"]).args(dataset::LEAN).arg("--features");
     cargo.args([workspace::heavy_features_of("papsynth-cli").as_str(), "--"]);
     cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
     for place in ["x_um=200", "y_um=150", "radius_um=400"] {
@@ -213,11 +209,10 @@ fn measure(workspace: &Workspace) -> Result<Outcome> {
     };
     let tests = workspace.root.join("crates/ccd-noise/tests");
     let folder = workspace.target.join("external");
-    let example = |name: &str, arguments: &[&Path]| {
-        let mut cargo = workspace.cargo();
-        cargo.args(["run", "--quiet", "--release", "--package", "ccd-noise", "--example", name, "--"]).args(arguments);
-        shell::run(&mut cargo)
-    };
+    // Built as the tests are, of the same libraries.
+    shell::run(workspace.cargo_light(&["build"]).args(["--example", "emva1288", "--example", "jpeg"]))?;
+    let examples = workspace.target.join("debug/examples");
+    let example = |name: &str, arguments: &[&Path]| shell::run(Command::new(examples.join(name)).args(arguments));
     let cameras = ["orca-05g", "scmos"];
     for camera in cameras {
         example("emva1288", &[Path::new(camera), &folder.join(camera)])?;

@@ -5,9 +5,9 @@ use std::fs;
 use anyhow::{Context, Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
+use crate::shell;
 use crate::workspace::Workspace;
-use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "figures",
@@ -98,11 +98,10 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let mut table = String::new();
     for figure in FIGURES.iter().filter(|figure| wanted.is_empty() || wanted.contains(&figure.name)) {
         let Figure { name, shows, package, example, arguments } = figure;
-        workspace.expect_target(package, "example", example)?;
         let path = folder.join(format!("fig-{name:0>2}.png"));
         let mut command = workspace.cargo();
         command
-            .args(["run", "--quiet", "--release", "--package", package, "--example", example, "--"])
+            .args(["run", "--release", "--package", package, "--example", example, "--"])
             .args(*arguments)
             .arg(&path);
         shell::run(&mut command)?;

@@ -7,9 +7,9 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::Workspace;
-use crate::{Chore, shell, system};
+use crate::{shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "hashes",
@@ -56,7 +56,7 @@ fn on_other_processors(workspace: &Workspace) -> Result<()> {
     for processor in PROCESSORS {
         let folder = workspace.target.join("hashes").join(processor);
         let mut command = workspace.cargo();
-        command.args(["run", "--quiet", "--package", PACKAGE, "--target-dir"]).arg(&folder);
+        command.args(["run", "--package", PACKAGE, "--target-dir"]).arg(&folder);
         command.env("RUSTFLAGS", format!("-C target-cpu={processor}"));
         compare(workspace, &shell::output(&mut command)?, processor)?;
     }
@@ -78,7 +78,7 @@ fn on_aarch64(workspace: &Workspace) -> Result<Outcome> {
     }
     let folder = workspace.target.join("hashes");
     let mut command = workspace.cargo();
-    command.args(["build", "--quiet", "--package", PACKAGE, "--target", AARCH64, "--target-dir"]).arg(&folder);
+    command.args(["build", "--package", PACKAGE, "--target", AARCH64, "--target-dir"]).arg(&folder);
     shell::run(command.env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER", "rust-lld"))?;
     let program = folder.join(AARCH64).join("debug").join(PACKAGE);
     compare(workspace, &shell::output(Command::new(emulator).arg(program))?, "aarch64")?;

@@ -8,8 +8,8 @@
 mod arguments;
 mod bench;
 mod browser;
+mod chore;
 mod ci;
-mod covered;
 mod dataset;
 mod deps;
 mod equations;
@@ -17,7 +17,6 @@ mod external;
 mod figures;
 mod golden;
 mod hashes;
-mod outcome;
 mod package;
 mod peers;
 mod publish;
@@ -36,20 +35,8 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::Workspace;
-
-/// One chore.
-struct Chore {
-    name: &'static str,
-    /// Its arguments, as a usage line shows them.
-    usage: &'static str,
-    /// What it does, in a line.
-    about: &'static str,
-    /// What else there is to know.
-    details: &'static str,
-    run: fn(&Workspace, Arguments) -> Result<Outcome>,
-}
 
 const CHORES: &[Chore] = &[
     dataset::CHORE,
@@ -65,7 +52,8 @@ const CHORES: &[Chore] = &[
     browser::CHORE,
     wasm::CHORE,
     publish::CHORE,
-    supply::CHORE,
+    supply::DENY,
+    supply::SBOM,
     package::CHORE,
     package::CLUSTER,
     package::RELEASES,

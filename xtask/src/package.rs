@@ -7,10 +7,10 @@ use std::process::Command;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, shell, system};
+use crate::{shell, system};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "python",
@@ -74,15 +74,7 @@ fn releases(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         Ok(wheel) => wheel,
         Err(reason) => return Outcome::skipped_unless_ci(reason),
     };
-    shell::run(workspace.cargo().args([
-        "build",
-        "--quiet",
-        "--release",
-        "--package",
-        "papsynth-cli",
-        "--target",
-        STATIC,
-    ]))?;
+    shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth-cli", "--target", STATIC]))?;
     let built = workspace.target.join(STATIC).join("release/papsynth");
     let program = workspace.target.join("releases/papsynth");
     fs::copy(&built, &program).with_context(|| format!("cannot copy {}", workspace.shown(&built)))?;
@@ -155,7 +147,7 @@ fn wheel(workspace: &Workspace, folder: &str, more: &[&str]) -> Result<Result<Pa
     let others = std::env::var_os("PATH").unwrap_or_default();
     let path = std::env::join_paths(own.chain(std::env::split_paths(&others)))?;
     command.env("PATH", path);
-    command.args(["-m", "maturin", "build", "--release", "--quiet"]).args(more).arg("--out").arg(&out);
+    command.args(["-m", "maturin", "build", "--release"]).args(more).arg("--out").arg(&out);
     shell::run(command.env("CARGO_TARGET_DIR", &workspace.target).current_dir(workspace.root.join(PACKAGE)))?;
     let mut wheels = fs::read_dir(&out).with_context(|| format!("cannot read {}", out.display()))?;
     let Some(wheel) = wheels.next() else { bail!("no wheel in {}", workspace.shown(&out)) };
@@ -175,7 +167,7 @@ fn installed(workspace: &Workspace, name: &str, packages: &str, wheel: &Path) ->
 
 /// The command line, to compare with.
 fn program(workspace: &Workspace) -> Result<PathBuf> {
-    let words = ["build", "--quiet", "--release", "--package", "papsynth-cli", "--features", "papsynth-cli/cloud"];
+    let words = ["build", "--release", "--package", "papsynth-cli", "--features", "papsynth-cli/cloud"];
     shell::run(workspace.cargo().args(words))?;
     let program = workspace.target.join("release").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
     ensure!(program.exists(), "{} was not built", workspace.shown(&program));

@@ -11,7 +11,7 @@ use std::fs;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::Outcome;
 use crate::python::Python;
 use crate::workspace::Workspace;
 use race::Race;

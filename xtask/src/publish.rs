@@ -6,9 +6,9 @@ use std::{env, fs};
 use anyhow::{Context, Result};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
+use crate::shell;
 use crate::workspace::Workspace;
-use crate::{Chore, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "publish",

@@ -9,10 +9,10 @@ use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::python::Python;
 use crate::workspace::Workspace;
-use crate::{Chore, dataset, shell};
+use crate::{dataset, shell};
 
 pub(crate) const CHORE: Chore = Chore {
     name: "realism",
@@ -76,7 +76,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
             // Few real fields are of one slide.
             let words: [OsString; 5] =
                 [recipe.into(), "--frames".into(), FRAMES.into(), "--set".into(), "slide.fields=1".into()];
-            dataset::generate(workspace, &fields, words)?;
+            dataset::generate(workspace, &[], &fields, words)?;
             let report = folder.join(format!("report-{what}-{grade}"));
             let mut judge = program(workspace);
             judge.arg("judge").arg(&halves[1]).arg(&fields).arg("--out").arg(&report);
@@ -97,7 +97,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
 
 fn program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
-    command.args(["run", "--quiet", "--release", "--package", "papsynth-cli", "--"]);
+    command.args(["run", "--release", "--package", "papsynth-cli", "--"]);
     command
 }
 
@@ -206,7 +206,7 @@ fn forest(
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
     let recipe = recipe.map(OsString::from);
-    dataset::generate(workspace, &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
+    dataset::generate(workspace, &[], &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
     let mut command = Command::new(&python);
     command.arg(&script).arg(&fields).arg(stack.join("extended_focus.png")).arg(stack.join("nuclei.png"));
     let output = command.output().with_context(|| format!("cannot run {}", workspace.shown(&script)))?;

@@ -5,9 +5,9 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::{Chore, Outcome};
 use crate::workspace::Workspace;
-use crate::{Chore, deps, hashes, shell, system};
+use crate::{deps, hashes, shell, system};
 
 /// Without a system, and with one that programs can print to.
 const TARGETS: [&str; 2] = ["wasm32-unknown-unknown", "wasm32-wasip1"];
@@ -15,7 +15,7 @@ const TARGETS: [&str; 2] = ["wasm32-unknown-unknown", "wasm32-wasip1"];
 pub(crate) const CHORE: Chore = Chore {
     name: "wasm",
     usage: "",
-    about: "builds the transforms, the technique crates and the engine for wasm32, and compares hashes of what they give there",
+    about: "checks the transforms, the technique crates and the engine for wasm32, and compares hashes of what they give there",
     details: "The hashes are those of `cargo xtask hashes`, made in wasm32 by Node. Left out, with a sentence, where a target is missing and rustup cannot \
               add it, or where there is no Node.",
     run,
@@ -29,7 +29,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
         }
     }
     let mut command = workspace.cargo();
-    command.args(["build", "--target", TARGETS[0], "--lib", "--no-default-features"]);
+    command.args(["check", "--target", TARGETS[0], "--lib", "--no-default-features"]);
     for name in deps::pure_crates(workspace) {
         command.args(["--package", name]);
     }

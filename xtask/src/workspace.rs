@@ -3,27 +3,28 @@
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use serde_json::Value;
 
 use crate::shell;
 
-/// A crate that takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
+/// What takes long to build, itself or its tests: only who names it, or works with `--full`, waits for it.
 pub(crate) struct Heavy {
-    pub(crate) package: &'static str,
-    /// The features of other crates that bring it along.
+    /// A crate of this workspace, if it is one; else an optional dependency.
+    pub(crate) package: Option<&'static str>,
+    /// The features that bring it along.
     pub(crate) features: &'static [&'static str],
 }
 
-/// All of them; each is missing in the `default-members` of the workspace, too.
+/// All of them; the crates are missing in the `default-members` of the workspace, too.
 pub(crate) const HEAVY: &[Heavy] = &[
-    Heavy { package: "papsynth-cloud", features: &["papsynth-cli/cloud", "papsynth-python/cloud"] },
-    Heavy { package: "papsynth-python", features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/cloud", "papsynth-cli/cloud", "papsynth-python/cloud"] },
+    Heavy { package: Some("papsynth-python"), features: &[] },
+    Heavy { package: None, features: &["papsynth-dataset/parquet", "papsynth-web/parquet", "papsynth-cli/parquet"] },
     Heavy {
-        package: "papsynth-parquet",
-        features: &["papsynth-dataset/parquet", "papsynth-view/parquet", "papsynth-cli/parquet"],
+        package: Some("papsynth-zarr"),
+        features: &["papsynth-dataset/zarr", "papsynth-web/zarr", "papsynth-cli/zarr"],
     },
-    Heavy { package: "papsynth-zarr", features: &["papsynth-dataset/zarr", "papsynth-view/zarr", "papsynth-cli/zarr"] },
 ];
 
 /// The features of other crates that bring heavy ones along, as Cargo reads them.
@@ -36,6 +37,16 @@ pub(crate) fn heavy_features_of(package: &str) -> String {
     let all = HEAVY.iter().flat_map(|heavy| heavy.features).copied();
     let own = all.filter(|feature| feature.split_once('/').is_some_and(|(name, _)| name == package));
     own.collect::<Vec<_>>().join(",")
+}
+
+/// The heavy members and those that one of their features brings them to.
+pub(crate) fn heavy_packages() -> Vec<&'static str> {
+    let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
+    let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
+    packages.extend(HEAVY.iter().filter_map(|heavy| heavy.package));
+    packages.sort_unstable();
+    packages.dedup();
+    packages
 }
 
 /// The workspace.
@@ -90,33 +101,28 @@ impl Workspace {
         command
     }
 
-    /// `cargo NAME` of all members but the heavy ones.
-    pub(crate) fn cargo_light(&self, name: &str) -> Command {
+    /// A subcommand of Cargo, of all members but the heavy ones, with every feature but those that bring heavy ones along.
+    pub(crate) fn cargo_light(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
-        command.args([name, "--workspace"]);
-        for heavy in HEAVY {
-            command.args(["--exclude", heavy.package]);
+        command.args(subcommand).args(["--workspace", "--features", &self.light_features()]);
+        for package in HEAVY.iter().filter_map(|heavy| heavy.package) {
+            command.args(["--exclude", package]);
         }
         command
     }
 
-    /// `cargo NAME` of the heavy members and of those that one of their features brings them to, with these features.
-    pub(crate) fn cargo_heavy(&self, name: &str) -> Command {
+    /// A subcommand of Cargo, of [`heavy_packages`], with these features.
+    pub(crate) fn cargo_heavy(&self, subcommand: &[&str]) -> Command {
         let mut command = self.cargo();
-        let of_features = HEAVY.iter().flat_map(|heavy| heavy.features).filter_map(|feature| feature.split_once('/'));
-        let mut packages: Vec<&str> = of_features.map(|(package, _)| package).collect();
-        packages.extend(HEAVY.iter().map(|heavy| heavy.package));
-        packages.sort_unstable();
-        packages.dedup();
-        command.args([name, "--features", &heavy_features()]);
-        for package in packages {
+        command.args(subcommand).args(["--features", &heavy_features()]);
+        for package in heavy_packages() {
             command.args(["--package", package]);
         }
         command
     }
 
     /// Every feature of every member but those that bring heavy ones along, as Cargo reads them.
-    pub(crate) fn light_features(&self) -> String {
+    fn light_features(&self) -> String {
         let all = self
             .packages
             .iter()
@@ -128,18 +134,6 @@ impl Workspace {
     /// A path below the target folder as a person would type it from the root folder.
     pub(crate) fn shown<'a>(&self, path: &'a std::path::Path) -> std::path::Display<'a> {
         path.strip_prefix(&self.root).unwrap_or(path).display()
-    }
-
-    /// Checks that a package has a target of that kind and name, so that a chore can say what is missing.
-    pub(crate) fn expect_target(&self, package: &str, kind: &str, name: &str) -> Result<()> {
-        let found = self
-            .packages
-            .iter()
-            .filter(|p| p.name == package)
-            .flat_map(|p| &p.targets)
-            .any(|(k, n)| k == kind && n == name);
-        ensure!(found, "crate `{package}` has no {kind} `{name}`");
-        Ok(())
     }
 }
 

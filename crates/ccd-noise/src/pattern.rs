@@ -1,5 +1,6 @@
 //! What makes the pixels of one camera differ: a pure function of its serial number and the place.
 
+use portable_numerics::elementary::exp_f32;
 use portable_numerics::random::SplitMix64;
 
 use crate::CameraParams;
@@ -69,39 +70,9 @@ impl PatternRow<'_> {
         if spread > 0.0 {
             let [normal, _] = block.normal_pairs_of(Stream::Chance, Stream::Fine);
             for i in 0..BLOCK {
-                noise[i] = read_noise * exp(spread * normal[i]);
+                noise[i] = read_noise * exp_f32(spread * normal[i]);
             }
         }
         Traits { response, offset, read_noise: noise }
-    }
-}
-
-/// eˣ for |x| < 80, relative error below 2e-7 (the polynomial of Cephes' `expf`).
-#[inline(always)]
-fn exp(x: f32) -> f32 {
-    /// 1.5 · 2²³: adding it rounds to an integer, which the lowest bits then hold.
-    const ROUND: f32 = 12_582_912.0;
-    let shifted = ROUND + x * core::f32::consts::LOG2_E;
-    let power = shifted - ROUND;
-    // ln 2 in two parts, the first of which is exact when multiplied by the power.
-    let rest = (x - power * 0.693_359_4) + power * 2.121_944_4e-4;
-    let square = rest * rest;
-    let odd = (1.987_569_1e-4 * square + 8.333_452e-3) * square + 1.666_666_5e-1;
-    let even = (1.398_2e-3 * square + 4.166_579_6e-2) * square + 0.5;
-    let e = (odd * rest + even) * square + rest + 1.0;
-    e * f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn exp_is_exp() {
-        for i in -800_000..800_000 {
-            let x = i as f32 * 1e-4;
-            let exact = libm::exp(f64::from(x));
-            assert!((f64::from(exp(x)) / exact - 1.0).abs() < 2e-7, "{x}");
-        }
     }
 }

@@ -3,10 +3,10 @@
 
 mod batch;
 mod cloth;
-#[cfg(any(feature = "mint", feature = "nalgebra"))]
-mod convert;
 mod crease;
 mod error;
+#[cfg(any(feature = "mint", feature = "nalgebra"))]
+mod interop;
 mod kernel;
 mod lanes;
 mod mesh;

@@ -2,11 +2,11 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod colour;
-#[cfg(feature = "image")]
-mod convert;
 mod curve;
 mod dye;
 mod error;
+#[cfg(feature = "image")]
+mod interop;
 mod light;
 mod lobe;
 mod params;

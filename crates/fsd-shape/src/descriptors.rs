@@ -1,7 +1,9 @@
 //! Fourier shape descriptors of a closed outline (Eqs. 1–3), and what can be done to them.
 
+use portable_numerics::fourier::LaneFft;
+
 use crate::Error;
-use crate::dft::{Direction, multiply, transform, unit};
+use crate::complex::{multiply, unit};
 use crate::outline::{Point, count_as_f64, signed_area};
 
 /// Fewest points that enclose an area.
@@ -45,7 +47,7 @@ impl Descriptors {
             return Err(Error::NoArea);
         }
         // Eq. 2: uₗ = (1/K) Σₖ z(k) e^{−i2πlk/K}, with z(k) = x(k) + iy(k) (Eq. 1).
-        let sums = transform(outline, Direction::Forward);
+        let sums = LaneFft::new(count).forward(outline);
         let half = count / 2;
         let shared = if count.is_multiple_of(2) { half } else { half + 1 };
         let terms = (0..=2 * half)
@@ -130,7 +132,7 @@ impl Descriptors {
             let bin = &mut bins[(first + place) % count];
             *bin = [bin[0] + u[0], bin[1] + u[1]];
         }
-        transform(&bins, Direction::Inverse)
+        LaneFft::new(count).inverse(&bins)
     }
 
     /// Only the terms with |l| ≤ `harmonics` (at least 1): a smoother outline.

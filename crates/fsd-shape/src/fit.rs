@@ -1,9 +1,11 @@
 //! From a set of outlines to their statistics.
 
+use portable_numerics::statistics::{deviation, mean};
+
 use crate::coordinates::add_scaled;
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, count_as_f64, resample, signed_area};
-use crate::pca::{dot, mean_and_sd, mean_of, principal_axes, sd_of};
+use crate::pca::{dot, mean_of, principal_axes, sd_of};
 use crate::roughness::Fine;
 use crate::sample::Bend;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics};
@@ -100,12 +102,11 @@ impl ShapeModel {
             let shape = described.normalised();
             shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
         }
-        let (ln_radius_mean, ln_radius_sd) = mean_and_sd(&ln_radii);
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
             outlines: outlines.len(),
-            ln_radius_mean,
-            ln_radius_sd,
+            ln_radius_mean: mean(&ln_radii),
+            ln_radius_sd: deviation(&ln_radii),
             mean: mean_of(&shapes),
             components: Vec::new(),
             residual: Residual::Descriptors,

@@ -4,10 +4,10 @@ use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
 
 use crate::Error;
+use crate::complex::{multiply, unit};
 use crate::coordinates::{add_scaled, finest_coarse, order, terms};
 use crate::crossing::self_intersects;
 use crate::descriptors::{Descriptors, modulus};
-use crate::dft::multiply;
 use crate::outline::{Point, count_as_f64};
 use crate::sample::Bend;
 use crate::statistics::{Residual, ShapeStatistics};
@@ -84,7 +84,7 @@ impl ShapeModel {
         for rejected in 0..TRIES {
             let mut terms = self.draw_terms(rng);
             let size = modulus(terms[harmonics + 1]);
-            let turn = crate::dft::unit(direction(rng));
+            let turn = unit(direction(rng));
             let scale = [turn[0] * radius_px / size, turn[1] * radius_px / size];
             for u in &mut terms {
                 *u = multiply(*u, scale);

@@ -64,14 +64,6 @@ pub(crate) fn sd_of(deviations: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
-/// Mean and standard deviation.
-pub(crate) fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-    let n = count_as_f64(values.len());
-    let mean = values.iter().sum::<f64>() / n;
-    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, (squares / (n - 1.0)).sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,12 @@
 //! Roughness: what the fine detail of outlines has beyond a normal field that is alike from shape to shape and all along the outline.
 
+use portable_numerics::statistics::deviation;
+
 use crate::coordinates::{finest_coarse, order, terms};
 use crate::descriptors::Descriptors;
 use crate::model::LEAST_FOR_LOCAL;
 use crate::outline::count_as_f64;
-use crate::pca::{dot, mean_and_sd};
+use crate::pca::dot;
 use crate::statistics::ShapeStatistics;
 
 /// Places per harmonic at which detail is looked at.
@@ -37,7 +39,7 @@ impl Fine {
     /// Spread of the logarithm of a shape's root-mean-square detail, beyond what chance gives draws without roughness.
     pub(crate) fn roughness_sd(&self, of: &ShapeStatistics) -> f64 {
         let logs: Vec<f64> = self.energies.iter().map(|e| libm::log(*e) / 2.0).collect();
-        let (_, spread) = mean_and_sd(&logs);
+        let spread = deviation(&logs);
         // The energy of a normal draw has mean tr Σ and variance 2 tr Σ², Σ being the loadings' products and, on the
         // diagonal, the residual variances. (Tails of the scores add to this variance, but little to that of its logarithm.)
         let coarse = finest_coarse(self.harmonics);

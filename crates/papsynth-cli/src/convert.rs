@@ -3,8 +3,9 @@
 use papsynth_dataset::Progress;
 
 use crate::args::Convert;
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Failure};
 use crate::interrupt::Interrupt;
+use crate::words::counted;
 
 pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
     let layout = args.files.layout(args.format.clone());
@@ -14,7 +15,7 @@ pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
     let out = args.out.display();
     if outcome.stopped {
         let message = format!("stopped; every file in {out} is whole");
-        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to write the rest")));
+        return Err(Failure::stopped(message, "write"));
     }
     if args.quiet {
         return Ok(());

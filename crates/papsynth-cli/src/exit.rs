@@ -1,12 +1,11 @@
 //! How the program ends: exit codes, error reports, and text on standard output.
 
 use std::io::{self, Write};
+use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, Report};
-
-/// Longest line of a file that is worth showing: beyond it an excerpt helps nobody.
-const LONGEST_SHOWN_LINE: usize = 400;
+use crate::excerpt::{self, Excerpt, Place};
 
 /// Why the program ends before it is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,35 +30,19 @@ impl Exit {
 }
 
 /// What is wrong, and where.
-#[derive(Debug, thiserror::Error, Diagnostic)]
-#[error("{message}")]
+#[derive(Debug)]
 pub(crate) struct Complaint {
     message: String,
-    #[help]
     help: Option<String>,
-    #[source_code]
-    text: Option<NamedSource<Arc<String>>>,
-    #[label(collection)]
-    labels: Vec<LabeledSpan>,
+    excerpt: Option<Excerpt>,
     /// What the complaint sums up; each is reported on its own.
     related: Vec<Complaint>,
     place: Option<Place>,
 }
 
-/// A place in a text that the user wrote.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub(crate) struct Place {
-    /// A file's path, or `--set`.
-    file: String,
-    /// From 1.
-    line: usize,
-    /// From 1, in characters.
-    column: usize,
-}
-
 impl Complaint {
     pub(crate) fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, text: None, labels: Vec::new(), related: Vec::new(), place: None }
+        Self { message: message.into(), help: None, excerpt: None, related: Vec::new(), place: None }
     }
 
     /// Adds what would help.
@@ -69,19 +52,12 @@ impl Complaint {
     }
 
     /// Points at a part of a text.
-    pub(crate) fn at(mut self, name: &str, text: &Arc<String>, span: std::ops::Range<usize>) -> Self {
-        let start = floor_char(text, span.start);
-        let end = floor_char(text, span.end).max(start);
-        let place = Place::of(name, text, start);
-        if text.lines().all(|line| line.len() <= LONGEST_SHOWN_LINE) {
-            // An underline does not reach beyond its first line.
-            let end = text[start..end].find('\n').map_or(end, |newline| start + newline);
-            self.labels = vec![LabeledSpan::new(None, start, end - start)];
-            self.text = Some(NamedSource::new(name, Arc::clone(text)));
-        } else {
-            self.message = format!("{}:{}:{}: {}", place.file, place.line, place.column, self.message);
+    pub(crate) fn at(mut self, name: &str, text: &Arc<String>, span: Range<usize>) -> Self {
+        let (place, excerpt) = excerpt::cut(name, text, span);
+        if excerpt.is_none() {
+            self.message = format!("{place}: {}", self.message);
         }
-        self.place = Some(place);
+        (self.place, self.excerpt) = (Some(place), excerpt);
         self
     }
 
@@ -108,24 +84,6 @@ impl Complaint {
     }
 }
 
-impl Place {
-    fn of(file: &str, text: &str, start: usize) -> Self {
-        let before = &text[..start];
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
-        Self { file: file.to_owned(), line, column }
-    }
-}
-
-/// The nearest boundary of a character at or before a byte.
-fn floor_char(text: &str, byte: usize) -> usize {
-    let mut byte = byte.min(text.len());
-    while !text.is_char_boundary(byte) {
-        byte -= 1;
-    }
-    byte
-}
-
 /// A complaint and the exit code it ends the program with.
 #[derive(Debug)]
 pub(crate) struct Failure {
@@ -146,8 +104,32 @@ impl Failure {
         Self { exit: Exit::Interrupted, complaint: Box::new(complaint) }
     }
 
+    /// What the user asked for is wrong, and what would help.
+    pub(crate) fn wrong(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::input(Complaint::new(message).help(help))
+    }
+
+    /// An error of a library; whether the system failed, so that trying again may help.
+    pub(crate) fn of(error: &impl std::fmt::Display, is_io: bool) -> Self {
+        let complaint = Complaint::new(error.to_string());
+        if is_io { Self::io(complaint) } else { Self::input(complaint) }
+    }
+
+    /// The user stopped a run; running the same command again makes or writes the rest.
+    pub(crate) fn stopped(message: String, does: &str) -> Self {
+        let help = format!("run the same command again to {does} the rest");
+        Self::interrupted(Complaint::new(message).help(help))
+    }
+
+    /// A subcommand of a feature that this program was built without.
+    #[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+    pub(crate) fn left_out(feature: &str) -> Self {
+        let message = format!("this subcommand needs a build of papsynth with `--features {feature}`");
+        Self::wrong(message, "`cargo install papsynth-cli` builds all subcommands")
+    }
+
     /// A file or folder that cannot be read or written: a wrong path is the user's, all else may pass.
-    pub(crate) fn file(what: &str, path: &std::path::Path, error: &io::Error) -> Self {
+    pub(crate) fn file(what: &str, path: &Path, error: &io::Error) -> Self {
         let exit = match error.kind() {
             io::ErrorKind::NotFound
             | io::ErrorKind::IsADirectory
@@ -171,12 +153,11 @@ impl Failure {
     }
 
     /// Says on standard error what went wrong; a closed standard error changes nothing.
-    pub(crate) fn print(self) {
-        let mut complaint = *self.complaint;
-        let parts = std::mem::take(&mut complaint.related);
+    pub(crate) fn print(&self) {
+        let complaint = &self.complaint;
         let mut err = io::stderr().lock();
-        for complaint in std::iter::once(complaint).chain(parts) {
-            let _ = writeln!(err, "{:?}", Report::new(complaint));
+        for Complaint { message, help, excerpt, .. } in std::iter::once(&**complaint).chain(&complaint.related) {
+            let _ = writeln!(err, "{}", excerpt::report(message, excerpt.as_ref(), help.as_deref()));
         }
     }
 
@@ -191,19 +172,8 @@ impl Failure {
 
 impl From<papsynth_dataset::Error> for Failure {
     fn from(error: papsynth_dataset::Error) -> Self {
-        Self::dataset(&error, Complaint::new(error.to_string()))
+        Self::of(&error, error.is_io())
     }
-}
-
-/// Reports look alike everywhere; on a terminal they are wrapped to its width, elsewhere lines stay whole.
-pub(crate) fn install_reports() {
-    use io::IsTerminal;
-    let on_terminal = io::stderr().is_terminal();
-    // It fails only if it was installed before, which is then what is wanted.
-    let _ = miette::set_hook(Box::new(move |_| {
-        let options = miette::MietteHandlerOpts::new().wrap_lines(on_terminal).break_words(false).context_lines(1);
-        Box::new(if on_terminal { options } else { options.color(false).unicode(false) }.build())
-    }));
 }
 
 /// Says on standard error what is no failure and may surprise.
@@ -212,17 +182,12 @@ pub(crate) fn note(text: &str) {
     let _ = writeln!(io::stderr().lock(), "note: {text}");
 }
 
-/// A number and what is counted.
-pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
-}
-
 /// Writes to standard output. Whoever closed the pipe has seen enough: that is no failure.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Failure::file("write", std::path::Path::new("standard output"), &error))
+            Err(Failure::file("write", Path::new("standard output"), &error))
         }
         _ => Ok(()),
     }
@@ -231,24 +196,6 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn places_count_lines_and_characters_from_one() {
-        let text = Arc::new("a = 1\nµ = 2\n".to_owned());
-        let complaint = Complaint::new("no").at("x.toml", &text, 9..12);
-        assert_eq!(complaint.place, Some(Place { file: "x.toml".to_owned(), line: 2, column: 3 }));
-        // In the middle of a character, and beyond the end.
-        let _ = Complaint::new("no").at("x.toml", &text, 7..8);
-        let _ = Complaint::new("no").at("x.toml", &text, 90..100);
-    }
-
-    #[test]
-    fn a_very_long_line_is_named_but_not_shown() {
-        let text = Arc::new("[".repeat(10_000));
-        let complaint = Complaint::new("too deep").at("x.toml", &text, 80..81);
-        assert!(complaint.text.is_none());
-        assert_eq!(complaint.message, "x.toml:1:81: too deep");
-    }
 
     #[test]
     fn json_holds_the_place_and_the_exit_code() {

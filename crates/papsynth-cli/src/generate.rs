@@ -63,14 +63,11 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     };
     let outcome = dataset.generate(&setup.engine, &run, &step);
     progress.clear();
-    let outcome = outcome.map_err(|error| match error {
-        Error::Engine(error) => setup.recipe.refuse(&error),
-        other => other.into(),
-    })?;
+    let outcome = outcome.map_err(|error| setup.failure(error))?;
     if outcome.stopped {
         let whole = outcome.kept + outcome.made;
         let message = format!("stopped with {whole} frames whole; every file in {} is whole", args.out.display());
-        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
+        return Err(Failure::stopped(message, "make"));
     }
     // What is whole is left alone, which a disk that cannot be written allows too.
     // What others are still making is merged by whoever comes last.

@@ -6,7 +6,8 @@ use std::ops::Range;
 use papsynth_dataset::{Overview, inspect};
 
 use crate::args::{Inspect, check_of};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
+use crate::words::{counted, size};
 
 pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     let check = check_of(args.verify);
@@ -21,14 +22,10 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     if frames + files == 0 {
         return Ok(());
     }
-    let counted = |count: usize, what: &str| match count {
-        1 => format!("1 {what}"),
-        _ => format!("{count} {what}s"),
-    };
-    let message =
-        format!("{}: {} and {} are damaged", args.dir.display(), counted(frames, "shard"), counted(files, "file"));
+    let (shards, files) = (counted(frames as u64, "shard", "shards"), counted(files as u64, "file", "files"));
+    let message = format!("{}: {shards} and {files} are damaged", args.dir.display());
     let help = "the command that made the data set, with --verify, makes them again";
-    Err(Failure::input(Complaint::new(message).help(help)))
+    Err(Failure::wrong(message, help))
 }
 
 /// Lines of the lists that are printed in full; the rest is counted.
@@ -73,7 +70,7 @@ fn table(dir: &str, overview: &Overview) -> String {
         let [least, most] = overview.pixel_um;
         let pixel = if least == most { format!("{least}") } else { format!("{least} to {most}") };
         row("images", &format!("{sizes}; {pixel} um a pixel; {bits}; {planes}"));
-        row("on disk", &bytes(overview.bytes));
+        row("on disk", &size(overview.bytes as f64));
         row("", "");
         row("objects", &format!("{:<28}{:>10}{:>12}", "", "in all", "a frame"));
         for (category, count) in &overview.objects {
@@ -98,22 +95,12 @@ fn listed(items: impl ExactSizeIterator<Item = String>) -> String {
     text
 }
 
-fn bytes(count: u64) -> String {
-    const UNITS: [(u64, &str); 3] = [(1_000_000_000, "GB"), (1_000_000, "MB"), (1_000, "kB")];
-    match UNITS.into_iter().find(|(unit, _)| count >= *unit) {
-        Some((unit, name)) => format!("{:.1} {name}", count as f64 / unit as f64),
-        None => format!("{count} bytes"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn sizes_and_lists_are_readable() {
-        assert_eq!(bytes(999), "999 bytes");
-        assert_eq!(bytes(1_234_567), "1.2 MB");
+    fn lists_are_readable() {
         assert_eq!(shown(&(3..4)), "3");
         assert_eq!(shown(&(3..9)), "3..9");
         assert!(listed((0..12).map(|n: u64| n.to_string()).collect::<Vec<_>>().into_iter()).ends_with("9 and 2 more"));

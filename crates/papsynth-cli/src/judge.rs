@@ -4,19 +4,23 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use papsynth::recipe::diagnose::quoted;
-use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits, field_files};
-use papsynth_dataset::write_file;
+use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
+use papsynth_dataset::{field_files, write_file};
 use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
 use rayon::prelude::*;
 
-use crate::args::{self, threads};
+use crate::args;
 use crate::exit::{self, Complaint, Failure};
-use crate::text_file::may_replace;
+use crate::setup::pool;
+use crate::text_file::may_replace_in;
 
 /// Files that are written, and how those begin that may be replaced.
-const PAGE: (&str, &[u8]) =
-    ("report.html", b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<");
-const NUMBERS: (&str, &[u8]) = ("report.json", b"{\n  \"judge_report\":");
+const PAGE: (&str, &[u8], &str) = (
+    "report.html",
+    b"<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge<",
+    "an older report",
+);
+const NUMBERS: (&str, &[u8], &str) = ("report.json", b"{\n  \"judge_report\":", "an older report");
 
 /// Pixels that differ by less are of one size.
 const SAME_PIXEL: f64 = 0.01;
@@ -35,13 +39,7 @@ struct Side {
 }
 
 pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
-    for (name, begins) in [PAGE, NUMBERS] {
-        may_replace(&args.out.join(name), begins, "an older report")?;
-    }
-    if args.out.exists() && !args.out.is_dir() {
-        let message = format!("--out {}: there is a file of this name; expected a folder", args.out.display());
-        return Err(Failure::input(Complaint::new(message)));
-    }
+    may_replace_in(&args.out, &[PAGE, NUMBERS])?;
     let (real, synthetic) = sides(args)?;
     let pixel_um = coarsest(&real, &synthetic);
     for (folder, side) in [(&args.real, &real), (&args.synthetic, &synthetic)] {
@@ -51,15 +49,13 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
     let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(refuse)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(refuse)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(args.threads)).build();
-    let pool = pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))?;
-    let report = pool.install(|| {
+    let report = pool(args.threads)?.install(|| {
         let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
         judge.compare(&real, &synthetic).map_err(refuse)
     })?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
     numbers.push('\n');
-    for ((name, _), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
+    for ((name, ..), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
     exit::print(&told(&report, &args.out))
@@ -83,9 +79,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
     let of_synthetic = args.synthetic_pixel_um.or(recorded(&synthetic));
     let (Some(of_real), Some(of_synthetic)) = (of_real.or(of_synthetic), of_synthetic.or(of_real)) else {
         let message = "neither folder says how large its pixels are";
-        return Err(Failure::input(
-            Complaint::new(message).help("give --pixel-um, the size of a pixel in micrometres"),
-        ));
+        return Err(Failure::wrong(message, "give --pixel-um, the size of a pixel in micrometres"));
     };
     let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
         let pixels_um = files.iter().map(|f| given.or(f.pixel_um).unwrap_or(else_um)).collect();
@@ -98,9 +92,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
 fn enough(folder: &Path, files: Vec<FieldFile>) -> Result<Vec<FieldFile>, Failure> {
     if files.len() < LEAST {
         let message = format!("{}: there is 1 field; at least {LEAST} are needed", folder.display());
-        return Err(Failure::input(
-            Complaint::new(message).help("fields are never split between what is learnt from and what is tried"),
-        ));
+        return Err(Failure::wrong(message, "fields are never split between what is learnt from and what is tried"));
     }
     Ok(files)
 }
@@ -118,10 +110,10 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
         let message = format!("{}: no field is of group {}", folder.display(), groups.join(" or "));
         if files.iter().all(|f| f.group.is_empty()) {
             let help = "fields have no groups there: frames.csv in that folder would name them, as frame,grade";
-            return Err(Failure::input(Complaint::new(message).help(help)));
+            return Err(Failure::wrong(message, help));
         }
         let known: BTreeSet<&str> = files.iter().map(|f| f.group.as_str()).collect();
-        return Err(Failure::input(Complaint::new(message).help(format!("there are {}", quoted(known.into_iter())))));
+        return Err(Failure::wrong(message, format!("there are {}", quoted(known.into_iter()))));
     }
     Ok(files)
 }
@@ -158,7 +150,7 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
             None => Ok(from),
             Some(file) => {
                 let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
-                Err(Failure::input(Complaint::new(message).help("all fields of both sides must have them")))
+                Err(Failure::wrong(message, "all fields of both sides must have them"))
             }
         },
     }

@@ -76,7 +76,7 @@ fn class_to_take_after(args: &Learn, base: &Model) -> Result<String, Failure> {
             quoted(known())
         ),
     };
-    Err(Failure::input(Complaint::new(message).help(help)))
+    Err(Failure::wrong(message, help))
 }
 
 /// The names of files and folders, without where they lie on this machine.
@@ -123,7 +123,7 @@ fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point
     if outlines.is_empty() {
         let message = format!("{}: no region of its label images is a whole cell", folder.display());
         let help = format!("expected regions of at least {SMALLEST_CELL_UM2} um2 that do not touch the border");
-        return Err(Failure::input(Complaint::new(message).help(help)));
+        return Err(Failure::wrong(message, help));
     }
     Ok(outlines)
 }

@@ -3,16 +3,21 @@
 
 mod allocator;
 mod args;
-mod browser;
+#[cfg(feature = "calibrate")]
 mod calibrate;
 mod convert;
+mod excerpt;
 mod exit;
+mod findings;
 mod generate;
 mod init;
 mod inspect;
 mod interrupt;
+#[cfg(feature = "judge")]
 mod judge;
+#[cfg(feature = "learn")]
 mod learn;
+#[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
 mod place;
@@ -27,23 +32,23 @@ mod setup;
 mod share;
 mod slide;
 mod status;
-mod study;
 mod submit;
 mod sweep;
 mod text_file;
 mod verify;
-mod view;
+#[cfg(feature = "web")]
+mod web;
+mod words;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser};
+use clap::Parser;
 
 use args::{Cli, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
     allocator::settle();
-    exit::install_reports();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -74,9 +79,13 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
         Verb::Render(args) => render::run(*args),
+        #[cfg(feature = "learn")]
         Verb::Learn(args) => learn::run(&args),
+        #[cfg(feature = "calibrate")]
         Verb::Calibrate(args) => calibrate::run(&args),
+        #[cfg(feature = "judge")]
         Verb::Judge(args) => judge::run(&args),
+        #[cfg(feature = "judge")]
         Verb::Match(args) => match_fields::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
         Verb::Verify(args) => verify::run(&args),
@@ -89,16 +98,29 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Merge(args) => status::merge(&args),
         Verb::Clean(args) => verify::clean(&args),
         Verb::Slide(args) => slide::run(args.verb),
-        Verb::Study(args) => study::run(&args),
-        Verb::View(args) => view::run(&args),
+        #[cfg(feature = "web")]
+        Verb::Study(args) => web::study::run(&args),
+        #[cfg(feature = "web")]
+        Verb::View(args) => web::view::run(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))
         }
+        #[cfg(feature = "completions")]
         Verb::Completions(args) => {
-            let mut script = Vec::new();
-            clap_complete::generate(args.shell, &mut Cli::command(), "papsynth", &mut script);
+            let (mut command, mut script) = (<Cli as clap::CommandFactory>::command(), Vec::new());
+            clap_complete::generate(args.shell, &mut command, "papsynth", &mut script);
             exit::print(&String::from_utf8_lossy(&script))
         }
+        #[cfg(not(feature = "calibrate"))]
+        Verb::Calibrate(_) => Err(Failure::left_out("calibrate")),
+        #[cfg(not(feature = "completions"))]
+        Verb::Completions(_) => Err(Failure::left_out("completions")),
+        #[cfg(not(feature = "judge"))]
+        Verb::Judge(_) | Verb::Match(_) => Err(Failure::left_out("judge")),
+        #[cfg(not(feature = "learn"))]
+        Verb::Learn(_) => Err(Failure::left_out("learn")),
+        #[cfg(not(feature = "web"))]
+        Verb::Study(_) | Verb::View(_) => Err(Failure::left_out("web")),
     }
 }

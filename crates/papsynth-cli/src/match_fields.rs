@@ -1,22 +1,19 @@
 //! `papsynth match`: real fields in, the recipe of fields like them out.
 
-use std::io::{self, IsTerminal, Write};
-use std::sync::Mutex;
 use std::sync::atomic::Ordering;
-use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use papsynth::{Engine, Inputs};
 use papsynth_dataset::write_file;
 use papsynth_judge::Picture;
 use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
 use serde_json::json;
 
-use crate::args::{self, threads};
+use crate::args;
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::judge::{fields_of, picture};
-use crate::setup::read_model;
+use crate::report::Bar;
+use crate::setup::{pool, read_model};
 use crate::text_file::{can_write, may_replace};
 
 /// How files begin that may be replaced.
@@ -41,9 +38,6 @@ const USUAL_PIXEL_UM: f64 = 0.33;
 /// Statistics that are told of at the end: those that the recipe shows worst.
 const TOLD: usize = 8;
 
-/// Lines of progress where there is no terminal.
-const LINES: usize = 20;
-
 pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
     may_replace(&args.out, RECIPE, "an older match")?;
     if let Some(report) = &args.report {
@@ -63,7 +57,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
         (false, None) => {
             let message = format!("{}: nothing says how large the pixels are", args.real.display());
             let help = "give --pixel-um, the size of a pixel in micrometres, or --find-pixel";
-            return Err(Failure::input(Complaint::new(message).help(help)));
+            return Err(Failure::wrong(message, help));
         }
     };
     let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
@@ -80,15 +74,19 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
     let base = args.preset.recipe();
     let matching = Match::new(&params, &base).map_err(|e| refuse(&e, &args.real))?;
     let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(args.threads)).build();
-    let pool = pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))?;
-    let progress = Progress::new(args.quiet);
+    let bar = Bar::start(args.quiet);
     let tell = |step: Step| {
-        progress.step(step);
+        match step {
+            Step::Simulated(done, of) => bar.say(done as u64, of as u64, "simulated recipes"),
+            Step::Searched(done, of, distance) => {
+                bar.say(done as u64, of as u64, &format!("rounds of the search, distance {distance:.2}"));
+            }
+        }
         !interrupt.flag().load(Ordering::SeqCst)
     };
-    let fit = pool.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
-    progress.clear();
+    let fit =
+        pool(args.threads)?.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
+    bar.clear();
 
     if let Some(report) = &args.report {
         let text = serde_json::to_string_pretty(&json!({ "match_report": 1, "fit": fit, "seed": args.seed }));
@@ -150,47 +148,4 @@ fn told(fit: &Fit) -> String {
         ));
     }
     text
-}
-
-/// How far the work is: a bar on a terminal, a few lines elsewhere.
-struct Progress {
-    bar: ProgressBar,
-    lines: bool,
-    began: Instant,
-    last: Mutex<usize>,
-}
-
-impl Progress {
-    #[expect(clippy::disallowed_methods, reason = "the time goes to whoever waits, and into no recipe")]
-    fn new(quiet: bool) -> Self {
-        let terminal = io::stderr().is_terminal();
-        let target = if terminal && !quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(1), target);
-        let look = ProgressStyle::with_template("{msg} [{bar:30}] {pos} of {len}, {elapsed} gone");
-        bar.set_style(look.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-        Self { bar, lines: !terminal && !quiet, began: Instant::now(), last: Mutex::new(0) }
-    }
-
-    fn step(&self, step: Step) {
-        let (what, done, of, more) = match step {
-            Step::Simulated(done, of) => ("simulated recipes", done, of, String::new()),
-            Step::Searched(done, of, distance) => {
-                ("rounds of the search", done, of, format!(", distance {distance:.2}"))
-            }
-        };
-        self.bar.set_length(of as u64);
-        self.bar.set_message(what);
-        self.bar.set_position(done as u64);
-        let Ok(mut last) = self.last.lock() else { return };
-        let part = done * LINES / of.max(1);
-        if self.lines && part != *last {
-            *last = part;
-            let seconds = self.began.elapsed().as_secs();
-            let _ = writeln!(io::stderr().lock(), "{what}: {done} of {of}{more}, {seconds} s gone");
-        }
-    }
-
-    fn clear(&self) {
-        self.bar.finish_and_clear();
-    }
 }

@@ -5,7 +5,7 @@ use std::fs;
 use papsynth::recipe::Recipe;
 use papsynth_dataset::memory::{Need, available};
 
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
 /// Share of what is available that is used where nothing else is said.
 const SHARE: f64 = 0.8;
@@ -21,7 +21,7 @@ pub(crate) fn refuse(need: &Need, recipe: &Recipe, budget: u64, is_given: bool) 
     let source = if is_given { "--max-memory" } else { "80 % of what is available" };
     let help =
         "smaller fields, fewer cells, one plane, grey light and less oversampling need less; --max-memory allows more";
-    Failure::input(Complaint::new(format!("{} ({source})", need.too_large(recipe, budget))).help(help))
+    Failure::wrong(format!("{} ({source})", need.too_large(recipe, budget)), help)
 }
 
 /// Why not even one frame of a slide fits.
@@ -36,7 +36,7 @@ pub(crate) fn refuse_slide(need: &Need, recipe: &Recipe, shard_px: u32, budget: 
         shown(budget as f64)
     );
     let help = "--shard-px 2048 or less, or a smaller scan.frame_px, needs less; --max-memory allows more";
-    Failure::input(Complaint::new(message).help(help))
+    Failure::wrong(message, help)
 }
 
 /// Reads `2GiB`, `500MB`, `1.5G`, `1048576`: powers of 1024 with an `i` and without a `B`, of 1000 else.

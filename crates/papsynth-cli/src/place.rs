@@ -5,24 +5,11 @@ use std::path::Path;
 use papsynth_dataset::Home;
 
 use crate::args::Verb;
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
 /// The data set at a path or an address.
-#[cfg(feature = "cloud")]
 pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
-    Ok(papsynth_cloud::Bucket::home(path)?)
-}
-
-/// The data set at a path.
-#[cfg(not(feature = "cloud"))]
-pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
-    match Home::is_address(path) {
-        true => {
-            let message = format!("{}: object stores need a build of papsynth with `--features cloud`", path.display());
-            Err(Failure::input(Complaint::new(message)))
-        }
-        false => Ok(Home::from(path)),
-    }
+    Ok(Home::at(path)?)
 }
 
 /// An address where only folders are known would become a folder of that name, and so would one that is mistyped.
@@ -31,7 +18,7 @@ pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsStr
     if let Some((word, address)) = words.iter().find_map(|word| Some((word, mistyped(word.to_str()?)?))) {
         let message = format!("{}: begins as an address of an object store and is none", word.display());
         let help = format!("write {address} for an object store, ./{} for a folder", word.display());
-        return Err(Failure::input(Complaint::new(message).help(help)));
+        return Err(Failure::wrong(message, help));
     }
     if matches!(
         verb,
@@ -43,7 +30,7 @@ pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsStr
         Some(word) => {
             let message = format!("{}: a folder or file is wanted here", Path::new(&word).display());
             let help = "generate, status, merge, verify and clean work on object stores";
-            Err(Failure::input(Complaint::new(message).help(help)))
+            Err(Failure::wrong(message, help))
         }
         None => Ok(()),
     }

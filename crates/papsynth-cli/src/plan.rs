@@ -13,6 +13,7 @@ use crate::args::Plan;
 use crate::exit::{self, Complaint, Failure};
 use crate::memory;
 use crate::setup::Setup;
+use crate::words::size;
 
 /// Student's t for a two-sided interval of 95 %, for 1, 2, … degrees of freedom; beyond the table that of the normal distribution.
 const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
@@ -56,10 +57,7 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
         profile: None,
     };
     let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
-    dataset.generate(&setup.engine, &run, &report).map_err(|error| match error {
-        papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
-        other => other.into(),
-    })?;
+    dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.failure(error))?;
     let times = times.into_inner().unwrap_or_else(|e| e.into_inner());
     let seconds = times.windows(2).skip(1).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     let mut bytes = BTreeMap::new();
@@ -136,12 +134,6 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
     out
 }
 
-fn size(bytes: f64) -> String {
-    let units = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
-    let (unit, name) = units.into_iter().find(|(unit, _)| bytes >= *unit).unwrap_or((1.0, "bytes"));
-    format!("{:.1} {name}", bytes / unit)
-}
-
 fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 120.0 => format!("{s:.0} s"),
@@ -177,9 +169,6 @@ mod tests {
     fn files_are_counted_to_their_format() {
         let of = ["images/1.png", "cellpose/nucleus/1.tif", "shards/1.json", "objects/1.csv"].map(format_of);
         assert_eq!(of, ["folder", "cellpose", "truth", "truth"]);
-        assert_eq!(
-            (size(1.5e9), size(12.0), duration(90.0), duration(36_000.0)),
-            ("1.5 GB".to_owned(), "12.0 bytes".to_owned(), "90 s".to_owned(), "10.0 h".to_owned())
-        );
+        assert_eq!([90.0, 36_000.0].map(duration), ["90 s", "10.0 h"]);
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use papsynth::model::Model;
 use papsynth::recipe::diagnose::{self, Fault, Schema};
-use papsynth::recipe::{Preset, Recipe, Swath};
+use papsynth::recipe::{Preset, Recipe};
 use toml::{Table, Value};
 
 use crate::args::RecipeArgs;
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
         let sets = ["layout.kind=swath", "layout.width_um=50", "layout.outside=0.1"];
-        let swath = Layout::Swath(Swath { width_um: 50.0.into(), outside: 0.1.into() });
+        let swath = Layout::Swath(papsynth::recipe::Swath { width_um: 50.0.into(), outside: 0.1.into() });
         assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, swath);
         // The later one wins.
         let recipe = load(Preset::Lbc, &["field.width_px=96", "field.width_px=64"]).unwrap();

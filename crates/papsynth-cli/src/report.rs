@@ -9,8 +9,9 @@ use papsynth_dataset::{Outcome, Progress as Step, Share};
 use serde_json::json;
 
 use crate::args::Generate;
-use crate::exit::{self, Failure, counted};
+use crate::exit::{self, Failure};
 use crate::memory;
+use crate::words::counted;
 
 /// Lines that a run prints at most, however many frames it makes.
 const MOST_LINES: u64 = 100;
@@ -22,6 +23,23 @@ enum Style {
     Lines,
     Json,
     Quiet,
+}
+
+impl Style {
+    fn of(quiet: bool, json: bool) -> Self {
+        match (quiet, json) {
+            (true, _) => Self::Quiet,
+            (_, true) => Self::Json,
+            _ if io::stderr().is_terminal() => Self::Bar,
+            _ => Self::Lines,
+        }
+    }
+
+    /// A bar of so many steps: it counts and estimates in every style, and is drawn in one.
+    fn bar(self, steps: u64) -> ProgressBar {
+        let target = if self == Self::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        ProgressBar::with_draw_target(Some(steps), target)
+    }
 }
 
 /// What a run is about to do.
@@ -44,22 +62,15 @@ pub(crate) struct Start {
 pub(crate) struct Progress {
     style: Style,
     start: Start,
-    /// It counts and estimates in every style, and is drawn in one.
     bar: ProgressBar,
 }
 
 impl Progress {
     /// Announces a run.
     pub(crate) fn start(args: &Generate, start: Start) -> Result<Self, Failure> {
-        let style = match (args.quiet, args.json) {
-            (true, _) => Style::Quiet,
-            (_, true) => Style::Json,
-            _ if io::stderr().is_terminal() => Style::Bar,
-            _ => Style::Lines,
-        };
-        let target = if style == Style::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(start.frames), target);
-        bar.set_style(look(""));
+        let style = Style::of(args.quiet, args.json);
+        let bar = style.bar(start.frames);
+        bar.set_style(look("{msg}", "frames, {elapsed} gone"));
         bar.set_message(start.dir.display().to_string());
         if style == Style::Json {
             let Start { dir, seed, frames, threads, memory } = &start;
@@ -85,23 +96,19 @@ impl Progress {
         self.bar.inc(1);
         if self.style == Style::Bar && self.bar.position() == 1 {
             // Before the first frame there is nothing to estimate from.
-            self.bar.set_style(look(", about {eta} left"));
+            self.bar.set_style(look("{msg}", "frames, {elapsed} gone, about {eta} left"));
         }
-        let (done, of) = (self.bar.position(), self.bar.length().unwrap_or_default());
-        let left_s = self.bar.eta().as_secs();
         let (index, objects) = (summary.index, summary.objects.values().sum::<u64>());
         match self.style {
             Style::Json => {
+                let (done, of) = (self.bar.position(), self.bar.length().unwrap_or_default());
+                let left_s = self.bar.eta().as_secs();
                 let _ = event(&json!({
                     "event": "frame", "index": index, "objects": summary.objects, "done": done, "of": of, "left_s": left_s,
                 }));
             }
-            Style::Lines if is_told(done, of) => {
-                let left = if done < of { format!(", about {} left", duration(left_s)) } else { String::new() };
-                let _ =
-                    writeln!(io::stderr().lock(), "frame {index}: {objects} objects and parts ({done} of {of}{left})");
-            }
-            Style::Lines | Style::Bar | Style::Quiet => {}
+            Style::Lines => line(&self.bar, &format!("frame {index}: {objects} objects and parts")),
+            Style::Bar | Style::Quiet => {}
         }
     }
 
@@ -135,25 +142,18 @@ impl Progress {
 
 /// Says how far work in few large steps is.
 #[derive(Debug)]
-#[cfg(feature = "zarr")]
+#[cfg(any(feature = "judge", feature = "zarr"))]
 pub(crate) struct Bar {
     style: Style,
     bar: ProgressBar,
 }
 
-#[cfg(feature = "zarr")]
+#[cfg(any(feature = "judge", feature = "zarr"))]
 impl Bar {
-    /// Of so many steps.
     pub(crate) fn start(quiet: bool) -> Self {
-        let style = match quiet {
-            true => Style::Quiet,
-            false if io::stderr().is_terminal() => Style::Bar,
-            false => Style::Lines,
-        };
-        let target = if style == Style::Bar { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(0), target);
-        let template = "[{bar:30}] {pos} of {len}, {elapsed} gone, about {eta} left: {msg}";
-        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let style = Style::of(quiet, false);
+        let bar = style.bar(0);
+        bar.set_style(look("", "{msg}, {elapsed} gone, about {eta} left"));
         Self { style, bar }
     }
 
@@ -162,10 +162,8 @@ impl Bar {
         self.bar.set_length(all);
         self.bar.set_position(done);
         self.bar.set_message(what.to_owned());
-        if self.style == Style::Lines && is_told(done, all) {
-            let left =
-                if done < all { format!(", about {} left", duration(self.bar.eta().as_secs())) } else { String::new() };
-            let _ = writeln!(io::stderr().lock(), "{what} ({done} of {all}{left})");
+        if self.style == Style::Lines {
+            line(&self.bar, what);
         }
     }
 
@@ -175,10 +173,19 @@ impl Bar {
     }
 }
 
-/// The bar, with what follows it.
-fn look(rest: &str) -> ProgressStyle {
-    let template = format!("{{msg}} [{{bar:30}}] {{pos}} of {{len}} frames, {{elapsed}} gone{rest}");
+/// The bar, between what stands before it and after its numbers.
+fn look(before: &str, after: &str) -> ProgressStyle {
+    let template = format!("{before} [{{bar:30}}] {{pos}} of {{len}} {after}");
     ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
+}
+
+/// A line about the last step, if one is due.
+fn line(bar: &ProgressBar, what: &str) {
+    let (done, all) = (bar.position(), bar.length().unwrap_or_default());
+    if is_told(done, all) {
+        let left = if done < all { format!(", about {} left", duration(bar.eta().as_secs())) } else { String::new() };
+        let _ = writeln!(io::stderr().lock(), "{what} ({done} of {all}{left})");
+    }
 }
 
 /// Whether a line is due: at most [`MOST_LINES`] in all, and the last frame always.

@@ -9,9 +9,10 @@ use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share,
 use toml::Table;
 
 use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::interrupt::Interrupt;
 use crate::setup::Setup;
+use crate::words::runs;
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
@@ -22,27 +23,26 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     if before.recipe.recipe.to_toml() != source_recipe(&source)? {
-        let complaint = Complaint::new(format!("{}: this program reads its recipe otherwise", args.dir.display()));
-        return Err(Failure::input(complaint.help("a data set is rendered again by the release that made it")));
+        return Err(Failure::wrong(
+            format!("{}: this program reads its recipe otherwise", args.dir.display()),
+            "a data set is rendered again by the release that made it",
+        ));
     }
     let after = load(args, seed, true)?;
     let changed = changed_sections(&before.recipe.recipe, &after.recipe.recipe);
     if let Some(section) = changed.iter().find(|section| !IMAGING.contains(&section.as_str())) {
-        let complaint =
-            Complaint::new(format!("`{section}` says what lies in a scene; rerender changes how it is imaged"));
-        return Err(Failure::input(
-            complaint.help(format!("it takes {}; for all else: papsynth generate", IMAGING.join(", "))),
+        return Err(Failure::wrong(
+            format!("`{section}` says what lies in a scene; rerender changes how it is imaged"),
+            format!("it takes {}; for all else: papsynth generate", IMAGING.join(", ")),
         ));
     }
     let (layout, _) = args.layout.layout(0);
     let interrupt = Interrupt::watch()?;
-    let frames: Vec<Range<u64>> =
-        frames.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
-    let outcome = render(&after, seed, &frames, &layout, &args.out, interrupt.flag())?;
+    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
-        let complaint = Complaint::new(format!("the truth is another: {difference}"));
-        return Err(Failure::input(
-            complaint.help("a finer grid (`optics.oversampling`) draws other masks; leave it as it was"),
+        return Err(Failure::wrong(
+            format!("the truth is another: {difference}"),
+            "a finer grid (`optics.oversampling`) draws other masks; leave it as it was",
         ));
     }
     if args.quiet {
@@ -110,16 +110,12 @@ pub(crate) fn render(
             stop,
             profile: None,
         };
-        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| match error {
-            papsynth_dataset::Error::Engine(error) => setup.recipe.refuse(&error),
-            other => other.into(),
-        })?;
+        let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
         sum.kept += outcome.kept;
         sum.made += outcome.made;
         if outcome.stopped {
             let message = format!("stopped; every file in {} is whole", out.display());
-            let complaint = Complaint::new(message).help("run the same command again to make the rest");
-            return Err(Failure::interrupted(complaint));
+            return Err(Failure::stopped(message, "make"));
         }
     }
     dataset.finish()?;

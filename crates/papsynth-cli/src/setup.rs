@@ -48,6 +48,19 @@ impl Setup {
         Ok(Self { recipe, model, map, engine, threads: args.threads() })
     }
 
+    /// A slide of a seed.
+    pub(crate) fn slide(&self, seed: u64, number: u64) -> Result<papsynth::Slide<'_>, Failure> {
+        self.engine.slide(seed, number).map_err(|error| self.recipe.refuse(&error))
+    }
+
+    /// What goes wrong while frames are written; what the engine says points at the recipe.
+    pub(crate) fn failure(&self, error: papsynth_dataset::Error) -> Failure {
+        match error {
+            papsynth_dataset::Error::Engine(error) => self.recipe.refuse(&error),
+            other => other.into(),
+        }
+    }
+
     /// All threads for one frame.
     pub(crate) fn threads_of_a_frame(&self) -> Threads {
         if self.threads == 1 {
@@ -57,6 +70,13 @@ impl Setup {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
         Threads::All
     }
+}
+
+/// Threads of their own, as many as asked for, or one a core.
+#[cfg(feature = "judge")]
+pub(crate) fn pool(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(crate::args::threads(asked)).build();
+    pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))
 }
 
 /// The model that ships, with the classes of a file.

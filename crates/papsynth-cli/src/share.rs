@@ -45,7 +45,7 @@ fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) 
         }
     } else {
         let message = "neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set, which `--shard auto` reads";
-        return Err(Failure::input(Complaint::new(message).help("give the share itself: --shard 0/4")));
+        return Err(Failure::wrong(message, "give the share itself: --shard 0/4"));
     };
     if share.index < share.of {
         return Ok(share);
@@ -55,7 +55,7 @@ fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) 
 }
 
 fn ask(message: &str) -> Failure {
-    Failure::input(Complaint::new(message).help("say it: --shard auto/N"))
+    Failure::wrong(message, "say it: --shard auto/N")
 }
 
 #[cfg(test)]

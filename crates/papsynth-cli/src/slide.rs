@@ -1,10 +1,9 @@
 //! `papsynth slide`: whole slides, and any part of one.
 
-use papsynth::Slide;
 use papsynth_dataset::write_png;
 
 use crate::args::{SlideTile, SlideVerb};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::Setup;
 use crate::text_file;
 
@@ -24,9 +23,9 @@ pub(crate) fn run(verb: SlideVerb) -> Result<(), Failure> {
         #[cfg(feature = "zarr")]
         SlideVerb::Finalize(args) => set::finalize(&args),
         #[cfg(not(feature = "zarr"))]
-        SlideVerb::Make(_) | SlideVerb::Finalize(_) => Err(Failure::input(
-            Complaint::new("this build cannot write slides, which are OME-Zarr".to_owned())
-                .help("build with `--features zarr`; `papsynth slide tile` makes any part of a slide as a PNG"),
+        SlideVerb::Make(_) | SlideVerb::Finalize(_) => Err(Failure::wrong(
+            "this build cannot write slides, which are OME-Zarr".to_owned(),
+            "build with `--features zarr`; `papsynth slide tile` makes any part of a slide as a PNG",
         )),
     }
 }
@@ -35,11 +34,11 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
     let pixels = u64::from(args.size[0]) * u64::from(args.size[1]);
     if pixels > MOST_PIXELS {
         let message = format!("--size {},{}: more than {MOST_PIXELS} pixels at once", args.size[0], args.size[1]);
-        return Err(Failure::input(Complaint::new(message).help("`papsynth slide make` makes pictures of any size")));
+        return Err(Failure::wrong(message, "`papsynth slide make` makes pictures of any size"));
     }
     text_file::is_png(&args.out)?;
     let setup = Setup::load(&args.engine, None)?;
-    let slide = open(&setup, args.engine.seed, args.slide)?;
+    let slide = setup.slide(args.engine.seed, args.slide)?;
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.refuse(&e))?;
     let middle = part.planes.len() / 2;
     if part.planes.len() > 1 {
@@ -57,8 +56,4 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
         slide.pixel_um(),
     )?;
     exit::print(&format!("Look at: {}\n", args.out.display()))
-}
-
-fn open(setup: &Setup, seed: u64, number: u64) -> Result<Slide<'_>, Failure> {
-    setup.engine.slide(seed, number).map_err(|error| setup.recipe.refuse(&error))
 }

@@ -6,23 +6,24 @@ use std::ops::Range;
 use papsynth_dataset::{Check, Dataset, shards_to_make};
 
 use crate::args::{Merge, Status, check_of};
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Failure};
 use crate::place;
+use crate::words::{counted, runs};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         let there = crate::slide::there(&args.dir)?;
-        let missing: Vec<Range<u64>> =
-            there.missing.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..run[0] + run.len() as u64).collect();
         let close = (!there.is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
-        return tell(args, &missing, there.shards, close.as_deref());
+        return tell(args, &runs(&there.missing), there.shards, close.as_deref());
     }
     let dataset = Dataset::open(&place::home(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
-        let complaint = Complaint::new("--frames is missing: how many frames there will be".to_owned());
-        return Err(Failure::input(complaint.help("only a slide, or a data set that was merged, knows it by itself")));
+        return Err(Failure::wrong(
+            "--frames is missing: how many frames there will be".to_owned(),
+            "only a slide, or a data set that was merged, knows it by itself",
+        ));
     };
     let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
@@ -57,14 +58,12 @@ pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
         let shards = counted(count(&missing), "shard is", "shards are");
         let message = format!("{dir}: {shards} missing or damaged: {}", listed(&missing));
         let help = "the command that makes the data set, with --verify, makes them, in any share; then merge again";
-        return Err(Failure::input(Complaint::new(message).help(help)));
+        return Err(Failure::wrong(message, help));
     }
     let summary = dataset.finish()?;
     if summary.frames != args.frames {
         let message = format!("{dir}: --frames {}, but {} are there", args.frames, summary.frames);
-        return Err(Failure::input(
-            Complaint::new(message).help("give the number that was meant, or take away what is too much"),
-        ));
+        return Err(Failure::wrong(message, "give the number that was meant, or take away what is too much"));
     }
     let (frames, root) = (counted(summary.frames, "frame", "frames"), summary.root);
     exit::print(&format!("{dir}: {frames}\nroot {root}\nLook at: {dir}/contact-sheet.png\n"))
@@ -79,14 +78,7 @@ fn of_tasks(shards: &[Range<u64>], tasks: u64) -> Vec<Range<u64>> {
     let of_range =
         |range: &Range<u64>| (range.start..range.end.min(range.start.saturating_add(tasks))).map(|n| n % tasks);
     let numbers: BTreeSet<u64> = shards.iter().flat_map(of_range).collect();
-    let mut ranges: Vec<Range<u64>> = Vec::new();
-    for number in numbers {
-        match ranges.last_mut() {
-            Some(last) if last.end == number => last.end += 1,
-            _ => ranges.push(number..number + 1),
-        }
-    }
-    ranges
+    runs(&Vec::from_iter(numbers))
 }
 
 /// Numbers as `sbatch --array` takes them.

@@ -17,17 +17,20 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
         Err(error) => return Err(Failure::input(Complaint::new(error.to_string()))),
     };
     if generate.share.shard.is_some() || generate.engine.threads.is_some() {
-        let complaint = Complaint::new("--shard and --threads are for the script to set");
-        return Err(Failure::input(complaint.help("leave them out; --tasks and --threads before `--` say both")));
+        return Err(Failure::wrong(
+            "--shard and --threads are for the script to set",
+            "leave them out; --tasks and --threads before `--` say both",
+        ));
     }
     check_here(&generate)?;
     let frames = generate.indices().end;
     let (layout, _) = generate.layout.layout(frames);
     let shards = frames.div_ceil(layout.frames_per_shard);
     if args.tasks > shards {
-        let complaint =
-            Complaint::new(format!("{} tasks for {shards} shards; some would have nothing to do", args.tasks));
-        return Err(Failure::input(complaint.help(format!("at most {shards}, or fewer --frames-per-shard"))));
+        return Err(Failure::wrong(
+            format!("{} tasks for {shards} shards; some would have nothing to do", args.tasks),
+            format!("at most {shards}, or fewer --frames-per-shard"),
+        ));
     }
     let script = match args.scheduler.as_str() {
         "slurm" => slurm(args),
@@ -50,8 +53,10 @@ fn check_here(generate: &Generate) -> Result<(), Failure> {
     match &generate.engine.recipe.recipe {
         Some(path) if !path.exists() => {
             if path == Path::new("generate") {
-                let complaint = Complaint::new("`generate` after `--` would be taken for a recipe");
-                return Err(Failure::input(complaint.help("leave it out; what follows it is meant")));
+                return Err(Failure::wrong(
+                    "`generate` after `--` would be taken for a recipe",
+                    "leave it out; what follows it is meant",
+                ));
             }
             exit::note(&format!("{} is not on this machine; the tasks must find it", path.display()));
             Ok(())

@@ -1,13 +1,12 @@
 //! `papsynth sweep`: the same fields under every combination of some settings.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
 use papsynth_dataset::{Dataset, images_of, write_file};
 
-use crate::args::{EngineArgs, RecipeArgs, Sweep};
+use crate::args::Sweep;
 use crate::exit::{self, Complaint, Failure};
 use crate::interrupt::Interrupt;
 use crate::rerender::render;
@@ -33,8 +32,10 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     let axes = args.vary.iter().map(|text| axis(text)).collect::<Result<Vec<_>, _>>()?;
     for (number, axis) in axes.iter().enumerate() {
         if axes[..number].iter().any(|before| before.field == axis.field) {
-            let complaint = Complaint::new(format!("--vary {}: it is varied already", axis.field));
-            return Err(Failure::input(complaint.help("give all its values at once: --vary FIELD=A,B,…")));
+            return Err(Failure::wrong(
+                format!("--vary {}: it is varied already", axis.field),
+                "give all its values at once: --vary FIELD=A,B,…",
+            ));
         }
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
@@ -53,8 +54,8 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
         let name = set_name(number);
         let out = args.out.join(&name);
         render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
-        for image in rows(&out)? {
-            let fixed = [name.as_str(), &image.index, &image.slide, &image.file];
+        for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
+            let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
             table.push_str(&csv_line(fixed.into_iter().chain(values.iter().copied())));
         }
         if !args.quiet {
@@ -72,7 +73,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
 fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
     let refuse = |name: &str| {
         let message = format!("{}: the folder holds something else (`{name}`) and no sweep", out.display());
-        Err(Failure::input(Complaint::new(message).help("choose another, or a new one")))
+        Err(Failure::wrong(message, "choose another, or a new one"))
     };
     let entries = match fs::read_dir(out) {
         Ok(entries) => entries,
@@ -154,28 +155,9 @@ fn combination(axes: &[Axis], mut number: usize) -> Vec<&str> {
 }
 
 fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure> {
-    let EngineArgs { recipe, model, seed, threads } = &args.engine;
-    let mut set = recipe.set.clone();
-    set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
-    let RecipeArgs { recipe, preset, with, camera, .. } = recipe;
-    let recipe = RecipeArgs { recipe: recipe.clone(), preset: *preset, with: with.clone(), camera: *camera, set };
-    Setup::load(&EngineArgs { recipe, model: model.clone(), seed: *seed, threads: *threads }, None)
-}
-
-/// An image of a data set, for the table.
-struct Row {
-    index: String,
-    slide: String,
-    file: String,
-}
-
-fn rows(out: &Path) -> Result<Vec<Row>, Failure> {
-    let dataset = Dataset::open(out)?;
-    let images: BTreeMap<u64, (u64, String)> = images_of(&dataset)?;
-    Ok(images
-        .into_iter()
-        .map(|(index, (slide, file))| Row { index: index.to_string(), slide: slide.to_string(), file })
-        .collect())
+    let mut engine = args.engine.clone();
+    engine.recipe.set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
+    Setup::load(&engine, None)
 }
 
 /// A line of a table; a value with a comma or a quote is quoted.

@@ -1,6 +1,6 @@
 //! Files that the user names: a text to be read, and what may be written.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{Read, stdin};
 use std::path::Path;
 
@@ -17,7 +17,18 @@ pub(crate) fn may_replace(out: &Path, begins: &[u8], what: &str) -> Result<(), F
         return Ok(());
     }
     let message = format!("{}: there is another kind of file of this name; expected {what} or none", out.display());
-    Err(Failure::input(Complaint::new(message).help("choose another name, or remove the file")))
+    Err(Failure::wrong(message, "choose another name, or remove the file"))
+}
+
+/// Makes sure that files can be written to the folder `out`, each in the place of nothing but an older one of its kind.
+#[cfg(any(feature = "calibrate", feature = "judge"))]
+pub(crate) fn may_replace_in(out: &Path, files: &[(&str, &[u8], &str)]) -> Result<(), Failure> {
+    files.iter().try_for_each(|(name, begins, what)| may_replace(&out.join(name), begins, what))?;
+    if out.exists() && !out.is_dir() {
+        let message = format!("--out {}: there is a file of this name; expected a folder", out.display());
+        return Err(Failure::input(Complaint::new(message)));
+    }
+    Ok(())
 }
 
 /// Makes sure that a PNG can be written there, and that its name says nothing else.
@@ -32,6 +43,7 @@ pub(crate) fn is_png(out: &Path) -> Result<(), Failure> {
 }
 
 /// Makes sure, before long work, that a file can be written there, and leaves nothing behind.
+#[cfg(feature = "judge")]
 pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
     if out.is_dir() {
         let message = format!("{}: this is a folder; expected the name of a file", out.display());
@@ -43,7 +55,7 @@ pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
     let name = out.file_name().unwrap_or_default().to_string_lossy();
     let probe = folder.join(format!(".{name}.{}", std::process::id()));
     File::create_new(&probe).map_err(|error| Failure::file("write", out, &error))?;
-    fs::remove_file(&probe).map_err(|error| Failure::file("remove", &probe, &error))
+    std::fs::remove_file(&probe).map_err(|error| Failure::file("remove", &probe, &error))
 }
 
 /// A text and the name it goes by; `-` is standard input.

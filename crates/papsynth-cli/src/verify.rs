@@ -1,15 +1,10 @@
 //! `papsynth verify` and `papsynth clean`: whether a data set is whole, and what does not belong there.
 
-use std::path::Path;
-
-use papsynth_dataset::{Finding, Mend};
-
 use crate::args::{Clean, Verify};
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Failure};
+use crate::findings;
 use crate::place;
-
-/// Findings that are printed in full; the rest is counted.
-const MOST: usize = 50;
+use crate::words::counted;
 
 pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
@@ -25,40 +20,9 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         let (frames, files) = (counted(verdict.frames, "frame", "frames"), counted(verdict.files, "file", "files"));
         exit::print(&format!("{dir}: whole, {frames} in {files}\nroot {root}\n"))?;
     } else {
-        print(&verdict.findings)?;
+        findings::print(&verdict.findings)?;
     }
-    judge(&args.dir, &verdict.findings)
-}
-
-/// Prints what was found, up to a number.
-pub(crate) fn print(findings: &[Finding]) -> Result<(), Failure> {
-    let mut text = String::new();
-    for finding in findings.iter().take(MOST) {
-        text.push_str(&format!("{}: {}\n", finding.path, finding.message));
-    }
-    if findings.len() > MOST {
-        text.push_str(&format!("and {} more\n", findings.len() - MOST));
-    }
-    exit::print(&text)
-}
-
-/// Nothing found is good; else there is something to do.
-pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
-    if findings.is_empty() {
-        return Ok(());
-    }
-    let things = counted(findings.len() as u64, "thing is", "things are");
-    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
-    let mends: Vec<&str> = [
-        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
-        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
-        (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
-    ]
-    .into_iter()
-    .filter(|(mend, _)| wants(*mend))
-    .map(|(_, words)| words)
-    .collect();
-    Err(Failure::input(Complaint::new(format!("{}: {things} wrong", dir.display())).help(mends.join("; "))))
+    findings::judge(&args.dir, &verdict.findings)
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {

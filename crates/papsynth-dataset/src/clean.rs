@@ -4,15 +4,12 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::dataset::{read_record, recorded_shards};
+use crate::dataset::{Manifest, nested, read_record, recorded_shards};
 use crate::error::Error;
-use crate::files::{Folder, is_temporary};
-use crate::layout;
-use crate::nested;
-use crate::record::Manifest;
+use crate::files::{Folder, Home, is_temporary};
+use crate::formats::names;
 #[cfg(feature = "zarr")]
 use crate::slide::SlideSet;
-use crate::store::Home;
 
 /// What [`clean`] took away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -49,7 +46,7 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
     found.retain(|name| !own.contains(name) && !is_temporary(name.rsplit('/').next().unwrap_or(name)));
     if let Some(inner) = nested::below(folder, &found) {
         let message = format!("{} lies within and has files of its own; move it elsewhere first", inner.display());
-        return Err(Error::Folder { path: folder.root().to_owned(), message });
+        return Err(Error::folder(folder.root(), message));
     }
     for name in found {
         if folder.is_remote() || folder.path(&name).symlink_metadata().is_ok() {
@@ -92,12 +89,12 @@ impl Owner {
         if shards.is_empty() || manifest.shards != shards.len() as u64 {
             let message =
                 "what others are writing cannot be told from strays before `papsynth merge` has closed the data set";
-            return Err(Error::Folder { path: folder.root().to_owned(), message: message.to_owned() });
+            return Err(Error::folder(folder.root(), message));
         }
         let mut names: BTreeSet<String> = manifest.files.iter().map(|file| file.path.clone()).collect();
-        names.insert(layout::MANIFEST.to_owned());
+        names.insert(names::MANIFEST.to_owned());
         for shard in shards {
-            names.insert(layout::record(shard));
+            names.insert(names::record(shard));
             names.extend(read_record(folder, shard)?.files.into_iter().map(|file| file.path));
         }
         Ok(names)

@@ -65,6 +65,15 @@ impl Error {
     pub(crate) fn input(path: &Path) -> impl FnOnce(Problem) -> Self {
         move |problem| Self::Input { path: path.to_owned(), problem }
     }
+
+    pub(crate) fn folder(path: &Path, message: impl Into<String>) -> Self {
+        Self::Folder { path: path.to_owned(), message: message.into() }
+    }
+
+    /// What to say of a path that needs a feature which this build lacks.
+    pub(crate) fn missing_feature(what: &str, feature: &str, path: &Path) -> Self {
+        Self::folder(path, format!("{what} needs a build of papsynth with `--features {feature}`"))
+    }
 }
 
 /// What is wrong with a file that was read.
@@ -234,4 +243,20 @@ pub enum Problem {
         /// What is wrong with it, and what would be accepted.
         message: String,
     },
+}
+
+impl Problem {
+    pub(crate) fn broken(format: &'static str, message: impl ToString) -> Self {
+        Self::Broken { format, message: message.to_string() }
+    }
+
+    pub(crate) fn differs(what: impl Into<String>) -> Self {
+        Self::Differs { what: what.into() }
+    }
+}
+
+impl From<serde_json::Error> for Problem {
+    fn from(error: serde_json::Error) -> Self {
+        Self::broken("JSON", error)
+    }
 }

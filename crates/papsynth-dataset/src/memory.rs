@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use papsynth::recipe::{Colour, Imaging, Light, Microscope, Mixing, Number, Optics, Recipe};
 
-use crate::formats::Format;
-use crate::layout::Layout;
+use crate::formats::{Format, Layout};
 
 /// What the program has before the first frame: the model, fields that all frames share.
 const PROGRAM: f64 = 32.0 * MIB;

@@ -1,6 +1,5 @@
 //! What the classifier was most and least sure of, cut from the fields.
 
-use crate::judge::Test;
 use crate::measure::Field;
 use crate::number::whole;
 use crate::table::Table;
@@ -30,15 +29,19 @@ pub(crate) struct Crop {
 /// A name, the table of it, and the side of its picture.
 type Kind = (&'static str, fn(&Field) -> &Table, usize);
 
-pub(crate) fn crops(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample>]) -> Vec<Crop> {
+pub(crate) fn crops<'a>(
+    real: &[Field],
+    synthetic: &[Field],
+    result: impl Fn(&str) -> Option<&'a TwoSample>,
+) -> Vec<Crop> {
     let kinds: [Kind; 2] =
         [("nuclei", |f| &f.nuclei, NUCLEUS_PX), ("patches", |f| &f.patches, crate::measure::PATCH_PX)];
     let mut crops = Vec::new();
     for (of, table, side) in kinds {
-        let Some(test) = tests.iter().find(|t| t.name == of) else { continue };
+        let Some(result) = result(of) else { continue };
         for (is_synthetic, fields) in [(false, real), (true, synthetic)] {
             let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
-            let scores = &test.result.scores[usize::from(is_synthetic)];
+            let scores = &result.scores[usize::from(is_synthetic)];
             let mut all: Vec<(f64, &Field, [f64; 2])> =
                 scores.iter().zip(places).map(|(s, (f, p))| (*s, f, p)).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0));

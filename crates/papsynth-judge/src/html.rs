@@ -22,6 +22,13 @@ svg text{font:11px system-ui,sans-serif;fill:#333}svg .title{font-weight:600;fon
 .crops{display:flex;flex-wrap:wrap;gap:5px}.crops figure{margin:0;font-size:10px;text-align:center;color:#666}\
 .nuclei img{width:80px;image-rendering:pixelated}.patches img{width:150px}.note{color:#555}";
 
+/// Adds text to a page. Writing to a string cannot fail.
+macro_rules! put {
+    ($page:expr, $($text:tt)*) => {{
+        let _ = write!($page, $($text)*);
+    }};
+}
+
 impl Report {
     /// The report as an HTML page: drawings and crops are in it, nothing is loaded from elsewhere. It shows pieces of the pictures
     /// that were judged.
@@ -29,32 +36,28 @@ impl Report {
     pub fn to_html(&self) -> String {
         let mut page = String::new();
         let [real, synthetic] = &self.fields;
-        put(
-            &mut page,
-            format_args!(
-                "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
+        put!(
+            page,
+            "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
              <h1>{} real fields against {} synthetic ones: {}</h1>",
-                real.len(),
-                synthetic.len(),
-                verdict(self.verdict)
-            ),
+            real.len(),
+            synthetic.len(),
+            verdict(self.verdict)
         );
-        put(
-            &mut page,
-            format_args!(
-                "<p>Pixels of {} µm; nuclei {}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
+        put!(
+            page,
+            "<p>Pixels of {} µm; nuclei {}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
              have these colours throughout.</p>",
-                self.gauge.pixel_um,
-                match self.gauge.nuclei_from {
-                    crate::NucleiFrom::Masks => "from masks",
-                    crate::NucleiFrom::Points => "around given points",
-                    crate::NucleiFrom::Search => "found",
-                },
-                self.judge.seed
-            ),
+            self.gauge.pixel_um,
+            match self.gauge.nuclei_from {
+                crate::NucleiFrom::Masks => "from masks",
+                crate::NucleiFrom::Points => "around given points",
+                crate::NucleiFrom::Search => "found",
+            },
+            self.judge.seed
         );
         for note in &self.notes {
-            put(&mut page, format_args!("<p class=\"note\">{}</p>", escape(note)));
+            put!(page, "<p class=\"note\">{}</p>", escape(note));
         }
         summary(&mut page, self);
         for test in &self.two_sample {
@@ -69,11 +72,6 @@ impl Report {
     }
 }
 
-fn put(page: &mut String, text: std::fmt::Arguments) {
-    // Writing to a string cannot fail.
-    let _ = page.write_fmt(text);
-}
-
 fn verdict(verdict: Verdict) -> String {
     let class = if verdict == Verdict::ToldApart { "told" } else { "not" };
     format!("<span class=\"{class}\">{verdict}</span>")
@@ -84,37 +82,33 @@ fn summary(page: &mut String, report: &Report) {
     for test in &report.two_sample {
         let r = &test.result;
         let null = Spread::of(r.null.iter().copied());
-        put(
+        put!(
             page,
-            format_args!(
-                "<tr><td>classifier on {}</td><td>{} / {}</td><td>{:.3}</td><td>{:.3} – {:.3}</td><td>{} ({} – {}), {} rows a half</td><td>{}</td></tr>",
-                escape(&test.name),
-                r.rows[0],
-                r.rows[1],
-                r.auc,
-                r.interval[0],
-                r.interval[1],
-                known(null.p50),
-                known(null.p10),
-                known(null.p90),
-                r.null_rows,
-                verdict(test.verdict)
-            ),
+            "<tr><td>classifier on {}</td><td>{} / {}</td><td>{:.3}</td><td>{:.3} – {:.3}</td><td>{} ({} – {}), {} rows a half</td><td>{}</td></tr>",
+            escape(&test.name),
+            r.rows[0],
+            r.rows[1],
+            r.auc,
+            r.interval[0],
+            r.interval[1],
+            known(null.p50),
+            known(null.p10),
+            known(null.p90),
+            r.null_rows,
+            verdict(test.verdict)
         );
     }
     for test in &report.moments {
         let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
         let slopes: Vec<String> = test.result.descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
-        put(
+        put!(
             page,
-            format_args!(
-                "<tr><td>Q-Q slopes, {}</td><td>{}</td><td></td><td>{}</td><td>{outside} of {} outside</td><td>{}</td></tr>",
-                escape(&test.name),
-                test.result.n,
-                slopes.join(" "),
-                test.result.descriptors.len(),
-                verdict(test.verdict)
-            ),
+            "<tr><td>Q-Q slopes, {}</td><td>{}</td><td></td><td>{}</td><td>{outside} of {} outside</td><td>{}</td></tr>",
+            escape(&test.name),
+            test.result.n,
+            slopes.join(" "),
+            test.result.descriptors.len(),
+            verdict(test.verdict)
         );
     }
     page.push_str(
@@ -131,30 +125,25 @@ fn known(value: Option<f64>) -> String {
 
 fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
     let r = &test.result;
-    put(
+    put!(
         page,
-        format_args!(
-            "<h2>What gives {} away</h2><p>AUC {:.3}, {}. With features of one kind alone: ",
-            escape(&test.name),
-            r.auc,
-            verdict(test.verdict)
-        ),
+        "<h2>What gives {} away</h2><p>AUC {:.3}, {}. With features of one kind alone: ",
+        escape(&test.name),
+        r.auc,
+        verdict(test.verdict)
     );
     let kinds: Vec<String> =
         r.families.iter().map(|f| format!("{} {:.2}", format!("{:?}", f.family).to_lowercase(), f.auc)).collect();
-    put(page, format_args!("{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r)));
+    put!(page, "{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r));
     page.push_str(
         "<table><tr><th>feature</th><th>importance</th><th>AUC alone</th><th class=\"real\">real p10</th><th class=\"real\">p50</th><th class=\"real\">p90</th>\
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th>\
          <th class=\"real\">sd between fields</th><th class=\"synthetic\">sd between fields</th></tr>",
     );
     for g in r.giveaways.iter().take(LISTED) {
-        put(
-            page,
-            format_args!("<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone),
-        );
+        put!(page, "<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone);
         for v in g.real.iter().chain(&g.synthetic).chain(&g.between_fields) {
-            put(page, format_args!("<td>{}</td>", short(*v)));
+            put!(page, "<td>{}</td>", short(*v));
         }
         page.push_str("</tr>");
     }
@@ -175,16 +164,14 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
         if chosen.is_empty() {
             continue;
         }
-        put(page, format_args!("<h3>{title}</h3><div class=\"crops {}\">", test.name));
+        put!(page, "<h3>{title}</h3><div class=\"crops {}\">", test.name);
         for crop in chosen {
-            put(
+            put!(
                 page,
-                format_args!(
-                    "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><br>{:.2} {}</figure>",
-                    base64(&png(&crop.grey, crop.width)),
-                    crop.score,
-                    escape(&crop.field)
-                ),
+                "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><br>{:.2} {}</figure>",
+                base64(&png(&crop.grey, crop.width)),
+                crop.score,
+                escape(&crop.field)
             );
         }
         page.push_str("</div>");
@@ -227,24 +214,22 @@ fn scores(r: &TwoSample) -> String {
 }
 
 fn moments(page: &mut String, test: &Test<Moments>) {
-    put(page, format_args!("<h2>{}: {}</h2>", escape(&test.name), verdict(test.verdict)));
+    put!(page, "<h2>{}: {}</h2>", escape(&test.name), verdict(test.verdict));
     page.push_str(
         "<table><tr><th>descriptor</th><th>Q-Q slope (5 – 95 %)</th><th>between real halves (0.25 – 99.75 %)</th><th>shift, sd (5 – 95 %)</th>\
          <th>between real halves</th></tr>",
     );
     for d in &test.result.descriptors {
         let three = |v: [f64; 3]| format!("{:.2} ({:.2} – {:.2})", v[1], v[0], v[2]);
-        put(
+        put!(
             page,
-            format_args!(
-                "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                if d.within { "" } else { " class=\"out\"" },
-                escape(&d.name),
-                three(d.slope),
-                three(d.null_slope),
-                three(d.shift),
-                three(d.null_shift)
-            ),
+            "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            if d.within { "" } else { " class=\"out\"" },
+            escape(&d.name),
+            three(d.slope),
+            three(d.null_slope),
+            three(d.shift),
+            three(d.null_shift)
         );
     }
     page.push_str("</table><div class=\"plots\">");
@@ -269,9 +254,9 @@ fn beside(page: &mut String, beside: &Beside) {
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th></tr>",
     );
     for s in &beside.scalars {
-        put(page, format_args!("<tr{}><td>{}</td>", if s.within { "" } else { " class=\"out\"" }, escape(&s.name)));
+        put!(page, "<tr{}><td>{}</td>", if s.within { "" } else { " class=\"out\"" }, escape(&s.name));
         for v in [s.real.p10, s.real.p50, s.real.p90, s.synthetic.p10, s.synthetic.p50, s.synthetic.p90] {
-            put(page, format_args!("<td>{}</td>", known(v)));
+            put!(page, "<td>{}</td>", known(v));
         }
         page.push_str("</tr>");
     }

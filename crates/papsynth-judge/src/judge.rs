@@ -154,7 +154,8 @@ impl Judge {
             .map(|t| t.verdict)
             .chain(moments.iter().map(|t| t.verdict))
             .any(|v| v == Verdict::ToldApart);
-        let crops = crops(real, synthetic, &two_sample);
+        let result = |name: &str| two_sample.iter().find(|test| test.name == name).map(|test| &test.result);
+        let crops = crops(real, synthetic, result);
         let names = |fields: &[Field]| fields.iter().map(|f| f.name.clone()).collect();
         Ok(Report {
             judge_report: VERSION,

@@ -15,7 +15,7 @@ mod number;
 mod picture;
 mod region;
 mod statistics;
-mod svg;
+pub mod svg;
 mod table;
 mod tree;
 mod two_sample;

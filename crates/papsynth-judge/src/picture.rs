@@ -32,6 +32,20 @@ pub struct Picture {
     pub nuclei: Known,
 }
 
+impl Default for Picture {
+    /// No pixels, of 8 bits, of which nothing is known.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            group: String::new(),
+            grey: Vec::new(),
+            width: 0,
+            full_scale: 255.0,
+            nuclei: Known::Nothing,
+        }
+    }
+}
+
 /// Smallest picture that is measured, pixels a side.
 pub(crate) const LEAST_SIDE: usize = 32;
 

@@ -1,19 +1,21 @@
-//! Small drawings as SVG.
+//! Small drawings as SVG, with plain text and no fonts of their own.
 
 use std::fmt::Write;
 
 /// Colour of real things, and of synthetic ones: told apart with defective colour vision too (Okabe and Ito).
-pub(crate) const COLOURS: [&str; 2] = ["#0072b2", "#d55e00"];
+pub const COLOURS: [&str; 2] = ["#0072b2", "#d55e00"];
 
-const WIDTH: f64 = 380.0;
-const HEIGHT: f64 = 260.0;
+/// Columns and rows of a drawing among others on a page.
+const SMALL: [f64; 2] = [380.0, 260.0];
 const LEFT: f64 = 52.0;
 const BOTTOM: f64 = 40.0;
 const TOP: f64 = 24.0;
 const RIGHT: f64 = 10.0;
 
 /// Axes with things on them.
-pub(crate) struct Plot {
+#[derive(Debug, Clone)]
+pub struct Plot {
+    size: [f64; 2],
     x: [f64; 2],
     y: [f64; 2],
     body: String,
@@ -21,15 +23,21 @@ pub(crate) struct Plot {
 
 impl Plot {
     /// Axes that hold all of these values, with a little room; what is not finite does not count.
-    pub(crate) fn new(
+    pub fn new(
         title: &str,
         x_name: &str,
         y_name: &str,
         x: impl Iterator<Item = f64>,
         y: impl Iterator<Item = f64>,
     ) -> Self {
-        let mut plot = Self { x: range(x), y: range(y), body: String::new() };
-        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        Self::sized(SMALL, title, x_name, y_name, range(x), range(y))
+    }
+
+    /// Axes from one value to another, in a drawing of so many columns and rows.
+    #[must_use]
+    pub fn sized(size: [f64; 2], title: &str, x_name: &str, y_name: &str, x: [f64; 2], y: [f64; 2]) -> Self {
+        let mut plot = Self { size, x, y, body: String::new() };
+        let (right, bottom) = (size[0] - RIGHT, size[1] - BOTTOM);
         plot.put(&format!(r##"<path d="M{LEFT} {TOP}V{bottom}H{right}" fill="none" stroke="#444"/>"##));
         for v in ticks(plot.x) {
             let at = plot.x(v);
@@ -40,7 +48,7 @@ impl Plot {
             plot.put(&format!(r##"<path d="M{LEFT} {at:.1}h-4" stroke="#444"/><text x="{:.1}" y="{:.1}" text-anchor="end">{}</text>"##, LEFT - 6.0, at + 3.5, short(v)));
         }
         plot.put(&format!(r#"<text class="title" x="{LEFT}" y="14">{}</text>"#, escape(title)));
-        plot.put(&format!(r#"<text x="{right}" y="{:.1}" text-anchor="end">{}</text>"#, HEIGHT - 6.0, escape(x_name)));
+        plot.put(&format!(r#"<text x="{right}" y="{:.1}" text-anchor="end">{}</text>"#, size[1] - 6.0, escape(x_name)));
         plot.put(&format!(
             r#"<text x="12" y="{TOP}" text-anchor="end" transform="rotate(-90 12 {TOP})">{}</text>"#,
             escape(y_name)
@@ -53,11 +61,12 @@ impl Plot {
     }
 
     fn x(&self, v: f64) -> f64 {
-        LEFT + (v - self.x[0]) / (self.x[1] - self.x[0]) * (WIDTH - LEFT - RIGHT)
+        LEFT + (v - self.x[0]) / (self.x[1] - self.x[0]) * (self.size[0] - LEFT - RIGHT)
     }
 
     fn y(&self, v: f64) -> f64 {
-        HEIGHT - BOTTOM - (v - self.y[0]) / (self.y[1] - self.y[0]) * (HEIGHT - BOTTOM - TOP)
+        let [_, height] = self.size;
+        height - BOTTOM - (v - self.y[0]) / (self.y[1] - self.y[0]) * (height - BOTTOM - TOP)
     }
 
     fn path(&self, points: impl Iterator<Item = [f64; 2]>) -> String {
@@ -75,36 +84,58 @@ impl Plot {
     }
 
     /// A line through points, broken where one is not finite.
-    pub(crate) fn line(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
+    pub fn line(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
         let path = self.path(points);
         self.put(&format!(r#"<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.8"/>"#));
     }
 
     /// A pale area between two lines.
-    pub(crate) fn band(&mut self, lower: &[[f64; 2]], upper: &[[f64; 2]], colour: &str) {
+    pub fn band(&mut self, lower: &[[f64; 2]], upper: &[[f64; 2]], colour: &str) {
         let known = |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite();
         let path = self.path(lower.iter().filter(known).chain(upper.iter().rev().filter(known)).copied());
         self.put(&format!(r#"<path d="{path}Z" fill="{colour}" fill-opacity="0.15" stroke="none"/>"#));
     }
 
     /// A dot at each point.
-    pub(crate) fn dots(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
+    pub fn dots(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
         for [x, y] in points.filter(|p| p[0].is_finite() && p[1].is_finite()) {
             let (x, y) = (self.x(x), self.y(y));
             self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="{colour}" fill-opacity="0.7"/>"#));
         }
     }
 
+    /// A ring at each point.
+    pub fn rings(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
+        for [x, y] in points {
+            let (x, y) = (self.x(x), self.y(y));
+            self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="none" stroke="{colour}"/>"#));
+        }
+    }
+
     /// A dashed line between two points.
-    pub(crate) fn dashes(&mut self, from: [f64; 2], to: [f64; 2]) {
+    pub fn dashes(&mut self, from: [f64; 2], to: [f64; 2]) {
         let path = self.path([from, to].into_iter());
         self.put(&format!(r##"<path d="{path}" stroke="#888" stroke-dasharray="4 3"/>"##));
     }
 
-    /// The drawing.
-    pub(crate) fn finish(self) -> String {
+    /// The drawing as a part of an HTML page, whose style sheet says how text looks.
+    #[must_use]
+    pub fn finish(self) -> String {
+        let [width, height] = self.size;
         format!(
-            r#"<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{}</svg>"#,
+            r#"<svg viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img">{}</svg>"#,
+            self.body
+        )
+    }
+
+    /// The drawing as a file of its own.
+    #[must_use]
+    pub fn document(self) -> String {
+        let [width, height] = self.size;
+        let style = "text{font:12px sans-serif;fill:#444}.title{font-weight:600}";
+        format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}"><style>{style}</style><rect width="100%" height="100%" fill="#fff"/>{}</svg>
+"##,
             self.body
         )
     }

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod array;
+mod calibrate;
 mod convert;
 mod engine;
 mod error;
@@ -24,6 +25,10 @@ mod _native {
         Ok(())
     }
 
+    #[pymodule_export]
+    use crate::calibrate::calibrate_camera;
+    #[pymodule_export]
+    use crate::calibrate::calibrate_microscope;
     #[pymodule_export]
     use crate::engine::Engine;
     #[pymodule_export]

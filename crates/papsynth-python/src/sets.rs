@@ -205,10 +205,7 @@ pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Strin
 
 /// The data set at a path or an address.
 fn home(path: &Path) -> Result<Home, papsynth_dataset::Error> {
-    #[cfg(feature = "cloud")]
-    return papsynth_cloud::Bucket::home(path);
-    #[cfg(not(feature = "cloud"))]
-    return Ok(Home::from(path));
+    Home::at(path)
 }
 
 /// Numbers of the shards that are not whole, from commit records: also while others work.

@@ -385,6 +385,59 @@ def test_a_class_is_learned_and_rendered():
             papsynth.learn(**{"name": "mine", "pixel_um": 0.25, "nuclei": nuclei, "like": "intermediate", **wrong})
 
 
+def test_a_microscope_is_measured():
+    y, x = np.mgrid[:96, :96].astype(np.float64)
+
+    def smooth_step(distance, sigma):
+        from math import erf
+
+        return 0.5 * (1 + np.vectorize(erf)(distance / (sigma * 2**0.5)))
+
+    edge = 80 + 120 * smooth_step(0.8 * (x - 45.3) + 0.6 * (y - 50.1), 0.9)
+    found = papsynth.calibrate_microscope(edge=edge, pixel_um=0.2)
+    assert abs(found["edge"]["sigma_px"] - 0.9) < 0.02 and "focus" not in found
+    assert abs(found["recipe_gaussian"]["optics"]["sigma_xy_um"] - 0.18) < 0.005
+    assert papsynth.recipe(found["recipe"])["optics"]["kind"] == "bright-field"
+    # A disk with spots, blurred more with each plane from the fourth.
+    planes = []
+    for plane in range(9):
+        sigma = (0.8**2 + (0.6 * (plane - 4)) ** 2) ** 0.5
+        image = 200 - 80 * smooth_step(16 - np.hypot(x - 48, y - 48), sigma)
+        for u, v in ((40, 44), (55, 50), (47, 57), (52, 40)):
+            image -= 60 * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * (sigma**2 + 4))) * 4 / (sigma**2 + 4)
+        planes.append(image)
+    stack = papsynth.calibrate_microscope(np.array(planes), windows=[(22, 22, 52, 52)])
+    assert stack["focus"]["nuclei"][0]["focused"] == 4 and stack["recipe"] is None
+    assert stack == papsynth.calibrate_microscope(np.array(planes), windows=[(22, 22, 52, 52)], threads=1)
+    for wrong in (
+        {},
+        {"stack": planes[:2]},
+        {"stack": [np.zeros((64, 64))] * 4},
+        {"edge": edge, "na": 1.2},
+        {"edge": edge, "line": (0, 0, 4, 0)},
+        {"stack": [planes[0], planes[1][:50], planes[2]]},
+    ):
+        with pytest.raises(ValueError):
+            papsynth.calibrate_microscope(**wrong)
+
+
+def test_a_camera_is_measured():
+    random = np.random.default_rng(5)
+
+    def frames(electrons, count=2):
+        charge = random.poisson(electrons, (count, 128, 128)) + random.normal(0, 9, (count, 128, 128))
+        return np.clip(np.rint(100 + 0.25 * charge), 0, 4095).astype(np.uint16)
+
+    flats, darks = [frames(electrons) for electrons in (1000, 4000, 8000, 12000)], frames(0, 8)
+    found = papsynth.calibrate_camera(flats, darks, bits=12)
+    assert abs(found["camera"]["gain_dn_per_e"] - 0.25) < 0.006 and len(found["camera"]["levels"]) == 5
+    assert abs(found["recipe"]["camera"]["offset_dn"] - 100) < 0.2 and found["recipe"]["camera"]["bits"] == 12
+    papsynth.recipe(found["recipe"])
+    for wrong in ((flats, darks, 8), (flats, [], 12), (flats, darks, 17), (flats, darks + 0.5, 12), (flats, darks, None)):
+        with pytest.raises(ValueError):
+            papsynth.calibrate_camera(*wrong[:2], bits=wrong[2])
+
+
 def test_fields_are_judged():
     recipe = {"field": {"width_px": 640, "height_px": 480}}
     one, other = ([papsynth.render(recipe, seed=seed, index=index).image for index in range(6)] for seed in (1, 2))

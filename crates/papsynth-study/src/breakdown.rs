@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::design::Side;
+use crate::judged::Judged;
 use crate::parameters::Value;
-use crate::results::Judged;
 use crate::score::Proportion;
 
 /// So many different values are a group each; more numbers are sorted into thirds.

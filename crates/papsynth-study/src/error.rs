@@ -61,9 +61,6 @@ pub enum Error {
         /// Patches that the study shows.
         needed: usize,
     },
-    /// The page cannot be served.
-    #[error(transparent)]
-    Server(#[from] papsynth_loopback::Error),
 }
 
 impl Error {

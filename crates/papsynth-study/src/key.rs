@@ -1,15 +1,8 @@
 //! Random numbers, and what they hang on.
 
-use rand_core::{Rng, SeedableRng};
+use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use sha2::{Digest, Sha256};
-
-/// Uniform in (0, 1].
-pub(crate) fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    /// Bits of an f64's fraction.
-    const BITS: u32 = 53;
-    ((rng.next_u64() >> (u64::BITS - BITS)) + 1) as f64 / (1_u64 << BITS) as f64
-}
 
 /// What random numbers of a study hang on, besides what each is for.
 #[derive(Debug, Clone)]

@@ -5,6 +5,7 @@ mod breakdown;
 mod design;
 mod error;
 mod fields;
+mod judged;
 mod key;
 mod normal;
 mod parameters;
@@ -18,7 +19,6 @@ mod session;
 #[cfg(test)]
 mod support;
 mod table;
-mod web;
 
 pub use breakdown::Group;
 pub use design::{Grey, Order, RANDOM, Side, Stage, StudyParams, Task, order};
@@ -27,6 +27,5 @@ pub use rand_core::Rng;
 pub use results::{Claim, Exposures, Pool, Row, Summary};
 pub use saved::{Answer, Exposure};
 pub use score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
-pub use session::{Session, State};
+pub use session::{Refusal, Session, State};
 pub use table::{breakdown_table, table};
-pub use web::serve;

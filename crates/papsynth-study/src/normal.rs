@@ -1,6 +1,6 @@
 //! The normal distribution and Student's t.
 
-use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, SQRT_2};
+use std::f64::consts::{FRAC_2_PI, PI, SQRT_2};
 
 /// Standard normal deviate that a two-sided interval of 95 % reaches to: Φ⁻¹(.975).
 pub(crate) const Z_95: f64 = 1.959_963_984_540_054;
@@ -55,13 +55,6 @@ fn inverse(function: impl Fn(f64) -> f64, value: f64) -> f64 {
         if function(middle) < value { low = middle } else { high = middle }
     }
     0.5 * (low + high)
-}
-
-/// Two independent standard normal deviates from two uniform ones in (0, 1], by Box and Muller.
-pub(crate) fn pair(u: f64, v: f64) -> [f64; 2] {
-    let radius = (-2.0 * libm::log(u)).sqrt();
-    let angle = 4.0 * FRAC_PI_2 * v;
-    [radius * libm::cos(angle), radius * libm::sin(angle)]
 }
 
 #[cfg(test)]

@@ -1,24 +1,17 @@
 //! A patch as it is sent: with noise, as a PNG of which nothing but the pixels differs between patches.
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter};
+use portable_numerics::random::Normals;
 use rand_core::Rng;
-
-use crate::key::unit;
-use crate::normal::pair;
 
 /// Adds Gaussian noise of `sigma` grey levels and rounds to 8 bits. Each pixel takes the same random numbers whatever its level.
 pub(crate) fn noisy<R: Rng + ?Sized>(levels: &[f32], sigma: f64, rng: &mut R) -> Vec<u8> {
-    let mut spare = None;
+    let mut normals = Normals::new(rng);
     levels
         .iter()
         .map(|&level| {
-            let deviate = spare.take().unwrap_or_else(|| {
-                let [one, other] = pair(unit(rng), unit(rng));
-                spare = Some(other);
-                one
-            });
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates: black and white")]
-            let grey = (f64::from(level) + sigma * deviate + 0.5) as u8;
+            let grey = (f64::from(level) + sigma * normals.draw() + 0.5) as u8;
             grey
         })
         .collect()

@@ -6,9 +6,9 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::breakdown::{Group, breakdown};
-use crate::design::{RANDOM, Side, Stage, StudyParams, Task};
+use crate::design::{RANDOM, StudyParams, Task};
 use crate::error::Error;
-use crate::plan::{Plan, Trial};
+use crate::judged::{Judged, counted};
 use crate::saved::{Answered, Saved, read_all};
 use crate::score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
 
@@ -196,34 +196,6 @@ impl Pool {
     }
 }
 
-/// A trial and what was said to it.
-#[derive(Clone, Copy)]
-pub(crate) struct Judged<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) trial: &'a Trial,
-    pub(crate) answered: &'a Answered,
-}
-
-impl Judged<'_> {
-    /// Whether the first patch is real.
-    pub(crate) fn is_positive(&self) -> bool {
-        self.trial.patches.first().is_some_and(|patch| patch.side == Side::Real)
-    }
-
-    pub(crate) fn is_correct(&self) -> bool {
-        self.is_positive() == self.answered.answer.is_positive()
-    }
-}
-
-pub(crate) fn answered(saved: &Saved) -> impl Iterator<Item = Judged<'_>> {
-    let pairs = saved.plan.trials.iter().zip(&saved.answers);
-    pairs.map(|(trial, answered)| Judged { plan: &saved.plan, trial, answered })
-}
-
-fn counted(saved: &Saved) -> impl Iterator<Item = Judged<'_>> {
-    answered(saved).filter(|judged| judged.trial.stage == Stage::Counted)
-}
-
 fn counts(judged: &[Judged]) -> Counts {
     let mut counts = Counts::default();
     judged.iter().for_each(|one| counts.count(one.is_positive(), one.answered.answer.is_positive()));
@@ -254,6 +226,7 @@ fn exposures(params: &StudyParams, answers: &[Answered]) -> Option<Exposures> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::Side;
     use crate::saved::{Answer, Exposure};
     use crate::session::Session;
     use crate::support::{Scratch, study_folders};

@@ -21,7 +21,7 @@ const LOCK: &str = ".lock";
 
 /// Why something that a page sent is not taken.
 #[derive(Debug)]
-pub(crate) enum Refusal {
+pub enum Refusal {
     /// It does not fit what is asked now: another page has gone on, or the answer arrived already.
     Stale,
     /// It is nothing that a page of ours sends.
@@ -176,8 +176,11 @@ impl Session {
         Ok(())
     }
 
-    /// A patch of the trial under way, if it has not been seen yet. Asking for the first one counts as a showing.
-    pub(crate) fn patch(&mut self, name: &str) -> Result<&[u8], Refusal> {
+    /// A patch of the trial under way, as a PNG file, if it has not been seen yet. Asking for the first one counts as a showing.
+    ///
+    /// # Errors
+    /// If no patch of that name is asked for now, or the showing could not be written down.
+    pub fn patch(&mut self, name: &str) -> Result<&[u8], Refusal> {
         let trial = self.saved.answers.len();
         let slots = self.patches.get(trial).map_or(0, Vec::len);
         let slot = (0..slots).find(|&slot| self.saved.plan.patch_name(&self.key, trial, slot) == name);
@@ -190,7 +193,10 @@ impl Session {
     }
 
     /// The patches of the trial under way were seen. What arrives twice counts once.
-    pub(crate) fn shown(&mut self, name: &str, exposure: Exposure) -> Result<(), Refusal> {
+    ///
+    /// # Errors
+    /// If it is not what is asked now, makes no sense, or could not be written down.
+    pub fn shown(&mut self, name: &str, exposure: Exposure) -> Result<(), Refusal> {
         if !exposure.is_sound() {
             return Err(Refusal::Nonsense);
         }
@@ -202,7 +208,10 @@ impl Session {
     }
 
     /// The answer to the trial under way, whose patches have been seen.
-    pub(crate) fn answer(&mut self, name: &str, answer: Answer, response_ms: f64) -> Result<(), Refusal> {
+    ///
+    /// # Errors
+    /// If it is not what is asked now, makes no sense, or could not be written down.
+    pub fn answer(&mut self, name: &str, answer: Answer, response_ms: f64) -> Result<(), Refusal> {
         if !is_time(response_ms) || !answer.fits(self.saved.params.task) {
             return Err(Refusal::Nonsense);
         }

@@ -5,9 +5,10 @@ use std::fmt::Write;
 
 use crate::breakdown::{FIELD, Group};
 use crate::design::{Side, Stage, Task};
+use crate::judged::answered;
 use crate::parameters::Value;
 use crate::plan::Patch;
-use crate::results::{Row, answered};
+use crate::results::Row;
 use crate::saved::{Answered, Saved};
 use crate::score::{Interval, Proportion};
 

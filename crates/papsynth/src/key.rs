@@ -13,7 +13,10 @@ pub type Stream = Xoshiro256PlusPlus;
 
 /// Version of the mapping from keys to numbers, and from numbers to images. It changes when the same recipe,
 /// model, seed and index would give another image, and is recorded with every data set.
-pub const STREAM_VERSION: u32 = 3;
+pub const STREAM_VERSION: u32 = 4;
+
+/// The [`STREAM_VERSION`] that last changed the random numbers themselves: versions since then draw the same numbers.
+const NUMBERS_VERSION: u32 = 3;
 
 /// What names one image: the seed of the data set and the index of the image in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -49,7 +52,7 @@ impl Key {
     pub fn stream(&self, kind: &str, object: u64, purpose: &str) -> Stream {
         let mut hash = Sha256::new();
         hash.update(b"papsynth");
-        hash.update(STREAM_VERSION.to_le_bytes());
+        hash.update(NUMBERS_VERSION.to_le_bytes());
         hash.update(self.seed.to_le_bytes());
         hash.update(self.index.to_le_bytes());
         hash.update(object.to_le_bytes());

@@ -157,12 +157,7 @@ impl Rendering {
                 let own = within(self.scene.place_um(object)) && !object.body.kind().is_layer();
                 for piece in &phantom.pieces {
                     if own {
-                        let cover = piece.cover_of_pixels(n);
-                        let at = [0, 1].map(|axis| cover.origin[axis] + origin_px[axis]);
-                        let inside = |share: f32| share >= COVERED;
-                        let [width, height] = size_px.map(|side| side as usize);
-                        let mask = Mask::from_tile(&cover.values, cover.width, at, width, height, inside);
-                        let covered = cover.values.iter().filter(|share| inside(**share)).count() as u64;
+                        let (mask, covered) = mask_of(piece, n, origin_px, size_px.map(|side| side as usize));
                         if !mask.is_empty() {
                             let mut row = self.row(object, phantom, piece, &mask, number);
                             row.truncated = mask.area() < covered;
@@ -311,16 +306,18 @@ impl Plane {
 /// The complete masks of all pieces, and how many pixels each covers when those outside the image count too.
 fn masks(scene: &Scene, phantoms: &[Phantom], threads: Threads) -> (Vec<Vec<Mask>>, Vec<Vec<u64>>) {
     let (view, n) = (scene.view, scene.oversampling());
-    let both = threads::map(threads, phantoms, |phantom| {
-        let mask = |piece: &phantom::Piece| {
-            let cover = piece.cover_of_pixels(n);
-            let inside = |share: f32| share >= COVERED;
-            let mask = Mask::from_tile(&cover.values, cover.width, cover.origin, view.width, view.height, inside);
-            (mask, cover.values.iter().filter(|share| inside(**share)).count() as u64)
-        };
-        phantom.pieces.iter().map(mask).unzip()
-    });
+    let mask = |piece: &phantom::Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);
+    let both = threads::map(threads, phantoms, |phantom| phantom.pieces.iter().map(mask).unzip());
     both.into_iter().unzip()
+}
+
+/// The mask of a piece in an image of that size, which begins `origin_px` before the scene's; and its pixels inside and outside.
+fn mask_of(piece: &phantom::Piece, n: usize, origin_px: [i64; 2], [width, height]: [usize; 2]) -> (Mask, u64) {
+    let cover = piece.cover_of_pixels(n);
+    let at = [0, 1].map(|axis| cover.origin[axis] + origin_px[axis]);
+    let inside = |share: f32| share >= COVERED;
+    let mask = Mask::from_tile(&cover.values, cover.width, at, width, height, inside);
+    (mask, cover.values.iter().filter(|share| inside(**share)).count() as u64)
 }
 
 /// One plane on its way through the camera.

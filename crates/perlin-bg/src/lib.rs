@@ -5,9 +5,9 @@ mod background;
 mod error;
 mod fractal;
 mod illumination;
-mod kernel;
 #[cfg(feature = "noise")]
-mod noise_fn;
+mod interop;
+mod kernel;
 mod perlin;
 mod rows;
 mod unit;

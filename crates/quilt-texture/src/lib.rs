@@ -3,11 +3,11 @@
 
 mod candidates;
 mod canvas;
-#[cfg(feature = "image")]
-mod convert;
 mod distance;
 mod draw;
 mod error;
+#[cfg(feature = "image")]
+mod interop;
 mod params;
 mod quilter;
 mod scan;

@@ -5,14 +5,14 @@
 mod error;
 mod field;
 #[cfg(feature = "noise")]
-mod noise_fn;
+mod interop;
 mod params;
 mod spectrum;
 
 pub use error::Error;
 pub use field::SpectralField;
 #[cfg(feature = "noise")]
-pub use noise_fn::DrawnField;
+pub use interop::DrawnField;
 pub use params::{FieldParams, Padding};
 pub use rand_core::Rng;
 pub use spectrum::Spectrum;

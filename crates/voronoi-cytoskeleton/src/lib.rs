@@ -2,12 +2,12 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod build;
-#[cfg(any(feature = "mint", feature = "nalgebra"))]
-mod convert;
 mod diagram;
 mod draw;
 mod error;
 mod geometry;
+#[cfg(any(feature = "mint", feature = "nalgebra"))]
+mod interop;
 mod lloyd;
 mod outline;
 mod river;

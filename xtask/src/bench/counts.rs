@@ -1,29 +1,27 @@
 //! Instructions of small works, compared with those that are kept.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
-use serde_json::Value;
+use anyhow::{Context, Result, ensure};
 
 use crate::arguments::Arguments;
-use crate::outcome::Outcome;
+use crate::chore::Outcome;
 use crate::shell;
 use crate::workspace::Workspace;
 
-/// The works, and the counts that are kept of them.
-pub(super) const PACKAGE: &str = "papsynth-benches";
-const BENCH: &str = "counts";
-const FILE: &str = "benches/counts.toml";
-const HEAD: &str = "# Instructions of the works of benches/benches/counts.rs, for each compiler.\n\
-                    # `cargo xtask bench counts --bless` writes this file.\n";
+/// The program that does the works, and the counts that are kept of them.
+const PACKAGE: &str = "papsynth-benches";
+const PROGRAM: &str = "counts";
+const FILE: &str = "benches/counts.json";
 
-/// The program that runs the works; its version must be the library's.
-const RUNNER: &str = "gungraun-runner";
-const RUNNER_VERSION: &str = "0.20.0";
+/// Makes the C library clear and copy memory by plain vectors at every size. Else it goes by the caches of the machine, and a string
+/// instruction counts once for each byte.
+const PLAIN_MEMORY: &str = "glibc.cpu.x86_rep_movsb_threshold=0xffffffffffffffff:\
+                            glibc.cpu.x86_rep_stosb_threshold=0xffffffffffffffff:\
+                            glibc.cpu.x86_non_temporal_threshold=0xfffffffffffffff";
 
 /// How many per cent more or less than is kept go without a word.
 const TOLERANCE_PERCENT: f64 = 2.0;
@@ -43,18 +41,14 @@ pub(super) fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Out
     if !bless && !kept.contains_key(&compiler) {
         return Outcome::skipped_unless_ci(format!("{FILE} has no counts for {compiler}; --bless adds them"));
     }
-    let tools = match runner(workspace)? {
-        Ok(tools) => tools,
-        Err(reason) => return Outcome::skipped_unless_ci(reason),
-    };
-    let found = count(workspace, &tools)?;
+    let found = count(workspace)?;
     let old = kept.get(&compiler).cloned().unwrap_or_default();
     let lines = compare(&old, &found);
     println!("\nInstructions, {compiler}:\n\n{}", table(&lines));
     if bless {
         kept.insert(compiler, found);
-        let text = toml::to_string(&kept).context("counts as TOML")?;
-        fs::write(&path, format!("{HEAD}\n{text}")).with_context(|| format!("cannot write {FILE}"))?;
+        let text = serde_json::to_string_pretty(&kept).context("counts as JSON")?;
+        fs::write(&path, text + "\n").with_context(|| format!("cannot write {FILE}"))?;
         println!("{FILE} holds them now.");
         return Ok(Outcome::Done);
     }
@@ -81,55 +75,43 @@ fn compiler(workspace: &Workspace) -> Result<String> {
 
 fn read(path: &Path) -> Result<BTreeMap<String, Counts>> {
     match fs::read_to_string(path) {
-        Ok(text) => toml::from_str(&text).with_context(|| format!("{FILE} is not in order")),
+        Ok(text) => serde_json::from_str(&text).with_context(|| format!("{FILE} is not in order")),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(BTreeMap::new()),
         Err(error) => Err(error).with_context(|| format!("cannot read {FILE}")),
     }
 }
 
-/// The `PATH` with the runner on it, which is installed below the target folder if it is not there; or why it cannot be had.
-fn runner(workspace: &Workspace) -> Result<Result<OsString, String>> {
-    let root = workspace.target.join("tools");
-    let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
-    if !installed.contains(&format!("\"{RUNNER} {RUNNER_VERSION} ")) {
-        let mut command = workspace.cargo();
-        let version = format!("={RUNNER_VERSION}");
-        // Optimised it would take three times as long to compile, and all it does is to read what valgrind wrote.
-        command.args(["install", RUNNER, "--version", &version, "--locked", "--debug", "--root"]).arg(&root);
-        if let Err(error) = shell::run(&mut command) {
-            return Ok(Err(format!("{RUNNER} {RUNNER_VERSION} cannot be installed: {error}")));
-        }
-    }
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders = [root.join("bin")].into_iter().chain(std::env::split_paths(&path));
-    Ok(Ok(std::env::join_paths(folders).context("the PATH cannot be extended")?))
+/// Builds the program and runs each of its works under valgrind.
+fn count(workspace: &Workspace) -> Result<Counts> {
+    // With the features that the program papsynth has, so that both share what they are built of.
+    let packages = ["--package", PACKAGE, "--package", "papsynth-cli"];
+    shell::run(workspace.cargo().args(["build", "--release", "--bin", PROGRAM]).args(packages))?;
+    let program = workspace.target.join("release").join(PROGRAM);
+    let names = shell::output(&mut Command::new(&program))?;
+    names.lines().map(|name| Ok((name.to_owned(), instructions(&program, name)?))).collect()
 }
 
-/// Runs the works under valgrind.
-fn count(workspace: &Workspace, path: &OsString) -> Result<Counts> {
-    workspace.expect_target(PACKAGE, "bench", BENCH)?;
-    let mut command = workspace.cargo();
-    command.args(["bench", "--package", PACKAGE, "--bench", BENCH]);
-    // Whatever a person has set for other programs of this kind would change the counts or their form.
-    let theirs =
-        std::env::vars_os().map(|(name, _)| name).filter(|name| name.to_string_lossy().starts_with("GUNGRAUN_"));
-    theirs.for_each(|name| {
-        command.env_remove(name);
-    });
-    command.env("PATH", path).env("GUNGRAUN_OUTPUT_FORMAT", "json");
-    let text = shell::output(&mut command)?;
-    let counts = text.lines().filter(|line| line.starts_with('{')).map(summary).collect::<Result<Counts>>()?;
-    ensure!(!counts.is_empty(), "the works told no counts");
-    Ok(counts)
+/// Instructions of a work, without those of its inputs.
+fn instructions(program: &Path, work: &str) -> Result<u64> {
+    let mut valgrind = Command::new("valgrind");
+    valgrind.args([
+        "--tool=callgrind",
+        "--cache-sim=no",
+        "--toggle-collect=*counted*",
+        "--callgrind-out-file=/dev/null",
+    ]);
+    // No other variable: the environment moves memory, and with it the counts.
+    valgrind.arg(program).arg(work).env_clear().env("GLIBC_TUNABLES", PLAIN_MEMORY);
+    let output = valgrind.output().context("cannot start valgrind")?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "`{work}` failed under valgrind ({}): {text}", output.status);
+    collected(&text).with_context(|| format!("valgrind counted nothing of `{work}`: {text}"))
 }
 
-/// The name and the count of a line of JSON.
-fn summary(line: &str) -> Result<(String, u64)> {
-    let value: Value = serde_json::from_str(line).with_context(|| format!("no JSON: {line}"))?;
-    let name = value.get("id").and_then(Value::as_str);
-    let count = value.pointer("/profiles/0/data/total/metrics/Ir/values/new").and_then(Value::as_u64);
-    let Some((name, count)) = name.zip(count) else { bail!("no count of instructions in {line}") };
-    Ok((name.to_owned(), count))
+/// The number in the line `==1== Collected : 42`.
+fn collected(text: &str) -> Option<u64> {
+    let number = text.lines().find_map(|line| line.split_once("Collected :"))?.1.trim().parse().ok()?;
+    (number > 0).then_some(number)
 }
 
 /// A work, what is kept and what was found.
@@ -216,9 +198,9 @@ mod tests {
     }
 
     #[test]
-    fn a_summary_has_its_count() {
-        let line = r#"{"id":"blur","profiles":[{"data":{"total":{"metrics":{"Ir":{"values":{"new":42,"old":41}}}}}}]}"#;
-        assert_eq!(summary(line).unwrap(), ("blur".to_owned(), 42));
-        assert!(summary("{}").is_err());
+    fn the_count_is_read() {
+        let text = "==7== Events    : Ir\n==7== Collected : 398413\n==7==\n";
+        assert_eq!(collected(text), Some(398_413));
+        assert_eq!(collected("==7== Collected : 0"), None);
     }
 }

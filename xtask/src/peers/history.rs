@@ -5,9 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::process::Command;
 
-use anyhow::{Context, Result, anyhow};
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use anyhow::{Context, Result};
 use serde_json::{Value, json};
 
 use super::race::Found;
@@ -34,8 +32,7 @@ pub(super) fn record(workspace: &Workspace, lines: &[Line]) -> Result<()> {
     writeln!(file, "{line}").with_context(|| format!("cannot write {FILE}"))?;
     let history = fs::read_to_string(&path).with_context(|| format!("cannot read {FILE}"))?;
     let history = history.lines().map(serde_json::from_str).collect::<Result<Vec<Value>, _>>().context(FILE)?;
-    let picture = draw(&history).map_err(|error| anyhow!("cannot draw {PICTURE}: {error}"))?;
-    fs::write(workspace.root.join(PICTURE), picture).with_context(|| format!("cannot write {PICTURE}"))?;
+    fs::write(workspace.root.join(PICTURE), draw(&history)).with_context(|| format!("cannot write {PICTURE}"))?;
     println!("{FILE} has a line more, {PICTURE} was drawn anew.");
     Ok(())
 }
@@ -62,83 +59,75 @@ fn machine() -> String {
     name.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }
 
-const SIZE: (u32, u32) = (960, 600);
-const TEXT_PX: u32 = 16;
-const LABEL_PX: i32 = 17;
-const COLOURS: [RGBColor; 6] = [
-    RGBColor(31, 119, 180),
-    RGBColor(214, 39, 40),
-    RGBColor(44, 140, 44),
-    RGBColor(148, 80, 170),
-    RGBColor(200, 110, 10),
-    RGBColor(90, 90, 90),
-];
+const SIZE: [f64; 2] = [960.0, 600.0];
+/// The corners of the chart; names stand at its right.
+const LEFT_TOP: [f64; 2] = [56.0, 40.0];
+const RIGHT_BOTTOM: [f64; 2] = [790.0, 540.0];
+const LABEL_PX: f64 = 17.0;
+const COLOURS: [&str; 6] = ["#1f77b4", "#d62728", "#2c8c2c", "#9450aa", "#c86e0a", "#5a5a5a"];
 
-/// How many times as much the peer needs, over commits: a line a row, its name at its end.
-fn draw(history: &[Value]) -> Result<String, Box<dyn std::error::Error>> {
-    let mut series: BTreeMap<&str, Vec<(f64, f64)>> = BTreeMap::new();
+/// How many times as much the peer needs, over commits: a line a row, its name at its end. The ratios lie on a logarithmic axis.
+#[expect(clippy::disallowed_methods, reason = "a picture for people, which reaches no pixel of a field")]
+fn draw(history: &[Value]) -> String {
+    let mut series: BTreeMap<&str, Vec<(usize, f64)>> = BTreeMap::new();
     for (place, line) in history.iter().enumerate() {
         for (name, row) in line.get("rows").and_then(Value::as_object).into_iter().flatten() {
             let number = |key| row.get(key).and_then(Value::as_f64).filter(|value| *value > 0.0);
             if let (Some(peer), Some(ours)) = (number("peer"), number("ours")) {
-                series.entry(name).or_default().push((place as f64, peer / ours));
+                series.entry(name).or_default().push((place, peer / ours));
             }
         }
     }
     let ratios = || series.values().flatten().map(|(_, ratio)| *ratio);
-    let (low, high) = (ratios().fold(0.9, f64::min), ratios().fold(100.0, f64::max));
-    // The last commit lies at the right, beside the names.
-    let last = history.len().saturating_sub(1) as f64;
-    let room = 0.04 * last.max(1.0);
-    let mut text = String::new();
-    let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
-    area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
-        .caption("The peer's time or memory over ours", ("sans-serif", TEXT_PX + 2))
-        .margin(12)
-        .margin_right(160)
-        .x_label_area_size(44)
-        .y_label_area_size(56)
-        .build_cartesian_2d(-room..last + room, (0.8 * low..1.2 * high).log_scale())?;
-    let commit = |place: &f64| {
-        let line = history.iter().enumerate().find(|(k, _)| (place - *k as f64).abs() < 1e-6);
-        line.and_then(|(_, line)| line.get("commit")).and_then(Value::as_str).unwrap_or_default().to_owned()
-    };
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .light_line_style(BLACK.mix(0.05))
-        .bold_line_style(BLACK.mix(0.2))
-        .x_labels(history.len().min(12))
-        .x_label_formatter(&commit)
-        .y_label_formatter(&|ratio| format!("{ratio}"))
-        .x_desc("commit")
-        .label_style(("sans-serif", TEXT_PX))
-        .draw()?;
+    let (low, high) = (0.8 * ratios().fold(0.9, f64::min), 1.2 * ratios().fold(100.0, f64::max));
+    let ([left, top], [right, bottom]) = (LEFT_TOP, RIGHT_BOTTOM);
+    let last = history.len().saturating_sub(1).max(1) as f64;
+    let x = |place: usize| left + (right - left) * (0.04 + 0.92 * place as f64 / last);
+    let y = |ratio: f64| bottom + (top - bottom) * (ratio / low).ln() / (high / low).ln();
+    let [width, height] = SIZE;
+    let mut svg = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='{width}' height='{height}' font-family='sans-serif' font-size='15'>\n\
+         <rect width='100%' height='100%' fill='white'/>\n<g text-anchor='middle'>\n\
+         <text x='{:.0}' y='24'>The peer's time or memory over ours</text>\n<text x='{:.0}' y='588'>commit</text>\n",
+        width / 2.0,
+        (left + right) / 2.0
+    );
+    let every = history.len().div_ceil(12).max(1);
+    for (place, line) in history.iter().enumerate().step_by(every) {
+        let commit = line.get("commit").and_then(Value::as_str).unwrap_or_default();
+        svg += &format!("<text x='{:.1}' y='{:.0}'>{commit}</text>\n", x(place), bottom + 20.0);
+    }
+    svg += "</g>\n<g stroke='#ccc' text-anchor='end'>\n";
+    let ticks = (-2..6).flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * 10_f64.powi(power)));
+    for tick in ticks.filter(|tick| (low..high).contains(tick)) {
+        let y = y(tick);
+        svg += &format!(
+            "<path d='M{left} {y:.1}H{right}'/><text x='{}' y='{:.1}' stroke='none'>{tick}</text>\n",
+            left - 8.0,
+            y + 5.0
+        );
+    }
+    svg += "</g>\n";
     let mut labels = Vec::new();
     for ((name, points), colour) in series.iter().zip(COLOURS.iter().cycle()) {
-        chart.draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))?;
-        chart.draw_series(points.iter().map(|point| Circle::new(*point, 3, colour.filled())))?;
-        if let Some(end) = points.last() {
-            labels.push((chart.backend_coord(end), format!("{name} {:.1}", end.1), colour));
+        let points: Vec<_> = points.iter().map(|&(place, ratio)| (x(place), y(ratio), ratio)).collect();
+        let path: Vec<String> = points.iter().map(|(x, y, _)| format!("{x:.1},{y:.1}")).collect();
+        svg += &format!("<polyline points='{}' fill='none' stroke='{colour}' stroke-width='2'/>\n", path.join(" "));
+        for (x, y, _) in &points {
+            svg += &format!("<circle cx='{x:.1}' cy='{y:.1}' r='3' fill='{colour}'/>\n");
         }
+        labels.extend(points.last().map(|(x, y, ratio)| (*x, *y, format!("{name} {ratio:.1}"), colour)));
     }
     // Names that would lie on each other move apart.
-    labels.sort_by_key(|((_, y), ..)| *y);
-    let mut free = i32::MIN;
-    for ((x, y), text, colour) in labels {
+    labels.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut free = 0.0;
+    for (x, y, text, colour) in labels {
         let at = y.max(free);
         free = at + LABEL_PX;
-        let style =
-            ("sans-serif", TEXT_PX).into_text_style(&area).color(colour).pos(Pos::new(HPos::Left, VPos::Center));
-        let right = i32::try_from(SIZE.0)? - 154;
-        area.draw(&PathElement::new([(x, y), (right - 4, at)], colour.mix(0.4)))?;
-        area.draw_text(&text, &style, (right, at))?;
+        svg += &format!("<path d='M{x:.1} {y:.1}L{} {at:.1}' stroke='{colour}' stroke-opacity='0.4'/>", right + 12.0);
+        svg += &format!("<text x='{}' y='{:.1}' fill='{colour}'>{text}</text>\n", right + 16.0, at + 5.0);
     }
-    area.present()?;
-    drop(chart);
-    drop(area);
-    Ok(text)
+    svg + "</svg>\n"
 }
 
 #[cfg(test)]
@@ -153,11 +142,11 @@ mod tests {
                 "growth": { "unit": "exponent", "peer": null, "ours": 1.0 },
             } })
         };
-        let picture = draw(&[line("aaaa", 5.7), line("bbbb", 2.85)]).unwrap();
+        let picture = draw(&[line("aaaa", 5.7), line("bbbb", 2.85)]);
         for word in ["aaaa", "bbbb", "noise 20.0"] {
             assert!(picture.contains(word), "{word} is missing");
         }
         assert!(!picture.contains("growth"));
-        assert!(draw(&[line("aaaa", 5.7)]).is_ok());
+        assert!(!draw(&[line("aaaa", 5.7)]).contains("NaN"));
     }
 }

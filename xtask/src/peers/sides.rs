@@ -98,8 +98,6 @@ pub(crate) struct Ours {
 impl Ours {
     pub(crate) fn build(workspace: &Workspace, scratch: PathBuf) -> Result<Self> {
         let (example, works) = ("peer_workload", "papsynth-benches");
-        workspace.expect_target("papsynth", "example", example)?;
-        workspace.expect_target(works, "bin", works)?;
         shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth", "--example", example]))?;
         shell::run(workspace.cargo().args(["build", "--release", "--package", works, "--bin", works]))?;
         let release = workspace.target.join("release");

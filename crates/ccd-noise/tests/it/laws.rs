@@ -11,6 +11,11 @@ fn twelve_bits() -> CameraParams {
     CameraParams { gain_dn_per_e: 3995.0 / 17_600.0, offset_dn: 100.0, bit_depth: 12, ..CameraParams::default() }
 }
 
+/// Number of draws of a statistical test: 10⁵, or 10⁶ if `PAPSYNTH_TORTURE` is set. Bounds are in standard errors and hold for both.
+fn draws() -> usize {
+    if std::env::var_os("PAPSYNTH_TORTURE").is_some() { 1_000_000 } else { 100_000 }
+}
+
 /// Deviates of one mean, 1000 to a row.
 fn poisson(mean: f32, n: usize) -> Vec<f64> {
     let mut counts = vec![0.0; n];
@@ -48,7 +53,7 @@ fn index(count: f64) -> usize {
 #[test]
 fn poisson_deviates_follow_the_law() {
     for mu in MEANS {
-        let counts = poisson(mu, 1_000_000);
+        let counts = poisson(mu, draws());
         let n = counts.len() as f64;
         let mu = f64::from(mu);
         let probability = |k: f64| libm::exp(k * libm::log(mu) - mu - libm::lgamma(k + 1.0));
@@ -80,7 +85,7 @@ fn poisson_deviates_follow_the_law() {
 #[test]
 fn poisson_moments_are_the_laws() {
     for mu in MEANS {
-        let counts = poisson(mu, 1_000_000);
+        let counts = poisson(mu, draws());
         let (n, mu) = (counts.len() as f64, f64::from(mu));
         let bound = |what: &str, error: f64, variance: f64| {
             let z = error / (variance / n).sqrt();
@@ -127,7 +132,7 @@ fn what_is_no_mean_counts_as_dark() {
 
 #[test]
 fn normal_deviates_are_normal() {
-    let n = 1_000_000;
+    let n = draws();
     let mut deviates = normal(KEY, n);
     // Mean and variance of xᵖ.
     for (p, expected, var) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
@@ -150,7 +155,7 @@ fn assert_uncorrelated(what: &str, a: &[f64], b: &[f64]) {
 
 #[test]
 fn frames_and_neighbours_are_independent() {
-    let n = 1_000_000;
+    let n = draws();
     let frame = normal(KEY, n);
     for (other, name) in [(KEY + 1, "next key"), (KEY ^ 1 << 63, "far key"), (!KEY, "inverse")] {
         assert_uncorrelated(name, &frame, &normal(other, n));
@@ -264,7 +269,7 @@ fn the_photon_transfer_curve_gives_the_gain() {
 
 #[test]
 fn rounding_adds_a_twelfth() {
-    let n = 1_000_000;
+    let n = draws();
     for sigma_dn in [0.5, 1.0, 3.0] {
         let params = CameraParams {
             gain_dn_per_e: 0.1,
@@ -288,7 +293,7 @@ fn rounding_adds_a_twelfth() {
 
 #[test]
 fn one_normal_deviate_has_the_summed_variance() {
-    let n = 1_000_000;
+    let n = draws();
     let params = CameraParams {
         full_well_e: 1e5,
         gain_dn_per_e: 2.0,

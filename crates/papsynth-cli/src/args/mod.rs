@@ -1,27 +1,61 @@
 //! What can be typed.
 
-mod real;
+#[cfg(feature = "calibrate")]
+mod calibrate;
+mod engine;
+mod generate;
+#[cfg(feature = "judge")]
+mod judge;
+mod layout;
+#[cfg(feature = "learn")]
+mod learn;
+#[cfg(not(all(
+    feature = "calibrate",
+    feature = "completions",
+    feature = "judge",
+    feature = "learn",
+    feature = "web"
+)))]
+mod left_out;
 mod sets;
+mod share;
 mod slide;
 mod values;
-mod view;
+#[cfg(feature = "web")]
+mod web;
 
-use std::ops::Range;
 use std::path::PathBuf;
 
-use clap::{ArgGroup, Args, Parser, Subcommand};
-use papsynth::recipe::{CameraPreset, Preset};
+use clap::{Args, Parser, Subcommand};
+use papsynth::recipe::Preset;
 
-use crate::memory::parse_size;
-pub(crate) use real::{Calibrate, Judge, Learn, Match, Study};
-pub(crate) use sets::{
-    Clean, Convert, LayoutArgs, Merge, Plan, Rerender, Shards, ShareArgs, Status, Submit, Sweep, Verify, check_of,
-};
+#[cfg(feature = "calibrate")]
+pub(crate) use calibrate::Calibrate;
+pub(crate) use engine::{EngineArgs, RecipeArgs, threads};
+pub(crate) use generate::{Generate, Preview, Render};
+#[cfg(feature = "judge")]
+pub(crate) use judge::{Judge, Match};
+pub(crate) use layout::LayoutArgs;
+#[cfg(feature = "learn")]
+pub(crate) use learn::Learn;
+#[cfg(not(feature = "calibrate"))]
+use left_out::LeftOut as Calibrate;
+#[cfg(not(feature = "completions"))]
+use left_out::LeftOut as Completions;
+#[cfg(not(feature = "learn"))]
+use left_out::LeftOut as Learn;
+#[cfg(not(feature = "judge"))]
+use left_out::{LeftOut as Judge, LeftOut as Match};
+#[cfg(not(feature = "web"))]
+use left_out::{LeftOut as Study, LeftOut as View};
+pub(crate) use sets::{Clean, Convert, Inspect, Merge, Plan, Rerender, Status, Submit, Sweep, Verify, check_of};
+pub(crate) use share::Shards;
 pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]
 pub(crate) use slide::{SlideFinalize, SlideMake};
-use values::{camera_parser, parse_range, preset_parser};
-pub(crate) use view::View;
+use values::preset_parser;
+#[cfg(feature = "web")]
+pub(crate) use web::{Study, View};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
 #[derive(Debug, Parser)]
@@ -92,185 +126,13 @@ pub(crate) struct Init {
     pub(crate) list: bool,
 }
 
-/// What a recipe is made of.
-#[derive(Debug, Args)]
-pub(crate) struct RecipeArgs {
-    /// Recipe in TOML, as `papsynth init` prints it; `-` reads standard input [default: the preset `lbc`]
-    #[arg(value_name = "RECIPE")]
-    pub(crate) recipe: Option<PathBuf>,
-    /// A built-in recipe instead of a file
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), conflicts_with = "recipe")]
-    pub(crate) preset: Option<Preset>,
-    /// Sections to put in the place of the recipe's, such as `papsynth calibrate` measured; repeatable
-    #[arg(long, value_name = "FILE")]
-    pub(crate) with: Vec<PathBuf>,
-    /// A built-in camera instead of the recipe's
-    #[arg(long, value_name = "NAME", value_parser = camera_parser())]
-    pub(crate) camera: Option<CameraPreset>,
-    /// Set one field over the recipe; repeatable, the last one wins
-    #[arg(long, value_name = "FIELD=VALUE", allow_hyphen_values = true)]
-    pub(crate) set: Vec<String>,
-}
-
-/// What an engine is made of.
-#[derive(Debug, Args)]
-pub(crate) struct EngineArgs {
-    #[command(flatten)]
-    pub(crate) recipe: RecipeArgs,
-    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
-    #[arg(long, value_name = "FILE")]
-    pub(crate) model: Option<PathBuf>,
-    /// Seed of the whole data set; recipes that differ share what they have in common under the same seed
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) seed: u64,
-    /// Threads to work with; the bytes are the same with any number [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) threads: Option<u16>,
-}
-
-impl EngineArgs {
-    /// Threads to work with.
-    pub(crate) fn threads(&self) -> usize {
-        threads(self.threads)
-    }
-}
-
-/// As many threads as asked for, or one a core.
-pub(crate) fn threads(asked: Option<u16>) -> usize {
-    match asked {
-        Some(threads) => usize::from(threads),
-        None => std::thread::available_parallelism().map_or(1, usize::from),
-    }
-}
-
-/// Make images and their truth.
-///
-/// The same recipe, model and seed give the same pixels, labels and tables on any machine, whatever the number of threads and
-/// however the frames are split into ranges. Running the same command again completes what is missing and touches nothing that is whole.
-#[derive(Debug, Args)]
-#[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
-Examples:
-  papsynth generate --out fields --frames 8
-  papsynth generate my.toml --out fields --frames 1000 --seed 7
-  papsynth generate --preset dense --out dense --range 500..1000     the second half, on another machine
-  papsynth generate --out sets --frames 200 --format folder,cellpose,yolo-seg
-  papsynth generate my.toml --out many --frames 100000 --shard 3/20   the fourth of twenty machines
-  papsynth generate my.toml --out s3://bucket/many --frames 100000    keys from AWS_ACCESS_KEY_ID and the like
-  papsynth generate wide.toml --out wide --frames 20 --max-memory 2GiB
-  papsynth generate --out timed --frames 20 --threads 1 --profile   where the time goes
-  papsynth generate --out stacks --frames 4 --set focus.planes=21 --set focus.step_um=0.5
-  papsynth generate --out few --frames 8 --set 'cells.intermediate.count={ uniform = [2, 6] }'")]
-pub(crate) struct Generate {
-    #[command(flatten)]
-    pub(crate) engine: EngineArgs,
-    /// Folder of the data set: new, empty, or one that this command began; or s3://, gs://, az://, bucket and prefix, in builds with --features cloud
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// Number of frames: those with index 0 to N − 1
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub(crate) frames: Option<u64>,
-    /// Indices of the frames, from A up to but without B
-    #[arg(long, value_name = "A..B", value_parser = parse_range)]
-    pub(crate) range: Option<Range<u64>>,
-    #[command(flatten)]
-    pub(crate) layout: LayoutArgs,
-    #[command(flatten)]
-    pub(crate) share: ShareArgs,
-    /// Read every file that is there, as `papsynth verify` does, and make anew what is wrong, instead of comparing sizes
-    #[arg(long)]
-    pub(crate) verify: bool,
-    /// Memory to use at most, such as 2GiB: fewer frames are made side by side if need be [default: 80 % of what is available, where the
-    /// system tells]
-    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
-    pub(crate) max_memory: Option<u64>,
-    /// Say where the time went, stage by stage, and how many pixels and objects a second were made
-    #[arg(long, conflicts_with = "quiet")]
-    pub(crate) profile: bool,
-    /// Say nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    pub(crate) quiet: bool,
-    /// Say everything as JSON, one object a line, on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
-impl Generate {
-    /// Indices of the frames that are asked for.
-    pub(crate) fn indices(&self) -> Range<u64> {
-        self.range.clone().unwrap_or(0..self.frames.unwrap_or(1))
-    }
-}
-
-/// Make one field and show it beside its truth.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  papsynth preview
-  papsynth preview my.toml --out my.png --set background.level=0.8
-  papsynth preview --preset inflamed --index 3")]
-pub(crate) struct Preview {
-    #[command(flatten)]
-    pub(crate) engine: EngineArgs,
-    /// Picture to write; an older picture is replaced, no other file
-    #[arg(long, value_name = "FILE", default_value = "preview.png")]
-    pub(crate) out: PathBuf,
-    /// Which frame of the data set
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) index: u64,
-}
-
-/// Render one scene, which may have been edited or made by another program.
-///
-/// `papsynth generate --scenes` writes the scene of each frame as JSON. With the same recipe and model an unchanged scene gives the same
-/// image, bit by bit. The image of a focus stack is the one with every object in focus.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  papsynth generate my.toml --out fields --frames 8 --scenes
-  papsynth render fields/recipe.toml --scene fields/scenes/000003.json --out again.png
-  papsynth render fields/recipe.toml --model fields/model.json --scene edited.json")]
-pub(crate) struct Render {
-    #[command(flatten)]
-    pub(crate) recipe: RecipeArgs,
-    /// Model that `papsynth learn` wrote, or a class file (TOML), beside the classes that ship
-    #[arg(long, value_name = "FILE")]
-    pub(crate) model: Option<PathBuf>,
-    /// Scene to render; `-` reads standard input
-    #[arg(long, value_name = "FILE")]
-    pub(crate) scene: PathBuf,
-    /// PNG to write; an older picture is replaced, no other file
-    #[arg(long, value_name = "FILE", default_value = "scene.png")]
-    pub(crate) out: PathBuf,
-    /// Threads to work with; the bytes are the same with any number [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) threads: Option<u16>,
-}
-
-/// Show what is in a data set.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  papsynth inspect fields
-  papsynth inspect fields --verify
-  papsynth inspect fields --json")]
-pub(crate) struct Inspect {
-    /// Folder of the data set
-    #[arg(value_name = "DIR")]
-    pub(crate) dir: PathBuf,
-    /// Read every file and compare its SHA-256, instead of its size alone
-    #[arg(long)]
-    pub(crate) verify: bool,
-    /// As JSON instead of a table
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
 /// Print the JSON schema of recipes.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  papsynth schema > papsynth-recipe.schema.json")]
 pub(crate) struct SchemaArgs {}
 
 /// Print what makes a shell complete papsynth's words.
+#[cfg(feature = "completions")]
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -284,13 +146,12 @@ pub(crate) struct Completions {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
+    #[cfg(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "learn", feature = "web"))]
     #[test]
     fn the_command_is_sound_and_every_verb_shows_an_example() {
-        let mut command = Cli::command();
+        let mut command = <Cli as clap::CommandFactory>::command();
         command.build();
         command.clone().debug_assert();
         for verb in command.get_subcommands().filter(|verb| verb.get_name() != "help") {

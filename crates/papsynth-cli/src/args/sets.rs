@@ -4,84 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use papsynth::recipe::CameraPreset;
-use papsynth_dataset::{Check, Flatten, Format, Layout, Share};
+use papsynth_dataset::{Check, Format};
 
-use super::EngineArgs;
-use super::values::{camera_parser, flatten_parser, format_parser, parse_share};
-
-/// How a data set lies in files.
-#[derive(Debug, Args)]
-pub(crate) struct LayoutArgs {
-    /// Formats to write, one or several [default: folder; webdataset above 10000 frames]
-    #[arg(long, value_name = "NAME", value_parser = format_parser(), value_delimiter = ',')]
-    pub(crate) format: Vec<Format>,
-    #[command(flatten)]
-    pub(crate) files: FileArgs,
-    /// Write the scene of each frame too, as scenes/NNNNNN.json, which `papsynth render` reads
-    #[arg(long)]
-    pub(crate) scenes: bool,
-}
-
-/// The same, whatever the formats.
-#[derive(Debug, Args)]
-pub(crate) struct FileArgs {
-    /// What a pixel shows that belongs to several objects, in formats with one label a pixel
-    #[arg(long, value_name = "POLICY", value_parser = flatten_parser(), default_value = Flatten::Top.name())]
-    pub(crate) flatten: Flatten,
-    /// Frames that are written and made again together [default: 1; 256 with webdataset and huggingface]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    pub(crate) frames_per_shard: Option<u64>,
-    /// Write the table of objects as CSV alone, not as Parquet too
-    #[cfg(feature = "parquet")]
-    #[arg(long)]
-    pub(crate) no_parquet: bool,
-}
-
-impl LayoutArgs {
-    /// From this many frames on a folder of single files is a burden.
-    pub(crate) const MOST_IN_FOLDERS: u64 = 10_000;
-
-    /// The layout of a data set of so many frames, and whether its format was chosen for their number.
-    pub(crate) fn layout(&self, frames: u64) -> (Layout, bool) {
-        let many = self.format.is_empty() && frames > Self::MOST_IN_FOLDERS;
-        let usual = if many { Format::Webdataset } else { Format::Folder };
-        let formats = if self.format.is_empty() { vec![usual] } else { self.format.clone() };
-        (Layout { scenes: self.scenes, ..self.files.layout(formats) }, many)
-    }
-}
-
-impl FileArgs {
-    pub(crate) fn layout(&self, formats: Vec<Format>) -> Layout {
-        let mut layout = Layout::new(formats);
-        layout.flatten = self.flatten;
-        #[cfg(feature = "parquet")]
-        if self.no_parquet {
-            layout.objects_parquet = false;
-        }
-        if let Some(frames) = self.frames_per_shard {
-            layout.frames_per_shard = frames;
-        }
-        layout
-    }
-}
-
-/// Which shards to make.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Shards {
-    /// Those of this share.
-    Given(Share),
-    /// Those that the environment of a Slurm array or of a Kubernetes job says; of how many, where it does not say.
-    Environment(Option<u64>),
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct ShareArgs {
-    /// Make every N-th shard from the I-th on (0/4 to 3/4 make all); `auto` asks the environment of a Slurm array, `auto/N`
-    /// that of a Kubernetes job of N completions. Close the data set with `papsynth merge`, a slide with
-    /// `papsynth slide finalize` afterwards
-    #[arg(long, value_name = "I/N", value_parser = parse_share)]
-    pub(crate) shard: Option<Shards>,
-}
+use super::engine::EngineArgs;
+use super::layout::{FileArgs, LayoutArgs};
+use super::values::{camera_parser, format_parser};
 
 /// How carefully files that are there are looked at, with `--verify` or without.
 pub(crate) fn check_of(verify: bool) -> Check {
@@ -304,4 +231,23 @@ pub(crate) struct Sweep {
     /// Say nothing but errors
     #[arg(long, short)]
     pub(crate) quiet: bool,
+}
+
+/// Show what is in a data set.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  papsynth inspect fields
+  papsynth inspect fields --verify
+  papsynth inspect fields --json")]
+pub(crate) struct Inspect {
+    /// Folder of the data set
+    #[arg(value_name = "DIR")]
+    pub(crate) dir: PathBuf,
+    /// Read every file and compare its SHA-256, instead of its size alone
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// As JSON instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
 }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::EngineArgs;
-use super::sets::ShareArgs;
+use super::engine::EngineArgs;
+use super::share::ShareArgs;
 use super::values::parse_pair;
 use crate::memory::parse_size;
 

@@ -1,22 +1,19 @@
 //! `papsynth calibrate`: a user's own images in, numbers of their microscope and camera out.
 
-mod edge;
-mod find;
-mod flat;
-mod fragment;
+mod images;
 mod plot;
-mod record;
-mod stack;
+mod table;
 
+use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
-use optics_psf::{Error, Microscope, MicroscopeParams};
+use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_BEGINS};
 use papsynth_dataset::write_file;
 
 use crate::args::Calibrate;
 use crate::exit::{self, Complaint, Failure};
-use crate::text_file::may_replace;
-use record::{Instrument, Record};
+use crate::text_file::may_replace_in;
 
 const RECORD: &str = "calibration.json";
 
@@ -25,54 +22,49 @@ const FILES: [(&str, &[u8], &str); 7] = [
     ("focus.svg", plot::BEGINS, "an older plot"),
     ("edge.svg", plot::BEGINS, "an older plot"),
     ("photon-transfer.svg", plot::BEGINS, "an older plot"),
-    ("optics.toml", fragment::BEGINS, "an older calibration"),
-    ("optics-gaussian.toml", fragment::BEGINS, "an older calibration"),
-    ("camera.toml", fragment::BEGINS, "an older calibration"),
-    (RECORD, record::BEGINS, "an older calibration"),
+    ("optics.toml", RECIPE_BEGINS, "an older calibration"),
+    ("optics-gaussian.toml", RECIPE_BEGINS, "an older calibration"),
+    ("camera.toml", RECIPE_BEGINS, "an older calibration"),
+    (RECORD, Calibration::BEGINS, "an older calibration"),
 ];
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
-    for (name, begins, what) in FILES {
-        may_replace(&args.out.join(name), begins, what)?;
-    }
-    if args.out.exists() && !args.out.is_dir() {
-        let message = format!("--out {}: there is a file of this name; expected a folder", args.out.display());
-        return Err(Failure::input(Complaint::new(message)));
-    }
+    may_replace_in(&args.out, &FILES)?;
     let instrument = instrument(args)?;
-    let older = Record::load(&args.out.join(RECORD))?;
+    let older = older(&args.out.join(RECORD))?;
     if let Some(older) = &older {
         same_microscope(instrument.as_ref(), older, &args.out)?;
     }
-    let mut record = Record::new();
-    record.microscope = instrument;
+    let mut found = Calibration { microscope: instrument, ..Calibration::default() };
     let mut files: Vec<(&str, String)> = Vec::new();
     let mut report = Vec::new();
     if !args.stack.is_empty() {
-        let found = stack::measure(args, record.microscope.as_ref())?;
-        report.push(stack::table(&found, args.pixel_um));
-        files.push(("focus.svg", plot::focus(&found, args.pixel_um)));
-        record.focus = Some(found);
+        let focus = images::focus(args, found.microscope.as_ref())?;
+        report.push(table::focus(&focus, args.pixel_um));
+        files.push(("focus.svg", plot::focus(&focus, args.pixel_um)));
+        found.focus = Some(focus);
     }
     if let Some(path) = &args.edge {
-        let found = edge::measure(args, path)?;
-        report.push(edge::table(&found.record, args.pixel_um));
-        files.push(("edge.svg", plot::edge(&found, args.pixel_um)));
-        record.edge = Some(found.record);
+        let (edge, profile) = images::edge(args, path)?;
+        report.push(table::edge(&edge, args.pixel_um));
+        files.push(("edge.svg", plot::edge(&edge, &profile, args.pixel_um)));
+        found.edge = Some(edge);
     }
     if let Some(folder) = &args.flat {
-        let found = flat::measure(args, folder)?;
-        report.push(flat::table(&found));
-        files.push(("photon-transfer.svg", plot::photon_transfer(&found)));
-        record.camera = Some(found);
+        let camera = images::camera(args, folder)?;
+        report.push(table::camera(&camera));
+        files.push(("photon-transfer.svg", plot::photon_transfer(&camera)));
+        found.camera = Some(camera);
     }
     if let Some(older) = older {
-        record.keep(older);
+        found.keep(older);
     }
-    files.extend(fragment::bright_field(&record)?.map(|text| ("optics.toml", text)));
-    files.extend(fragment::gaussian(&record).map(|text| ("optics-gaussian.toml", text)));
-    files.extend(fragment::camera(&record).map(|text| ("camera.toml", text)));
-    files.push((RECORD, record.to_json()));
+    let optics = found.bright_field_toml();
+    let optics = optics.map_err(|error| Failure::input(Complaint::new(format!("--edge: {error}"))))?;
+    files.extend(optics.map(|text| ("optics.toml", text)));
+    files.extend(found.gaussian_toml().map(|text| ("optics-gaussian.toml", text)));
+    files.extend(found.camera_toml().map(|text| ("camera.toml", text)));
+    files.push((RECORD, found.to_json()));
     report.push(written(args, &files));
     for (name, text) in &files {
         write_file(&args.out.join(name), text.as_bytes())?;
@@ -82,18 +74,16 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
 
 /// What is known of the microscope; nothing where the size of a pixel is not.
 fn instrument(args: &Calibrate) -> Result<Option<Instrument>, Failure> {
-    let default = MicroscopeParams::default();
     let instrument = Instrument {
         na: args.na,
         wavelength_um: args.wavelength_um,
         mount_index: args.mount_index,
         immersion_index: args.immersion_index,
-        pixel_um: args.pixel_um.unwrap_or(default.pixel_um),
+        pixel_um: args.pixel_um.unwrap_or(Instrument::default().pixel_um),
     };
-    let na = default.condenser_na.min(instrument.na);
-    match Microscope::new(&instrument.params(na)) {
-        Ok(_) => Ok(args.pixel_um.map(|_| instrument)),
-        Err(Error::OutOfRange { field, value, accepted }) => {
+    match instrument.check() {
+        Ok(()) => Ok(args.pixel_um.map(|_| instrument)),
+        Err(Error::Microscope(optics_psf::Error::OutOfRange { field, value, accepted })) => {
             let accepted = accepted.replace('_', "-");
             let message = format!("--{} is {value}; it must be {accepted}", field.replace('_', "-"));
             Err(Failure::input(Complaint::new(message)))
@@ -102,8 +92,27 @@ fn instrument(args: &Calibrate) -> Result<Option<Instrument>, Failure> {
     }
 }
 
+/// The calibration of a folder, if there is one.
+fn older(path: &Path) -> Result<Option<Calibration>, Failure> {
+    let text = match fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => return Ok(None),
+        Err(error) => return Err(Failure::file("read", path, &error)),
+    };
+    let refuse = |what: String| {
+        let help = "choose another folder with --out, or remove the file";
+        Err(Failure::wrong(format!("{}: {what}", path.display()), help))
+    };
+    const KNOWN: u32 = Calibration::VERSION;
+    match serde_json::from_str::<Calibration>(&text) {
+        Ok(found) if found.calibration == KNOWN => Ok(Some(found)),
+        Ok(found) => refuse(format!("a calibration of version {}; this program knows {KNOWN}", found.calibration)),
+        Err(error) => refuse(format!("it is no calibration of this program: {error}")),
+    }
+}
+
 /// One folder is of one microscope: what it holds from before must fit.
-fn same_microscope(instrument: Option<&Instrument>, older: &Record, out: &Path) -> Result<(), Failure> {
+fn same_microscope(instrument: Option<&Instrument>, older: &Calibration, out: &Path) -> Result<(), Failure> {
     let (Some(new), Some(old)) = (instrument, &older.microscope) else { return Ok(()) };
     let pairs = [
         ("--na", new.na, old.na),
@@ -118,7 +127,7 @@ fn same_microscope(instrument: Option<&Instrument>, older: &Record, out: &Path) 
             let message =
                 format!("{}: was measured with {option} {old}; this command has {new}", out.join(RECORD).display());
             let help = format!("give {option} {old}, or another folder with --out");
-            Err(Failure::input(Complaint::new(message).help(help)))
+            Err(Failure::wrong(message, help))
         }
     }
 }

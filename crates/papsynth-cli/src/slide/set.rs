@@ -6,17 +6,17 @@ use std::path::Path;
 use papsynth::Threads;
 use papsynth_dataset::memory::{Need, shown};
 use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Error, Share};
+use papsynth_dataset::{Check, Share};
 
-use super::open;
 use crate::args::{SlideFinalize, SlideMake, check_of};
-use crate::exit::{self, Complaint, Failure, counted};
+use crate::exit::{self, Failure};
+use crate::findings;
 use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
 use crate::share;
-use crate::verify;
+use crate::words::counted;
 
 pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     if let Some([width, height]) = args.size {
@@ -28,7 +28,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let shard_px = args.shard_px.parse().unwrap_or(4096);
     setup.threads = fitting(&args, &setup, shard_px)?;
     let seed = args.engine.seed;
-    let slide = open(&setup, seed, args.slide)?;
+    let slide = setup.slide(seed, args.slide)?;
     let share = match args.share.shard {
         Some(shards) => share::of(shards)?,
         None => Share::ALL,
@@ -55,13 +55,9 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
         );
     });
     bar.clear();
-    let stopped = stopped.map_err(|error| match error {
-        Error::Engine(error) => setup.recipe.refuse(&error),
-        other => other.into(),
-    })?;
-    if stopped {
+    if stopped.map_err(|error| setup.failure(error))? {
         let message = format!("stopped; every file in {} is whole", args.out.display());
-        return Err(Failure::interrupted(Complaint::new(message).help("run the same command again to make the rest")));
+        return Err(Failure::stopped(message, "make"));
     }
     if share == Share::ALL { close(&set, Check::Sizes, args.quiet) } else { Ok(()) }
 }
@@ -130,7 +126,7 @@ pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     } else if findings.is_empty() {
         exit::print(&format!("{}: whole\n", dir.display()))?;
     } else {
-        verify::print(&findings)?;
+        findings::print(&findings)?;
     }
-    verify::judge(dir, &findings)
+    findings::judge(dir, &findings)
 }

@@ -370,7 +370,7 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     write("flat.tif", &vec![vec![5.0; 192 * 192]; 4]);
     let one = "18,26,44,38";
     refused(&bench, "", &["--stack", "--edge", "--flat"]);
-    refused(&bench, "--stack end.tif", &["--stack end.tif, window ", "the stack's end", "both sides of focus"]);
+    refused(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
     refused(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
     refused(&bench, "--stack two.tif", &["--stack two.tif: 2 planes; expected 3 or more"]);
     refused(&bench, "--stack flat.tif", &["no dark, compact thing", "--window"]);
@@ -391,7 +391,7 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     refused(&bench, "--step-um 1 --edge stack.tif", &["--stack"]);
     refused(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected one"]);
     write("one.tif", &planes[9..10]);
-    refused(&bench, "--edge one.tif --line 0,0,4,0", &["--line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
+    refused(&bench, "--edge one.tif --line 0,0,4,0", &["line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
     refused(&bench, "--edge one.tif --line 180,10,220,10", &["does not lie in"]);
     refused(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
     refused(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);

@@ -1,15 +1,22 @@
 //! Integration tests, linked as one program.
 
+#[cfg(feature = "calibrate")]
 mod calibrate;
 mod cli;
 mod hostile;
+#[cfg(feature = "judge")]
 mod judge;
+#[cfg(not(all(feature = "calibrate", feature = "completions", feature = "judge", feature = "web")))]
+mod left_out;
+#[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
 mod scenes;
 mod sets;
 mod slide;
+#[cfg(feature = "web")]
 mod study;
 #[path = "../support/mod.rs"]
 mod support;
+#[cfg(feature = "web")]
 mod view;

@@ -19,7 +19,7 @@ fn the_recipe_that_is_found_makes_fields() {
     let outcome = bench.good("match real --out mine.toml --report mine.json --budget 90 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);
     assert!(outcome.out.ends_with("\nmine.toml: use it with papsynth generate mine.toml\n"), "{}", outcome.out);
-    assert!(outcome.err.contains("simulated recipes: 30 of 30"), "{}", outcome.err);
+    assert!(outcome.err.contains("simulated recipes (30 of 30)"), "{}", outcome.err);
     let toml = fs::read_to_string(bench.path("mine.toml")).unwrap();
     assert!(toml.starts_with("# Matched to 3 fields: ") && toml.contains("# measured: "), "{toml}");
     let report: serde_json::Value = serde_json::from_slice(&fs::read(bench.path("mine.json")).unwrap()).unwrap();

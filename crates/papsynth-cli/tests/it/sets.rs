@@ -60,7 +60,7 @@ fn four_writers_on_the_same_shards_do_no_harm() {
     assert_eq!(root(&bench, "four", 6), root(&bench, "one", 6));
 }
 
-/// Kills at random moments of the whole run, 50 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
+/// Kills at random moments of the whole run, 15 or as many as `PAPSYNTH_KILLS` says: nothing is lost, corrupt or there twice.
 #[cfg(unix)]
 #[test]
 fn whatever_is_killed_is_completed_by_the_next_run() {
@@ -71,7 +71,7 @@ fn whatever_is_killed_is_completed_by_the_next_run() {
     bench.good(&format!("generate --out whole {frames}"));
     let whole = u64::try_from(start.elapsed().as_micros()).unwrap();
     let expected = root(&bench, "whole", 6);
-    let kills: u64 = std::env::var("PAPSYNTH_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(50);
+    let kills: u64 = std::env::var("PAPSYNTH_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(15);
     let mut state = 20_261_122_u64;
     let (mut killed, mut rounds) = (0, 0);
     while killed < kills {

@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::hash::{measure, sha256};
-use super::{Folder, fault};
+use super::fault;
+use super::file_record::FileRecord;
+use super::store::Remote;
+use crate::bytes::{json, measure, sha256};
 use crate::error::Error;
-use crate::record::{Check, FileRecord};
-use crate::store::Remote;
 
 const TEMPORARY_ENDING: &str = ".tmp";
 
@@ -67,7 +67,7 @@ impl Pending {
 
     /// Brings the file to the disk and gives it its name.
     pub(crate) fn commit(mut self) -> Result<FileRecord, Error> {
-        let record = self.seal().map_err(Error::io("write", &self.path))?;
+        let record = self.seal()?;
         self.rename()?;
         Ok(record)
     }
@@ -80,18 +80,9 @@ impl Pending {
         Ok(FileRecord { path: self.name.clone(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
     }
 
-    /// As [`commit`](Self::commit), but leaves a file of the same content untouched.
-    pub(super) fn commit_if_new(mut self, folder: &Folder) -> Result<FileRecord, Error> {
-        let record = self.seal().map_err(Error::io("write", &self.path))?;
-        if folder.flaw(&record, Check::Hashes)?.is_some() {
-            self.rename()?;
-        }
-        Ok(record)
-    }
-
     /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.
     pub(super) fn commit_unless_there(mut self) -> Result<bool, Error> {
-        self.seal().map_err(Error::io("write", &self.path))?;
+        self.seal()?;
         if self.remote.is_none() {
             match fault::point().and_then(|()| fs::hard_link(&self.temporary, &self.path)) {
                 // The temporary name goes with this.
@@ -104,15 +95,18 @@ impl Pending {
         self.rename().map(|()| true)
     }
 
-    fn seal(&mut self) -> io::Result<FileRecord> {
-        fault::sync(&self.file)?;
-        // Read back: what counts is what is there, however it was written.
-        self.file.seek(SeekFrom::Start(0))?;
-        let (bytes, sha256) = measure(&mut self.file)?;
+    /// Brings the file to the disk, and says what is in it.
+    pub(super) fn seal(&mut self) -> Result<FileRecord, Error> {
+        let sealed = fault::sync(&self.file)
+            // Read back: what counts is what is there, however it was written.
+            .and_then(|()| self.file.seek(SeekFrom::Start(0)))
+            .and_then(|_| measure(&mut self.file));
+        let (bytes, sha256) = sealed.map_err(Error::io("write", &self.path))?;
         Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
     }
 
-    fn rename(&mut self) -> Result<(), Error> {
+    /// Gives a sealed file its name.
+    pub(super) fn rename(&mut self) -> Result<(), Error> {
         let rename = || fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
         let renamed = rename().or_else(|error| match error.kind() {
             // A folder in the file's place gives way if there is nothing in it.
@@ -150,7 +144,7 @@ impl Output {
     }
 
     pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), Error> {
-        serde_json::to_writer(&mut self.writer, value).map_err(|e| Error::io("write", &self.pending.path)(e.into()))
+        self.bytes(&json(value))
     }
 
     /// The elements of a JSON array between its brackets, one a line.

@@ -1,23 +1,45 @@
-//! What formats of one label a pixel share.
-
-use std::io;
+//! Formats with one label a pixel, in a folder for cytoplasm and one for nuclei: `cellpose` and `stardist`.
+//!
+//! `cellpose` has `NAME.tif` beside `NAME_masks.tif`; it takes every image of a folder that does not end in `_masks`, so that the two groups cannot
+//! share one. `stardist` has `images/NAME.tif` and `masks/NAME.tif`.
 
 use papsynth::truth::Group;
 
-use super::Field;
-use crate::flatten::Flatten;
-use crate::write::{label_tiff, picture_tiff};
+use super::format::Format;
+use super::ome::picture_tiff;
+use super::sink::{Field, Files};
+use super::written::Written;
+use crate::error::Error;
+use crate::write::label_tiff;
 
 /// The groups that segmenters are trained for, each in a folder of its own.
 pub(super) const GROUPS: [Group; 2] = [Group::Cytoplasm, Group::Nucleus];
 
-/// The picture as TIFF, for readers that expect no other.
-pub(super) fn picture(field: &Field) -> io::Result<Vec<u8>> {
-    picture_tiff(field.picture, field.geometry)
+/// The files of image and labels.
+pub(super) fn names(format: Format, group: Group, index: u64) -> [String; 2] {
+    let group = group.name();
+    match format {
+        Format::Stardist => ["images", "masks"].map(|what| format!("stardist/{group}/{what}/{index:06}.tif")),
+        _ => ["", "_masks"].map(|ending| format!("cellpose/{group}/{index:06}{ending}.tif")),
+    }
 }
 
-/// The labels of a group as TIFF: the ids of the truth, so that numbers have gaps.
-pub(super) fn masks(field: &Field, group: Group, policy: Flatten) -> io::Result<Vec<u8>> {
-    let ids = policy.labels(field.truth, group);
-    label_tiff(&ids, field.geometry.view.width, field.geometry.view.pixel_um)
+/// Labels are the ids of the truth, so that numbers have gaps.
+pub(super) fn write(format: Format, field: &Field, files: &mut Files) -> Result<(), Error> {
+    let view = field.geometry.view;
+    for group in GROUPS {
+        let [image, masks] = names(format, group, field.index());
+        files.encode(&image, picture_tiff(field.picture, field.geometry, None))?;
+        let ids = files.layout.flatten.labels(field.truth, group);
+        files.encode(&masks, label_tiff(&ids, view.width, view.pixel_um))?;
+    }
+    Ok(())
+}
+
+pub(super) fn check(format: Format, written: &Written) -> Result<(), Error> {
+    GROUPS.into_iter().try_for_each(|group| {
+        let [image, masks] = names(format, group, written.field.index());
+        written.file(&image, |bytes| written.picture(bytes))?;
+        written.file(&masks, |bytes| written.labels(bytes, &written.flat(group)))
+    })
 }

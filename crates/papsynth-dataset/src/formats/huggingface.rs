@@ -1,9 +1,8 @@
 //! `huggingface`: Parquet files of many frames, a row each, as the library `datasets` reads them without a script. Here is where they lie; what is in them
 //! stands in `parquet`, which wants the feature of that name.
 
-use crate::layout::{Form, numbered};
-use crate::record::FrameSummary;
-use crate::splits::Split;
+use super::names::numbered;
+use crate::truth::{Form, FrameSummary, Split};
 
 /// The card that names the files of each split.
 pub(crate) const CARD: &str = "huggingface/README.md";

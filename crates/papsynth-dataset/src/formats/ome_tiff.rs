@@ -3,22 +3,16 @@
 use papsynth::Plane;
 use papsynth::truth::Group;
 
-use super::written::is_described;
-use super::{Field, Files, Place, Sink, Written};
+use super::ome::{Levels, description, of_labels, ome_labels, page};
+use super::sink::{Field, Files, Sink};
+use super::written::{Written, is_described};
 use crate::error::Error;
-use crate::layers::layers;
-use crate::record::{FileRecord, Geometry};
-use crate::write::{Pages, Pixels, description, narrow, of_labels, ome_labels};
+use crate::truth::{Geometry, layers};
+use crate::write::Pages;
 
-pub(super) struct Images<'a> {
-    files: Files<'a>,
+#[derive(Default)]
+pub(super) struct Images {
     image: Option<Pages>,
-}
-
-impl<'a> Images<'a> {
-    pub(super) fn new(place: Place<'a>) -> Self {
-        Self { files: Files::new(place.folder), image: None }
-    }
 }
 
 pub(super) fn image(index: u64) -> String {
@@ -37,44 +31,35 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     })?;
     Group::ALL.into_iter().try_for_each(|group| {
         let pages = layers(written.field.truth, group);
-        let small = pages.iter().flatten().all(|&id| id <= u16::MAX.into());
-        let kind = if small { "uint16" } else { "uint32" };
         written.file(&labels(group, index), |bytes| {
             written.layers(bytes, &pages)?;
-            is_described(bytes, &of_labels(geometry, group, pages.len(), kind))
+            is_described(bytes, &of_labels(geometry, group, &pages))
         })
     })
 }
 
-impl Sink for Images<'_> {
-    fn begin(&mut self, geometry: &Geometry) -> Result<(), Error> {
+impl Sink for Images {
+    fn begin(&mut self, geometry: &Geometry, files: &Files) -> Result<(), Error> {
         let name = image(geometry.key.index);
         let values = geometry.values() as u64 * geometry.planes_um.len() as u64;
-        self.image = Some(Pages::new(self.files.folder.pending(&name)?, values * 3)?);
+        self.image = Some(Pages::new(files.folder.pending(&name)?, values * 3)?);
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, geometry: &Geometry, _: &Files) -> Result<(), Error> {
         let Some(pages) = &mut self.image else { return Ok(()) };
         let text = (plane.index == 0).then(|| description(geometry));
-        match geometry.bits {
-            ..=8 => pages.write_pyramid(Pixels::U8(&narrow(&plane.grey)), geometry, text.as_deref()),
-            _ => pages.write_pyramid(Pixels::U16(&plane.grey), geometry, text.as_deref()),
-        }
+        pages.write_pyramid(Levels::new(&plane.grey, geometry).pixels(), &page(geometry, text.as_deref()))
     }
 
-    fn field(&mut self, field: &Field) -> Result<(), Error> {
+    fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         if let Some(pages) = self.image.take() {
-            self.files.written.push(pages.commit()?);
+            files.written.push(pages.commit()?);
         }
         for group in Group::ALL {
             let pages = layers(field.truth, group);
-            self.files.encode(&labels(group, field.index()), ome_labels(&pages, group, field.geometry))?;
+            files.encode(&labels(group, field.index()), ome_labels(&pages, group, field.geometry))?;
         }
         Ok(())
-    }
-
-    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
-        Ok(self.files.written)
     }
 }

@@ -13,24 +13,21 @@ use papsynth_zarr::{
 };
 use serde_json::{Map, Value, json};
 
-use super::written::differs;
-use super::{Field, Files, Place, Sink, Written, zarr_group as group_of};
-use crate::coco::category_name;
+use super::names::{numbered, zarr_group as group_of};
+use super::sink::{Field, Files, Sink};
+use super::written::{LIMITS, Take, Written, differs};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Output};
-use crate::image_of::LIMITS;
-use crate::layers::layers;
-use crate::layout::numbered;
 use crate::read::{self, LevelImage};
-use crate::record::{FileRecord, Geometry};
-use crate::write::LARGE;
+use crate::truth::{Geometry, category_name, layers};
+use crate::write::{fits_16_bits, is_large};
 use papsynth::white_level as white;
 
 /// Side of a chunk: what a viewer reads at least.
 const CHUNK: usize = 512;
 
-pub(super) struct Images<'a> {
-    files: Files<'a>,
+#[derive(Default)]
+pub(super) struct Images {
     /// The levels of the image whose planes are coming.
     levels: Vec<Level>,
 }
@@ -41,11 +38,7 @@ struct Level {
     output: Output,
 }
 
-impl<'a> Images<'a> {
-    pub(super) fn new(place: Place<'a>) -> Self {
-        Self { files: Files::new(place.folder), levels: Vec::new() }
-    }
-
+impl Images {
     /// Adds one channel of a plane to every level.
     fn add<T: Sample>(&mut self, channel: usize, plane: usize, mut values: Vec<T>) -> Result<(), papsynth_zarr::Error> {
         for level in &mut self.levels {
@@ -71,7 +64,7 @@ fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 
         height,
         width,
         tiling: Tiling::whole(CHUNK, planes.unwrap_or(1), width, height),
-        levels: if width.max(height) < LARGE { 1 } else { levels_until(CHUNK, width, height) },
+        levels: if is_large(width, height) { levels_until(CHUNK, width, height) } else { 1 },
     };
     Pyramid::new(&form).map_err(|error| geometry.wrong(error.to_string()))
 }
@@ -94,7 +87,7 @@ fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
     let mut found = Vec::new();
     for group in Group::ALL {
         let pages = layers(field.truth, group);
-        let kind = if pages.iter().flatten().all(|&id| id <= u16::MAX.into()) { Kind::U16 } else { Kind::U32 };
+        let kind = if pages.iter().all(|ids| fits_16_bits(ids)) { Kind::U16 } else { Kind::U32 };
         for (number, ids) in pages.into_iter().enumerate() {
             let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
             let labels = Labels {
@@ -170,13 +163,13 @@ fn shard_file(level: usize, array: &papsynth_zarr::Array) -> String {
     format!("{level}/{}", array.file(Shard::default()))
 }
 
-impl Sink for Images<'_> {
-    fn begin(&mut self, geometry: &Geometry) -> Result<(), Error> {
+impl Sink for Images {
+    fn begin(&mut self, geometry: &Geometry, files: &Files) -> Result<(), Error> {
         let group = group_of(geometry.key.index);
         self.levels.clear();
         for (level, array) in of_image(geometry)?.levels().iter().enumerate() {
             let name = format!("{group}/{}", shard_file(level, array));
-            let output = Output::new(self.files.folder.pending(&name)?)?;
+            let output = Output::new(files.folder.pending(&name)?)?;
             let encoder =
                 ShardEncoder::new(array, Shard::default()).map_err(|error| geometry.wrong(error.to_string()))?;
             self.levels.push(Level { encoder, output });
@@ -184,7 +177,7 @@ impl Sink for Images<'_> {
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, geometry: &Geometry, files: &Files) -> Result<(), Error> {
         for channel in 0..geometry.channels {
             let values = plane.grey.iter().skip(channel).step_by(geometry.channels);
             let added = match geometry.bits {
@@ -192,34 +185,31 @@ impl Sink for Images<'_> {
                 ..=8 => self.add(channel, plane.index, values.map(|&v| v.to_le_bytes()[0]).collect()),
                 _ => self.add(channel, plane.index, values.copied().collect()),
             };
-            added.map_err(|error| failed(error, self.files.folder, &group_of(geometry.key.index), geometry))?;
+            added.map_err(|error| failed(error, files.folder, &group_of(geometry.key.index), geometry))?;
         }
         Ok(())
     }
 
-    fn field(&mut self, field: &Field) -> Result<(), Error> {
+    fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         let (geometry, group) = (field.geometry, group_of(field.index()));
-        let broken = |error| failed(error, self.files.folder, &group, geometry);
+        let folder = files.folder;
+        let broken = |error| failed(error, folder, &group, geometry);
         for Level { encoder, mut output } in self.levels.drain(..) {
             output.bytes(&encoder.end().map_err(broken)?)?;
-            self.files.written.push(output.into_pending()?.commit()?);
+            files.written.push(output.into_pending()?.commit()?);
         }
         let mut described = Vec::new();
         for Layer { labels, ids } in of_labels(field)? {
             let folder = format!("{group}/{}", labels.folder());
             for (name, bytes) in label_shards(&labels, ids).map_err(broken)? {
-                self.files.write(&format!("{folder}/{name}"), &bytes)?;
+                files.write(&format!("{folder}/{name}"), &bytes)?;
             }
             described.push(labels);
         }
         for (name, bytes) in documents(geometry, described)? {
-            self.files.write(&format!("{group}/{name}"), &bytes)?;
+            files.write(&format!("{group}/{name}"), &bytes)?;
         }
         Ok(())
-    }
-
-    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
-        Ok(self.files.written)
     }
 }
 
@@ -263,7 +253,7 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     }
     let pyramid = of_image(geometry)?;
     let first = format!("{group}/{}", shard_file(0, &pyramid.levels()[0]));
-    written.file(&first, |bytes| written.shown(geometry.planes_um.len(), |take| planes(bytes, geometry, take)))?;
+    written.file(&first, |bytes| written.shown(geometry.planes_um.len(), &mut |take| planes(bytes, geometry, take)))?;
     match geometry.bits {
         ..=8 => are_halves::<u8>(written, &group, &pyramid)?,
         _ => are_halves::<u16>(written, &group, &pyramid)?,
@@ -317,17 +307,12 @@ fn are_labels<T: Sample>(written: &Written, group: &str, labels: &Labels, mut id
 }
 
 fn broken(error: papsynth_zarr::Error) -> Problem {
-    Problem::Broken { format: "Zarr", message: error.to_string() }
+    Problem::broken("Zarr", error)
 }
 
 /// The planes of a frame, from the bytes of its image's one shard at full size.
-fn planes(
-    bytes: &[u8],
-    geometry: &Geometry,
-    take: &mut dyn FnMut(LevelImage) -> Result<(), Problem>,
-) -> Result<(), Problem> {
-    let sizes = |error: Error| Problem::Differs { what: error.to_string() };
-    let pyramid = of_image(geometry).map_err(sizes)?;
+fn planes(bytes: &[u8], geometry: &Geometry, take: &mut Take) -> Result<(), Problem> {
+    let pyramid = of_image(geometry).map_err(|error| Problem::differs(error.to_string()))?;
     let array = &pyramid.levels()[0];
     let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
     let (width, channels) = (geometry.view.width, geometry.channels);
@@ -352,11 +337,7 @@ fn planes(
 }
 
 /// The planes of a frame of a data set, one after the other.
-pub(crate) fn read_planes(
-    folder: &Folder,
-    geometry: &Geometry,
-    take: &mut dyn FnMut(LevelImage) -> Result<(), Problem>,
-) -> Result<(), Error> {
+pub(crate) fn read_planes(folder: &Folder, geometry: &Geometry, take: &mut Take) -> Result<(), Error> {
     let array = of_image(geometry)?;
     let path = folder.path(&format!("{}/{}", group_of(geometry.key.index), shard_file(0, &array.levels()[0])));
     let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;

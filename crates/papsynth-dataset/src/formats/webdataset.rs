@@ -3,31 +3,30 @@
 
 use std::cell::RefCell;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::io::{self, BufReader, BufWriter, Cursor, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use papsynth::Plane;
 use papsynth::truth::Group;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use super::written::{differs, is_described};
-use super::{Field, Place, Sink, Written, flat};
+use super::flat;
+use super::names::numbered;
+use super::ome::{Levels, description, page};
+use super::sink::{Field, Files, Sink};
+use super::written::{LIMITS, Written, differs, is_described};
+use crate::bytes::json;
 use crate::error::{Error, Problem};
-use crate::files::{Handle, Pending};
-use crate::flatten::Flatten;
-use crate::image_of::LIMITS;
-use crate::layout::{Form, numbered};
-use crate::record::{FileRecord, Geometry, broken};
-use crate::splits::Split;
-use crate::write::{PageWriter, Pixels, as_io, description, label_png, label_tiff, narrow};
+use crate::files::{Folder, Handle, Pending};
+use crate::truth::{Form, Geometry, Split};
+use crate::write::{PageWriter, fits_16_bits, label_png, label_tiff};
 
 pub(super) struct Shard {
     tar: tar::Builder<BufWriter<Handle>>,
     pending: Pending,
-    policy: Flatten,
     /// The planes of a stack: the tar file wants its size before its bytes.
-    stack: Option<(PageWriter<Memory>, Memory)>,
+    stack: Option<(PageWriter<'static>, Memory)>,
 }
 
 /// A file in memory, of which the writer has one handle and we the other.
@@ -51,10 +50,10 @@ impl Seek for Memory {
 }
 
 impl Shard {
-    pub(super) fn new(place: Place<'_>) -> Result<Self, Error> {
-        let pending = place.folder.pending(&tar(place.shard))?;
+    pub(super) fn new(files: &Files) -> Result<Self, Error> {
+        let pending = files.folder.pending(&tar(files.shard))?;
         let tar = tar::Builder::new(BufWriter::with_capacity(1 << 18, pending.handle()?));
-        Ok(Self { tar, pending, policy: place.layout.flatten, stack: None })
+        Ok(Self { tar, pending, stack: None })
     }
 
     /// Adds a file whose head tells nothing but its name and size.
@@ -82,11 +81,45 @@ pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
 
 /// What is known of a frame.
 fn head(field: &Field) -> Value {
-    let split = json!({
+    let split = serde_json::json!({
         "field": Split::of_field(field.geometry.key.seed, field.index()).name(),
-        "slide": Split::of_slide(field.geometry.key.seed, field.geometry.slide).name(),
+        "slide": field.split().name(),
     });
-    json!({ "frame": field.summary, "split": split, "truth": field.document })
+    serde_json::json!({ "frame": field.summary, "split": split, "truth": field.document })
+}
+
+/// A tar file of a data set.
+pub(crate) struct TarFile {
+    path: PathBuf,
+    archive: tar::Archive<BufReader<File>>,
+}
+
+impl TarFile {
+    pub(crate) fn open(folder: &Folder, name: &str) -> Result<Self, Error> {
+        let path = folder.inside(name)?;
+        let file = File::open(&path).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => Error::input(&path)(Problem::Missing { wanted: "file" }),
+            _ => Error::io("read", &path)(e),
+        })?;
+        Ok(Self { path, archive: tar::Archive::new(BufReader::new(file)) })
+    }
+
+    /// Its files, one after the other.
+    pub(crate) fn files(&mut self) -> Result<Tar<'_>, Error> {
+        let entries = self.archive.entries().map_err(cannot_be_read(&self.path))?;
+        Ok(Tar { path: &self.path, entries })
+    }
+
+    /// The content of the file of this name.
+    pub(crate) fn content(&mut self, name: &str) -> Result<Vec<u8>, Error> {
+        let mut files = self.files()?;
+        while let Some(entry) = files.entry()? {
+            if *entry.path_bytes() == *name.as_bytes() {
+                return files.bytes(entry);
+            }
+        }
+        Err(Error::input(files.path)(Problem::broken("tar", format!("it has no file `{name}`"))))
+    }
 }
 
 /// The files of a tar file, one after the other.
@@ -95,19 +128,25 @@ pub(crate) struct Tar<'a> {
     entries: tar::Entries<'a, BufReader<File>>,
 }
 
+/// A file in a tar file.
+type Entry<'a> = tar::Entry<'a, BufReader<File>>;
+
 impl<'a> Tar<'a> {
-    pub(crate) fn new(path: &'a Path, archive: &'a mut tar::Archive<BufReader<File>>) -> Result<Self, Error> {
-        Ok(Self { path, entries: archive.entries().map_err(cannot_be_read(path))? })
+    fn entry(&mut self) -> Result<Option<Entry<'a>>, Error> {
+        self.entries.next().transpose().map_err(cannot_be_read(self.path))
+    }
+
+    fn bytes(&self, entry: Entry) -> Result<Vec<u8>, Error> {
+        let mut bytes = Vec::new();
+        entry.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(cannot_be_read(self.path))?;
+        Ok(bytes)
     }
 
     /// Name and content of the next file.
     fn next(&mut self) -> Result<Option<(String, Vec<u8>)>, Error> {
-        let Some(entry) = self.entries.next() else { return Ok(None) };
-        let entry = entry.map_err(cannot_be_read(self.path))?;
+        let Some(entry) = self.entry()? else { return Ok(None) };
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
-        let mut bytes = Vec::new();
-        entry.take(LIMITS.max_file_bytes).read_to_end(&mut bytes).map_err(cannot_be_read(self.path))?;
-        Ok(Some((name, bytes)))
+        Ok(Some((name, self.bytes(entry)?)))
     }
 
     /// No further file follows.
@@ -124,7 +163,7 @@ impl<'a> Tar<'a> {
 fn cannot_be_read(path: &Path) -> impl Fn(io::Error) -> Error {
     move |e| match e.kind() {
         io::ErrorKind::Other | io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
-            Error::input(path)(Problem::Broken { format: "tar", message: e.to_string() })
+            Error::input(path)(Problem::broken("tar", e))
         }
         _ => Error::io("read", path)(e),
     }
@@ -146,7 +185,7 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
             ("json", _) if ending == part => match serde_json::from_slice::<Value>(&bytes) {
                 Ok(found) if found == head(field) => Ok(()),
                 Ok(_) => differs("it does not say what the record and coco.json say"),
-                Err(error) => Err(broken(error)),
+                Err(error) => Err(error.into()),
             },
             ("ome.tif", _) if ending == part => {
                 written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.geometry)))
@@ -163,43 +202,31 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
 }
 
 impl Sink for Shard {
-    fn begin(&mut self, geometry: &Geometry) -> Result<(), Error> {
+    fn begin(&mut self, geometry: &Geometry, _: &Files) -> Result<(), Error> {
         let bytes = geometry.values() as u64 * geometry.planes_um.len() as u64 * 2;
         self.stack = match Form::of(geometry.planes_um.len()) {
             Form::Single => None,
             Form::Stack => {
                 let memory = Memory::default();
                 let writer = PageWriter::new(memory.clone(), bytes);
-                Some((writer.map_err(|e| Error::io("encode", self.pending.path())(as_io(e)))?, memory))
+                Some((writer.map_err(Error::io("encode", self.pending.path()))?, memory))
             }
         };
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, geometry: &Geometry, _: &Files) -> Result<(), Error> {
         let Some((writer, _)) = &mut self.stack else { return Ok(()) };
         let text = (plane.index == 0).then(|| description(geometry));
-        let (narrow, wide);
-        let pixels = match geometry.bits {
-            ..=8 => {
-                narrow = self::narrow(&plane.grey);
-                Pixels::U8(&narrow)
-            }
-            _ => {
-                wide = &plane.grey;
-                Pixels::U16(wide)
-            }
-        };
-        let (width, channels, pixel_um) = (geometry.view.width, geometry.channels, geometry.view.pixel_um);
-        let written = writer.write(pixels, width, channels, pixel_um, text.as_deref());
-        written.map_err(|e| Error::io("encode", self.pending.path())(as_io(e)))
+        let written = writer.write(Levels::new(&plane.grey, geometry).pixels(), &page(geometry, text.as_deref()));
+        written.map_err(Error::io("encode", self.pending.path()))
     }
 
-    fn field(&mut self, field: &Field) -> Result<(), Error> {
+    fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
         let (key, view) = (numbered(field.index()), field.geometry.view);
         let failed = |path| Error::io("encode", path);
         let path = self.pending.path().to_owned();
-        self.add(&format!("{key}.json"), &serde_json::to_vec(&head(field)).map_err(|e| failed(&path)(e.into()))?)?;
+        self.add(&format!("{key}.json"), &json(&head(field)))?;
         match self.stack.take() {
             None => self.add(&format!("{key}.png"), field.png().map_err(failed(&path))?)?,
             Some((_, memory)) => {
@@ -208,9 +235,8 @@ impl Sink for Shard {
             }
         }
         for group in flat::GROUPS {
-            let ids = self.policy.labels(field.truth, group);
-            let small = ids.iter().all(|&id| id <= u16::MAX.into());
-            let (ending, bytes) = match small {
+            let ids = files.layout.flatten.labels(field.truth, group);
+            let (ending, bytes) = match fits_16_bits(&ids) {
                 true => ("png", label_png(&ids, view.width, view.pixel_um)),
                 false => ("tif", label_tiff(&ids, view.width, view.pixel_um)),
             };
@@ -219,11 +245,12 @@ impl Sink for Shard {
         Ok(())
     }
 
-    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
+    fn close(self: Box<Self>, files: &mut Files) -> Result<(), Error> {
         let Self { tar, pending, .. } = *self;
         let mut writer = tar.into_inner().map_err(Error::io("write", pending.path()))?;
         writer.flush().map_err(Error::io("write", pending.path()))?;
         drop(writer);
-        Ok(vec![pending.commit()?])
+        files.written.push(pending.commit()?);
+        Ok(())
     }
 }

@@ -4,12 +4,31 @@ use std::cell::OnceCell;
 
 use papsynth::truth::Group;
 
-use super::Field;
+use super::layout::Layout;
+use super::sink::Field;
+use crate::bytes::sha256;
 use crate::error::{Error, Problem};
-use crate::files::{Folder, sha256};
-use crate::image_of::{LIMITS, levels};
-use crate::layout::{Form, Layout};
-use crate::read::{self, LevelImage};
+use crate::files::Folder;
+use crate::read::{self, LevelImage, Limits};
+use crate::truth::Form;
+
+/// What was written for one frame is read whole.
+pub(crate) const LIMITS: Limits =
+    Limits { max_side_px: 1 << 15, max_pixels: 1 << 30, max_file_bytes: 1 << 32, max_regions: 1 << 20 };
+
+/// The levels of a page with as many channels as the frame has: a picture in colour whose pixels are all grey is read as grey.
+pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
+    match channels / page.channels.max(1) {
+        3 => page.levels.iter().flat_map(|&level| [level; 3]).collect(),
+        _ => page.levels,
+    }
+}
+
+/// Takes images one after the other.
+pub(crate) type Take<'a> = dyn FnMut(LevelImage) -> Result<(), Problem> + 'a;
+
+/// Hands over the planes of a file.
+type Read<'a> = dyn FnMut(&mut Take) -> Result<(), Problem> + 'a;
 
 /// A frame of which every file is read again.
 pub(crate) struct Written<'a> {
@@ -36,49 +55,21 @@ impl<'a> Written<'a> {
     /// All planes are there and of the size that the record says, and the same in every format.
     pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
         let planes = self.field.geometry.planes_um.len();
-        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
-        self.pages([bytes], planes, seen)
-    }
-
-    /// The same of planes in a file each.
-    #[cfg(feature = "parquet")]
-    pub(crate) fn planes_apart<'b>(&self, files: impl IntoIterator<Item = &'b [u8]>) -> Result<(), Problem> {
-        self.pages(files, self.field.geometry.planes_um.len(), &self.planes)
+        self.shown(planes, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// The one picture of a frame, the same in every format.
     pub(crate) fn picture(&self, bytes: &[u8]) -> Result<(), Problem> {
-        self.pages([bytes], 1, &self.picture)
-    }
-
-    fn pages<'b>(
-        &self,
-        files: impl IntoIterator<Item = &'b [u8]>,
-        planes: usize,
-        seen: &OnceCell<Vec<String>>,
-    ) -> Result<(), Problem> {
-        self.compare(planes, seen, |take| {
-            files.into_iter().try_for_each(|bytes| LevelImage::pages(bytes, &LIMITS, &mut *take))
-        })
+        self.compare(1, &self.picture, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
-    #[cfg(feature = "zarr")]
-    pub(super) fn shown(
-        &self,
-        planes: usize,
-        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
-    ) -> Result<(), Problem> {
+    pub(super) fn shown(&self, planes: usize, read: &mut Read) -> Result<(), Problem> {
         let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
         self.compare(planes, seen, read)
     }
 
-    fn compare(
-        &self,
-        planes: usize,
-        seen: &OnceCell<Vec<String>>,
-        read: impl FnOnce(&mut dyn FnMut(LevelImage) -> Result<(), Problem>) -> Result<(), Problem>,
-    ) -> Result<(), Problem> {
+    fn compare(&self, planes: usize, seen: &OnceCell<Vec<String>>, read: &mut Read) -> Result<(), Problem> {
         let geometry = self.field.geometry;
         let mut found = Vec::new();
         read(&mut |page| {
@@ -147,5 +138,5 @@ fn is_of_masks(holds: bool) -> Result<(), Problem> {
 }
 
 pub(super) fn differs<T>(what: &str) -> Result<T, Problem> {
-    Err(Problem::Differs { what: what.to_owned() })
+    Err(Problem::differs(what))
 }

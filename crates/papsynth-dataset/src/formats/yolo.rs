@@ -4,22 +4,10 @@
 
 use std::fmt::Write;
 
-use super::written::differs;
-use super::{Field, Files, Place, Sink, Written};
+use super::sink::{Field, Files};
+use super::written::{Written, differs};
 use crate::error::Error;
-use crate::polygon::outlines;
-use crate::record::FileRecord;
-use crate::splits::Split;
-
-pub(super) struct Polygons<'a> {
-    files: Files<'a>,
-}
-
-impl<'a> Polygons<'a> {
-    pub(super) fn new(place: Place<'a>) -> Self {
-        Self { files: Files::new(place.folder) }
-    }
-}
+use crate::truth::{Split, outlines};
 
 pub(super) fn image(split: Split, index: u64) -> String {
     format!("yolo-seg/images/{}/{index:06}.png", split.name())
@@ -59,7 +47,7 @@ fn text(field: &Field) -> String {
 
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
-    let split = Split::of_slide(field.geometry.key.seed, field.geometry.slide);
+    let split = field.split();
     written.file(&image(split, field.index()), |bytes| written.picture(bytes))?;
     written.file(&labels(split, field.index()), |bytes| match bytes == text(field).as_bytes() {
         true => Ok(()),
@@ -67,16 +55,10 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     })
 }
 
-impl Sink for Polygons<'_> {
-    fn field(&mut self, field: &Field) -> Result<(), Error> {
-        let split = Split::of_slide(field.geometry.key.seed, field.geometry.slide);
-        self.files.png(&image(split, field.index()), field)?;
-        self.files.write(&labels(split, field.index()), text(field).as_bytes())
-    }
-
-    fn close(self: Box<Self>) -> Result<Vec<FileRecord>, Error> {
-        Ok(self.files.written)
-    }
+pub(super) fn write(field: &Field, files: &mut Files) -> Result<(), Error> {
+    let split = field.split();
+    files.png(&image(split, field.index()), field)?;
+    files.write(&labels(split, field.index()), text(field).as_bytes())
 }
 
 /// What tells a trainer where the splits lie and what the classes are called. Without a `path`, Ultralytics starts from the folder of the

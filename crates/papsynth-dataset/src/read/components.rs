@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use papsynth::truth::{LabelMap, Mask, Run};
 
-use super::Limits;
+use super::file::Limits;
 use crate::error::Problem;
 
 /// A connected region of one label. Pixels that meet at a corner are connected.

@@ -1,17 +1,15 @@
-//! Fields of slides with what is known of their nuclei: data sets of ours, and folders of images.
+//! Fields of slides with what is known of their nuclei: folders of images.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use papsynth::truth::LabelMap;
 
-use super::{LevelImage, Limits, bytes, components, image_files, parse, read_label_map};
-use crate::dataset::{recorded_shards, whole_record};
+use super::components::components;
+use super::file::{Limits, bytes, parse};
+use super::image::{LevelImage, read_label_map};
+use super::nucleus::image_files;
 use crate::error::{Error, Problem};
-use crate::files::Folder;
-use crate::formats::Format;
-use crate::layout::{self, Form};
-use crate::record::{Check, Manifest};
 use papsynth::white_level as white;
 
 /// The table that says which group each image of a folder belongs to.
@@ -42,7 +40,7 @@ pub enum FieldNuclei {
 
 /// The same before it is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum NucleiFile {
+pub(crate) enum NucleiFile {
     Unknown,
     Points(PathBuf),
     Labels(PathBuf),
@@ -59,10 +57,10 @@ pub struct FieldFile {
     pub pixel_um: Option<f64>,
     /// Which slide it is of, where the files say it: fields of one slide are stained alike.
     pub slide: Option<u64>,
-    image: PathBuf,
-    nuclei: NucleiFile,
+    pub(crate) image: PathBuf,
+    pub(crate) nuclei: NucleiFile,
     /// The largest grey level, where the files say it.
-    white: Option<u16>,
+    pub(crate) white: Option<u16>,
 }
 
 /// A field.
@@ -129,16 +127,8 @@ impl FieldFile {
     }
 }
 
-/// The fields in a folder, in the order of their names: a data set of ours with its masks of nuclei; or images (in the folder,
-/// or in `images`), with masks of the same names in `masks` (labels, or anything above 0), or for each image
-/// a table `NAME.csv` of `y,x` points beside it, and `frames.csv` that says which group each belongs to.
-///
-/// # Errors
-/// If there is no image, the folder cannot be read, or its tables make no sense.
-pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
-    if folder.join(layout::MANIFEST).exists() {
-        return of_dataset(folder);
-    }
+/// The fields of a folder that is no data set, in the order of their names.
+pub(crate) fn files_in(folder: &Path) -> Result<Vec<FieldFile>, Error> {
     let images = match image_files(folder) {
         Err(Error::Input { problem: Problem::NoImages, .. }) if folder.join("images").is_dir() => {
             image_files(&folder.join("images"))?
@@ -170,49 +160,6 @@ pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
         }
     };
     Ok(images.into_iter().map(field).collect())
-}
-
-/// The frames of a data set, which must all be whole; of a stack, its image with everything in focus.
-fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
-    let folder = Folder::new(path);
-    let manifest = Manifest::read(&folder)?;
-    if !manifest.layout.has(Format::Folder) {
-        let message = format!(
-            "the data set lies in files as {}; images and labels are read from the format `folder`",
-            manifest.layout
-        );
-        return Err(Error::Folder { path: path.to_owned(), message });
-    }
-    let mut fields = Vec::new();
-    for shard in recorded_shards(&folder)? {
-        let Manifest { identity, layout, categories, .. } = &manifest;
-        let whole = whole_record(&folder, identity, layout, categories, shard, Check::Sizes)?;
-        let record = whole.map_err(|flaw| {
-            let message =
-                format!("shard {shard} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
-            Error::Folder { path: path.to_owned(), message }
-        })?;
-        for frame in record.frames {
-            let index = frame.index;
-            let image = match Form::of(frame.planes_um.len()) {
-                Form::Single => layout::image(index, Form::Single),
-                Form::Stack => layout::all_in_focus(index),
-            };
-            fields.push(FieldFile {
-                name: layout::numbered(index),
-                group: String::new(),
-                pixel_um: Some(frame.pixel_um),
-                slide: Some(frame.slide),
-                image: folder.inside(&image)?,
-                nuclei: NucleiFile::Labels(folder.inside(&layout::labels(papsynth::truth::Group::Nucleus, index))?),
-                white: Some(white(frame.bits)),
-            });
-        }
-    }
-    if fields.is_empty() {
-        return Err(Error::Folder { path: path.to_owned(), message: "the data set has no whole frame".to_owned() });
-    }
-    Ok(fields)
 }
 
 /// A mask of one value alone becomes one label a connected region.
@@ -276,7 +223,7 @@ fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|e| Problem::Broken { format: "CSV", message: e.to_string() })?;
+        let record = record.map_err(|e| Problem::broken("CSV", e))?;
         let line = record.position().map_or(0, csv::Position::line);
         let (Some(a), Some(b), 2) = (record.get(0), record.get(1), record.len()) else {
             return Err(Problem::Row { line, message: format!("has {} values; two are wanted", record.len()) });

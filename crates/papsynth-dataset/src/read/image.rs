@@ -4,9 +4,10 @@ use std::path::Path;
 
 use papsynth::truth::LabelMap;
 
+use super::file::{Limits, parse};
 use super::png::{self, Meaning};
 use super::raster::{Channels, Raster, Samples};
-use super::{Limits, parse, tiff};
+use super::tiff;
 use crate::error::{Error, Problem};
 
 pub(crate) const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -99,10 +100,10 @@ impl LevelImage {
     pub(crate) fn pages(
         bytes: &[u8],
         limits: &Limits,
-        mut take: impl FnMut(Self) -> Result<(), Problem>,
+        take: &mut dyn FnMut(Self) -> Result<(), Problem>,
     ) -> Result<(), Problem> {
         match is_tiff(bytes) {
-            true => tiff::pages(bytes, limits, |raster| take(Self::of(raster)?)),
+            true => tiff::pages(bytes, limits, &mut |raster| take(Self::of(raster)?)),
             false => take(Self::decode(bytes, limits)?),
         }
     }
@@ -147,7 +148,7 @@ pub fn label_map(bytes: &[u8], limits: &Limits) -> Result<LabelMap, Problem> {
 /// The label images of a TIFF file, one a page; more than `most` are refused.
 pub(crate) fn label_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<Vec<LabelMap>, Problem> {
     let mut pages = Vec::new();
-    tiff::pages(bytes, limits, |raster| {
+    tiff::pages(bytes, limits, &mut |raster| {
         if pages.len() >= most {
             return Err(tiff::too_many(most));
         }

@@ -7,11 +7,12 @@
 //!
 //! PNG of 1 to 16 bits and TIFF of 8, 16 or (label images only) 32 bits. An image in colour is refused, but for
 //! [`LevelImage`], which keeps its channels: how much light of one wavelength a colour stands for is not known. Fields that
-//! are compared are read in green ([`field_files`]). A colour file whose pixels are all grey (R = G = B, opaque) is read as
+//! are compared are read in green ([`FieldFile`]). A colour file whose pixels are all grey (R = G = B, opaque) is read as
 //! grey. In label images and masks a palette is not looked at, its indices are the labels.
 
 mod components;
 mod fields;
+mod file;
 mod image;
 mod nucleus;
 mod outlines;
@@ -19,83 +20,17 @@ mod png;
 mod raster;
 mod stack;
 mod tiff;
-mod truths;
 mod weights;
 
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::Path;
-
 pub use components::{Component, components};
-pub use fields::{FieldFile, FieldImage, FieldNuclei, field_files};
+pub use fields::{FieldFile, FieldImage, FieldNuclei};
+pub(crate) use fields::{NucleiFile, files_in};
+pub use file::Limits;
+pub(crate) use file::bytes;
 pub(crate) use image::label_pages;
 pub use image::{GreyImage, LevelImage, label_map, read_label_map};
 pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
 pub use stack::{Stack, natural_order};
 pub(crate) use tiff::{description, float_pages};
-pub use truths::truths;
 pub use weights::{InputFile, label_weights, read_inputs, weights};
-
-use crate::error::{Error, Problem};
-
-/// How large a file may be to be read. All defaults are ours.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
-    /// Largest width and height of an image, pixels. Default 32768, as wide as a field may be.
-    pub max_side_px: u32,
-    /// Largest number of pixels of an image. Default 2²⁶, that is 8192 x 8192.
-    pub max_pixels: u64,
-    /// Largest size of a file, bytes. Default 2³⁰.
-    pub max_file_bytes: u64,
-    /// Largest number of separate regions of a label image. Default 100000.
-    pub max_regions: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { max_side_px: 32_768, max_pixels: 1 << 26, max_file_bytes: 1 << 30, max_regions: 100_000 }
-    }
-}
-
-impl Limits {
-    /// Refuses an image by its stated size, before anything is allocated for it.
-    fn check(&self, width: u32, height: u32) -> Result<(), Problem> {
-        let pixels = u64::from(width) * u64::from(height);
-        if width.max(height) > self.max_side_px || pixels > self.max_pixels || pixels == 0 {
-            return Err(Problem::ImageSize {
-                width: width.into(),
-                height: height.into(),
-                max_side: self.max_side_px.into(),
-                max_pixels: self.max_pixels,
-            });
-        }
-        Ok(())
-    }
-}
-
-/// Reads a file and parses it.
-fn parse<T>(path: &Path, limits: &Limits, parse: impl FnOnce(&[u8]) -> Result<T, Problem>) -> Result<T, Error> {
-    parse(&bytes(path, limits.max_file_bytes)?).map_err(Error::input(path))
-}
-
-/// The bytes of a file of at most `limit` bytes.
-pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
-    let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::input(path)(Problem::Missing { wanted: "file" })
-        }
-        io::ErrorKind::IsADirectory => Error::input(path)(Problem::Folder),
-        _ => Error::io("read", path)(e),
-    };
-    let file = File::open(path).map_err(failed)?;
-    let size = file.metadata().map_err(failed)?.len();
-    let mut bytes = Vec::new();
-    // A device or a growing file may hold more than it says.
-    file.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(failed)?;
-    let read = bytes.len() as u64;
-    if read > limit {
-        return Err(Error::input(path)(Problem::FileSize { bytes: size.max(read), limit }));
-    }
-    Ok(bytes)
-}

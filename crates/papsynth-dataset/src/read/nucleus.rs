@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 
 use papsynth::truth::LabelMap;
 
-use super::{GreyImage, Limits, components, read_label_map};
+use super::components::components;
+use super::file::Limits;
+use super::image::{GreyImage, read_label_map};
 use crate::error::{Error, Problem};
 
 /// Endings of the files that are looked at, in lower case.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Limits, parse};
+use super::file::{Limits, parse};
 use crate::error::{Error, Problem};
 
 /// The columns of a table of outlines.
@@ -60,15 +60,11 @@ pub fn outlines(bytes: &[u8]) -> Result<Vec<Outline>, Problem> {
         last.points.push(point);
     }
     match outlines.iter().find(|o| o.points.len() < MIN_POINTS) {
-        Some(short) => Err(Problem::Broken {
-            format: "CSV",
-            message: format!(
-                "outline `{}` has {} points; at least {MIN_POINTS} are wanted",
-                short.name,
-                short.points.len()
-            ),
-        }),
-        None if outlines.is_empty() => Err(Problem::Broken { format: "CSV", message: "it has no outline".to_owned() }),
+        Some(Outline { name, points }) => {
+            let message = format!("outline `{name}` has {} points; at least {MIN_POINTS} are wanted", points.len());
+            Err(Problem::broken("CSV", message))
+        }
+        None if outlines.is_empty() => Err(Problem::broken("CSV", "it has no outline")),
         None => Ok(outlines),
     }
 }
@@ -84,6 +80,6 @@ pub fn read_outlines(path: &Path, limits: &Limits) -> Result<Vec<Outline>, Error
 fn broken(error: csv::Error) -> Problem {
     match error.position() {
         Some(position) => Problem::Row { line: position.line(), message: error.to_string() },
-        None => Problem::Broken { format: "CSV", message: error.to_string() },
+        None => Problem::broken("CSV", error),
     }
 }

@@ -4,7 +4,7 @@ use std::io::{Cursor, ErrorKind};
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Transformations};
 
-use super::Limits;
+use super::file::Limits;
 use super::raster::{Channels, Raster, Samples};
 use crate::error::Problem;
 
@@ -63,6 +63,6 @@ fn unpack(rows: &[u8], bits: usize, width: usize, line_size: usize) -> Vec<u8> {
 fn problem(error: DecodingError) -> Problem {
     match error {
         DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated { format: "PNG" },
-        other => Problem::Broken { format: "PNG", message: other.to_string() },
+        other => Problem::broken("PNG", other),
     }
 }

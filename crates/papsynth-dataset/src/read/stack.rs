@@ -3,10 +3,12 @@
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
+use super::file::{Limits, bytes};
 use super::image::{decode, is_tiff};
+use super::nucleus::image_files;
 use super::png::Meaning;
 use super::raster::{Raster, Samples};
-use super::{Limits, bytes, image_files, tiff};
+use super::tiff;
 use crate::error::{Error, Problem};
 
 /// Largest number of pixels of all planes: a GiB in memory.
@@ -63,7 +65,7 @@ impl Stack {
     /// Adds the planes of a file.
     fn add(&mut self, bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
         if is_tiff(bytes) {
-            tiff::pages(bytes, limits, |raster| self.push(raster))
+            tiff::pages(bytes, limits, &mut |raster| self.push(raster))
         } else {
             self.push(decode(bytes, limits, Meaning::Brightness)?)
         }

@@ -6,7 +6,7 @@ use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
 use tiff::{ColorType, TiffError};
 
-use super::Limits;
+use super::file::Limits;
 use super::raster::{Channels, Raster, Samples};
 use crate::error::Problem;
 
@@ -39,7 +39,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
 pub(super) fn pages(
     bytes: &[u8],
     limits: &Limits,
-    mut take: impl FnMut(Raster) -> Result<(), Problem>,
+    take: &mut dyn FnMut(Raster) -> Result<(), Problem>,
 ) -> Result<(), Problem> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     loop {
@@ -80,7 +80,7 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
 }
 
 pub(super) fn too_many(most: usize) -> Problem {
-    Problem::Differs { what: format!("it has more than {most} pages") }
+    Problem::differs(format!("it has more than {most} pages"))
 }
 
 /// What the first page of a file says that it shows, if it says anything.
@@ -134,7 +134,7 @@ fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) ->
         Samples::F32(s) => s.len(),
     };
     if found != pixels * channels.count() {
-        return Err(Problem::Broken { format: "TIFF", message: format!("{found} samples for {pixels} pixels") });
+        return Err(Problem::broken("TIFF", format!("{found} samples for {pixels} pixels")));
     }
     Ok((Raster { width, channels, samples }, decoder))
 }
@@ -142,6 +142,6 @@ fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) ->
 fn problem(error: TiffError) -> Problem {
     match error {
         TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated { format: "TIFF" },
-        other => Problem::Broken { format: "TIFF", message: other.to_string() },
+        other => Problem::broken("TIFF", other),
     }
 }

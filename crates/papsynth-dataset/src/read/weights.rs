@@ -7,10 +7,10 @@ use papsynth::recipe::{Labels, Layout, Recipe};
 use papsynth::scene::WeightMap;
 use papsynth::truth::LabelMap;
 
-use super::image::PNG_SIGNATURE;
-use super::{GreyImage, Limits, bytes, label_map};
+use super::file::{Limits, bytes};
+use super::image::{GreyImage, PNG_SIGNATURE, label_map};
+use crate::bytes::sha256;
 use crate::error::{Error, Problem};
-use crate::files::sha256;
 
 /// Brightness as weight: 0 where black, 1 at the file's largest grey level.
 ///

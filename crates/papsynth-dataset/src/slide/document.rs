@@ -4,11 +4,13 @@ use papsynth::truth::Group;
 use papsynth_zarr::{Channel, Form, Image, Kind, Labels, Pyramid, Space, Tiling, levels_until};
 use serde_json::{Map, json};
 
-use super::{IMAGE, SlideHead, SlideSet};
-use crate::error::Error;
+use super::record::SlideHead;
 
 /// Side of a chunk.
 pub(super) const CHUNK: usize = 512;
+
+/// Folder of the image.
+pub(super) const IMAGE: &str = "slide.ome.zarr";
 
 /// Name of the label image that counts cytoplasms.
 pub(super) const LAYERS: &str = "layers";
@@ -23,7 +25,7 @@ pub(super) struct Forms {
 }
 
 impl Forms {
-    pub(super) fn new(head: &SlideHead) -> Result<Self, String> {
+    pub(super) fn new(head: &SlideHead) -> Result<Self, papsynth_zarr::Error> {
         let (width, height) = (head.width_px as usize, head.height_px as usize);
         let form = |kind, channels, planes| {
             let form = Form {
@@ -35,7 +37,7 @@ impl Forms {
                 tiling: Tiling { chunk: CHUNK, shard: head.shard_px as usize, planes: 1 },
                 levels: levels_until(CHUNK, width, height),
             };
-            Pyramid::new(&form).map_err(|e| e.to_string())
+            Pyramid::new(&form)
         };
         let kind = if head.bits <= 8 { Kind::U8 } else { Kind::U16 };
         let planes = (head.planes_um.len() > 1).then_some(head.planes_um.len());
@@ -46,20 +48,9 @@ impl Forms {
             layers: form(Kind::U16, None, None)?,
         })
     }
-}
 
-/// The folder of a level of the image, or of the labels of a name.
-pub(super) fn folder(labels: Option<&str>, level: usize) -> String {
-    match labels {
-        None => format!("{IMAGE}/{level}"),
-        Some(name) => format!("{IMAGE}/labels/{name}/{level}"),
-    }
-}
-
-impl SlideSet {
     /// The documents of the image, by their paths in the slide's folder.
-    pub(super) fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let head = &self.head;
+    pub(super) fn documents(&self, head: &SlideHead) -> Result<Vec<(String, Vec<u8>)>, papsynth_zarr::Error> {
         let most = f64::from((1_u32 << head.bits) - 1);
         let channel =
             |label: &str, color| Channel { label: label.to_owned(), color, range: [0.0, most], window: [0.0, most] };
@@ -76,7 +67,7 @@ impl SlideSet {
         let planes = &head.planes_um;
         let image = Image {
             name: format!("papsynth slide {} of seed {}", head.slide, head.identity.seed),
-            pyramid: self.forms.image.clone(),
+            pyramid: self.image.clone(),
             space: Space {
                 pixel_um: head.pixel_um,
                 step_um: planes.get(1).map_or(1.0, |second| second - planes[0]),
@@ -86,15 +77,23 @@ impl SlideSet {
             plane: planes.len() / 2,
             labels: Group::ALL
                 .iter()
-                .map(|group| labels(group.name(), &self.forms.labels))
-                .chain([labels(LAYERS, &self.forms.layers)])
+                .map(|group| labels(group.name(), &self.labels))
+                .chain([labels(LAYERS, &self.layers)])
                 .collect(),
             attributes: Map::from_iter([(
                 "papsynth".to_owned(),
                 json!({ "seed": head.identity.seed, "slide": head.slide, "recipe_sha256": head.identity.recipe_sha256 }),
             )]),
         };
-        let documents = image.documents().map_err(|e| super::wrong(self.folder.root(), e.to_string()))?;
-        Ok(documents.into_iter().map(|(path, bytes)| (format!("{IMAGE}/{path}"), bytes)).collect())
+        let documents = image.documents()?.into_iter();
+        Ok(documents.map(|(path, bytes)| (format!("{IMAGE}/{path}"), bytes)).collect())
+    }
+}
+
+/// The folder of a level of the image, or of the labels of a name.
+pub(super) fn folder(labels: Option<&str>, level: usize) -> String {
+    match labels {
+        None => format!("{IMAGE}/{level}"),
+        Some(name) => format!("{IMAGE}/labels/{name}/{level}"),
     }
 }

@@ -8,10 +8,11 @@ use sha2::{Digest, Sha256};
 
 use super::document::{LAYERS, folder};
 use super::read::parts;
-use super::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, wrong};
+use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place};
+use crate::bytes::hex;
 use crate::error::Error;
-use crate::files::hex;
-use crate::record::{Check, FileRecord};
+use crate::files::{Check, FileRecord};
+use crate::formats::HAS_PARQUET;
 use crate::write;
 
 /// Longer side of the thumbnail at most, px.
@@ -39,7 +40,7 @@ impl SlideSet {
     pub fn finish(&self, check: Check) -> Result<Finished, Error> {
         let missing = self.missing(check)?;
         if let Some(&first) = missing.first() {
-            return Err(wrong(
+            return Err(Error::folder(
                 self.path(),
                 format!(
                     "{} of {} shards are missing or damaged, the first is {}; `papsynth slide make --verify` with the same recipe makes them",
@@ -119,7 +120,7 @@ impl SlideSet {
         [channel, plane]: [usize; 2],
         halve: fn(&[T], usize) -> Vec<T>,
     ) -> Result<Vec<T>, Error> {
-        let bad = |e: papsynth_zarr::Error| wrong(self.path(), e.to_string());
+        let bad = |e: papsynth_zarr::Error| Error::folder(self.path(), e.to_string());
         let block = array.block(place(at, plane)).map_err(bad)?;
         let width = block.columns.len();
         let mut values = vec![T::default(); block.pixels()];
@@ -152,7 +153,7 @@ impl SlideSet {
         let bytes: Vec<u16> = grey.iter().map(|grey| grey >> shift).collect();
         let pixel_um = self.head.pixel_um * f64::from(1_u32 << level);
         write::png(&bytes, width, self.head.channels, 8, pixel_um)
-            .map_err(|e| wrong(self.path(), format!("{THUMBNAIL}: {e}")))
+            .map_err(|e| Error::folder(self.path(), format!("{THUMBNAIL}: {e}")))
     }
 
     fn card(&self, objects: u64) -> String {
@@ -188,7 +189,68 @@ impl SlideSet {
             head.slide,
             head.shard_px,
             // Only builds with Parquet know the word, and write it unless told otherwise.
-            if crate::parquet::IS_HERE && !head.objects_parquet { " --no-parquet" } else { "" },
+            if HAS_PARQUET && !head.objects_parquet { " --no-parquet" } else { "" },
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::path::Path;
+    use std::sync::atomic::AtomicBool;
+
+    use papsynth::model::Model;
+    use papsynth::recipe::Preset;
+    use papsynth::{Engine, Inputs, Threads};
+
+    use super::super::{SlideInfo, SlideRun};
+    use super::*;
+    use crate::dataset::Share;
+    use crate::files::fault;
+    use crate::support::{Scratch, contents};
+
+    #[test]
+    fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_slide() {
+        let mut recipe = Preset::Sparse.recipe();
+        (recipe.scan.width_px, recipe.scan.height_px, recipe.scan.frame_px) = (600, 64, 256);
+        recipe.cells.clear();
+        let model = Model::builtin();
+        let engine = Engine::new(&recipe, &model, &Inputs::default()).unwrap();
+        let slide = engine.slide(1, 0).unwrap();
+        let info = SlideInfo {
+            recipe: &recipe,
+            model: &model,
+            seed: 1,
+            shard_px: 512,
+            objects_parquet: crate::formats::HAS_PARQUET,
+        };
+        let make = |path: &Path| {
+            let set = SlideSet::create_or_resume(path, &slide, &info)?;
+            let stop = AtomicBool::new(false);
+            let run = SlideRun { share: Share::ALL, threads: Threads::One, check: Check::Sizes, stop: &stop };
+            set.make(&slide, &run, &|_| ())?;
+            set.finish(Check::Sizes)
+        };
+        let good = Scratch::new("slide-faults-none");
+        make(good.path()).unwrap();
+        let expected = contents(good.path());
+        let mut failures = 0;
+        for passed in (0..60).chain((60..).step_by(7)) {
+            let scratch = Scratch::new("slide-faults");
+            let kinds = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied, io::ErrorKind::Other];
+            fault::KIND.set(kinds[failures % 3]);
+            fault::LEFT.set(Some(passed));
+            let result = make(scratch.path());
+            fault::LEFT.set(None);
+            let Err(error) = result else { break };
+            failures += 1;
+            assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
+            let there = contents(scratch.path());
+            assert!(there.iter().all(|file| expected.contains(file)), "after {passed} calls");
+            make(scratch.path()).unwrap();
+            assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
+        }
+        assert!(failures > 60, "{failures}");
     }
 }

@@ -7,7 +7,7 @@ use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid, Sample, ShardReader};
 
 use super::document::folder;
-use super::{SlideSet, UPPER, place, wrong};
+use super::set::{SlideSet, UPPER, place};
 use crate::error::Error;
 
 impl SlideSet {
@@ -24,7 +24,7 @@ impl SlideSet {
         let shard = place(at, plane);
         let path = self.folder.path(&format!("{folder}/{}", array.file(shard)));
         let file = File::open(&path).map_err(Error::io("read", &path))?;
-        let bad = |e: papsynth_zarr::Error| wrong(&path, e.to_string());
+        let bad = |e: papsynth_zarr::Error| Error::folder(&path, e.to_string());
         let mut reader = ShardReader::open(array, shard, file).map_err(bad)?;
         reader.region(channel, plane, rows, columns).map_err(bad)
     }
@@ -93,9 +93,9 @@ impl SlideSet {
 
     fn level<'a>(&self, pyramid: &'a Pyramid, level: usize) -> Result<&'a Array, Error> {
         let levels = pyramid.levels();
-        levels
-            .get(level)
-            .ok_or_else(|| wrong(self.path(), format!("has {} levels, and none of number {level}", levels.len())))
+        levels.get(level).ok_or_else(|| {
+            Error::folder(self.path(), format!("has {} levels, and none of number {level}", levels.len()))
+        })
     }
 
     fn gather<T: Sample>(
@@ -108,7 +108,7 @@ impl SlideSet {
     ) -> Result<Vec<T>, Error> {
         let [_, _, height, width] = array.shape();
         if rows.is_empty() || columns.is_empty() || rows.end > height || columns.end > width {
-            return Err(wrong(
+            return Err(Error::folder(
                 self.path(),
                 format!("rows {rows:?} and columns {columns:?} leave a level of {width} x {height} pixels"),
             ));

@@ -1,20 +1,38 @@
 //! What a slide is, and what of it is whole.
 
-use std::path::{Component, Path};
-
 use papsynth::Slide;
+use papsynth::model::Model;
+use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
-use super::{HEAD, SlideInfo};
+use crate::bytes::{json, json_lines, sha256};
+use crate::dataset::{Identity, WRITER, lies_inside, nested};
 use crate::error::{Error, Problem};
-use crate::files::{Folder, sha256};
-use crate::record::{FileRecord, Identity, WRITER, broken};
+use crate::files::{FileRecord, Folder};
 
-const FORMAT: &str = crate::nested::SLIDE[1];
+/// Name of the file that says what a slide is made from.
+pub(super) const HEAD: &str = nested::SLIDE[0];
+
+const FORMAT: &str = nested::SLIDE[1];
 const VERSION: u32 = 1;
 
 /// Largest record that is read back.
 pub(super) const RECORD_BYTES: u64 = 1 << 26;
+
+/// What a slide is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct SlideInfo<'a> {
+    /// The recipe, resolved: as the engine got it.
+    pub recipe: &'a Recipe,
+    /// The model.
+    pub model: &'a Model,
+    /// The seed.
+    pub seed: u64,
+    /// Side of the squares that are written and made again together, px: 512 times a power of two.
+    pub shard_px: u32,
+    /// Whether tables of objects are also written as Parquet, which wants the feature `parquet`.
+    pub objects_parquet: bool,
+}
 
 /// What a slide is made from, and how it is cut: `slide.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -83,8 +101,8 @@ impl SlideHead {
     /// # Errors
     /// If it is none, or of another version.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
-        let head: Self = serde_json::from_slice(bytes).map_err(broken)?;
-        let said = |message: String| Err(Problem::Broken { format: "JSON", message });
+        let head: Self = serde_json::from_slice(bytes)?;
+        let said = |message: String| Err(Problem::broken("JSON", message));
         if head.format != FORMAT || head.version != VERSION {
             let (format, version) = (head.format.escape_default().to_string(), head.version);
             return said(format!("is `{format}` of version {version}; expected `{FORMAT}` of version {VERSION}"));
@@ -105,8 +123,7 @@ impl SlideHead {
     }
 
     pub(super) fn to_json(&self) -> Vec<u8> {
-        // Numbers of a slide all have a JSON.
-        let mut text = serde_json::to_vec_pretty(self).unwrap_or_default();
+        let mut text = json_lines(self);
         text.push(b'\n');
         text
     }
@@ -156,12 +173,11 @@ impl SlideRecord {
 
     fn sealed(self) -> Self {
         let open = Self { sha256: String::new(), ..self };
-        let text = serde_json::to_vec(&open).unwrap_or_default();
-        Self { sha256: sha256(&text), ..open }
+        Self { sha256: sha256(&json(&open)), ..open }
     }
 
     pub(super) fn to_json(&self) -> Vec<u8> {
-        serde_json::to_vec_pretty(self).unwrap_or_default()
+        json_lines(self)
     }
 
     /// Parses a record.
@@ -169,10 +185,8 @@ impl SlideRecord {
     /// # Errors
     /// If it is none, was changed after it was written, or names a file outside the slide.
     pub fn from_json(bytes: &[u8]) -> Result<Self, Problem> {
-        let record: Self = serde_json::from_slice(bytes).map_err(broken)?;
-        let said = |message: &str| Err(Problem::Broken { format: "JSON", message: message.to_owned() });
-        let lies_inside =
-            |path: &str| !path.is_empty() && Path::new(path).components().all(|c| matches!(c, Component::Normal(_)));
+        let record: Self = serde_json::from_slice(bytes)?;
+        let said = |message: &str| Err(Problem::broken("JSON", message));
         if !record.files.iter().all(|file| lies_inside(&file.path)) {
             return said("names a file outside the slide");
         }

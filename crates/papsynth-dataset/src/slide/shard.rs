@@ -2,17 +2,19 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use papsynth::truth::Group;
+use papsynth::truth::{Group, ObjectTruth};
 use papsynth::{Slide, Threads};
 use papsynth_zarr::{Array, Pyramid, Sample, ShardEncoder, halved, halved_labels};
+use serde_json::{Value, json};
 
 use super::document::{LAYERS, folder};
-use super::objects::{cells, collection, columns, table};
-use super::{SlideSet, name_of, place, record_name, wrong};
+use super::set::{SlideSet, name_of, place, record_name};
+use crate::bytes;
+use crate::dataset::Share;
 use crate::error::Error;
-use crate::generate::Share;
-use crate::parquet;
-use crate::record::{Check, FileRecord};
+use crate::files::{Check, FileRecord};
+use crate::formats::parquet::Table;
+use crate::truth::{collection, slide_cells, slide_columns, slide_table};
 
 /// Which shards to make, and how.
 #[derive(Debug, Clone, Copy)]
@@ -93,19 +95,27 @@ impl SlideSet {
         files.extend(self.write_levels(pyramid, name, at, 0, vec![part.layers], width, halved_labels)?);
         let name = name_of(at);
         let objects = &part.objects;
-        let rows = table(objects).map_err(|e| wrong(self.path(), format!("objects of {name}: {e}")))?;
-        files.push(self.folder.write(&format!("objects/{name}.csv"), &rows)?);
+        files.push(self.folder.write(&format!("objects/{name}.csv"), &slide_table(objects))?);
         if self.head.objects_parquet {
             let pending = self.folder.pending(&format!("objects/{name}.parquet"))?;
-            parquet::write_cells(&pending, &columns(), objects.iter().map(cells))?;
+            let mut table = Table::begin(pending.handle()?, pending.path(), slide_columns())?;
+            objects.iter().try_for_each(|object| table.row(slide_cells(object)))?;
+            table.end()?;
             files.push(pending.commit()?);
         }
-        let outlines = collection(objects, self.head.identity.seed, self.head.slide);
-        let outlines = serde_json::to_vec(&outlines).map_err(|e| wrong(self.path(), e.to_string()))?;
+        let outlines = bytes::json(&self.outlines(objects));
         files.push(self.folder.write(&format!("objects/{name}.geojson"), &outlines)?);
         let count = objects.len() as u64;
         self.write_record(&record_name(at), files, count)?;
         Ok(count)
+    }
+
+    /// The outlines of a shard, in pixels of the slide.
+    fn outlines(&self, objects: &[ObjectTruth]) -> Value {
+        let (seed, slide) = (self.head.identity.seed, self.head.slide);
+        let name = |o: &ObjectTruth| format!("papsynth slide {seed} {slide} {} {:?}", o.id, o.part);
+        let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Stain": o.stain });
+        collection(&objects.iter().collect::<Vec<_>>(), name, measure)
     }
 
     /// Writes the shards of all levels that follow from this one alone, each level half of that before.
@@ -144,7 +154,7 @@ impl SlideSet {
     ) -> Result<FileRecord, Error> {
         let shard = place(at, plane);
         let name = format!("{folder}/{}", array.file(shard));
-        let bad = |e: papsynth_zarr::Error| wrong(&self.folder.path(&name), e.to_string());
+        let bad = |e: papsynth_zarr::Error| Error::folder(&self.folder.path(&name), e.to_string());
         let mut encoder = ShardEncoder::new(array, shard).map_err(bad)?;
         self.write_pieces(&name, |out| {
             let path = self.folder.path(&name);

@@ -6,12 +6,13 @@ use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid};
 
 use super::document::{LAYERS, folder};
-use super::{CARD, HEAD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
+use super::record::HEAD;
+use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
+use crate::bytes::sha256;
+use crate::dataset::{Finding, Mend};
 use crate::error::Error;
-use crate::files::is_temporary;
-use crate::layout;
-use crate::record::{Check, FileRecord};
-use crate::verify::{Finding, Mend};
+use crate::files::{Check, FileRecord, is_temporary};
+use crate::formats::names;
 
 impl SlideSet {
     /// Reads every file and says what is missing, cut, changed or too many, by path.
@@ -58,7 +59,7 @@ impl SlideSet {
                 let message = format!(
                     "what others are writing cannot be told from strays before `papsynth slide finalize` has closed the slide ({name} is missing)"
                 );
-                Err(super::wrong(self.path(), message))
+                Err(Error::folder(self.path(), message))
             }
         }
     }
@@ -121,12 +122,12 @@ impl SlideSet {
         let file = |path: &str, bytes: &[u8]| FileRecord {
             path: path.to_owned(),
             bytes: bytes.len() as u64,
-            sha256: crate::files::sha256(bytes),
+            sha256: sha256(bytes),
         };
         let mut files = vec![file(HEAD, &self.head.to_json())];
         files.extend(self.documents()?.iter().map(|(path, bytes)| file(path, bytes)));
         for (path, sha256) in
-            [(layout::RECIPE, &self.head.identity.recipe_sha256), (layout::MODEL, &self.head.identity.model_sha256)]
+            [(names::RECIPE, &self.head.identity.recipe_sha256), (names::MODEL, &self.head.identity.model_sha256)]
         {
             let bytes = std::fs::metadata(self.folder.path(path)).map_or(0, |found| found.len());
             files.push(FileRecord { path: path.to_owned(), bytes, sha256: sha256.clone() });

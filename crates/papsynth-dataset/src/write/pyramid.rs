@@ -1,52 +1,33 @@
 //! Pages in tiles, each with the same at half the size, and again: viewers of large images read what they show.
 
-use std::io::{Seek, Write};
-
 use tiff::TiffResult;
 use tiff::encoder::{DirectoryEncoder, TiffEncoder, TiffKind, TiffValue};
-use tiff::tags::{PhotometricInterpretation, SampleFormat, Tag};
+use tiff::tags::{SampleFormat, Tag};
 
-use super::tiff::resolution;
+use super::page::{Out, Page, photometric, resolution};
 
 /// Side of a tile.
 const TILE: usize = 512;
 
 /// From this side on an image is written as a pyramid.
-pub(crate) const LARGE: usize = 2048;
+const LARGE: usize = 2048;
+
+/// Whether an image is written as a pyramid.
+pub(crate) fn is_large(width: usize, height: usize) -> bool {
+    width.max(height) >= LARGE
+}
 
 /// Grey levels of 8 or of 16 bits.
-pub(super) trait Level: Copy + Default {
+pub(super) trait Level: Copy + Default + Into<u32> + TryFrom<u32> {
     const BITS: u16;
-
-    fn into_u32(self) -> u32;
-
-    fn from_u32(level: u32) -> Self;
 }
 
 impl Level for u8 {
     const BITS: u16 = 8;
-
-    fn into_u32(self) -> u32 {
-        self.into()
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "the mean of bytes is one")]
-    fn from_u32(level: u32) -> Self {
-        level as Self
-    }
 }
 
 impl Level for u16 {
     const BITS: u16 = 16;
-
-    fn into_u32(self) -> u32 {
-        self.into()
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "the mean of 16 bits has no more")]
-    fn from_u32(level: u32) -> Self {
-        level as Self
-    }
 }
 
 /// An image whose channels lie side by side.
@@ -71,8 +52,9 @@ impl<T: Level> Image<'_, T> {
             for x in 0..width {
                 for channel in 0..channels {
                     let at = 2 * x * channels + channel;
-                    let sum: u32 = rows.iter().map(|row| row[at].into_u32() + row[at + channels].into_u32()).sum();
-                    half.push(T::from_u32((sum + 2) / 4));
+                    let sum: u32 = rows.iter().map(|row| row[at].into() + row[at + channels].into()).sum();
+                    let mean = T::try_from((sum + 2) / 4).ok();
+                    half.push(mean.expect("a mean of levels has no more bits than they have"));
                 }
             }
         }
@@ -93,13 +75,10 @@ impl<T: Level> Image<'_, T> {
 }
 
 /// Adds a page and its smaller versions, down to one tile, as sub-images.
-pub(super) fn page<W: Write + Seek, K: TiffKind, T: Level>(
+pub(super) fn page<W: Out, K: TiffKind, T: Level>(
     encoder: &mut TiffEncoder<W, K>,
     levels: &[T],
-    width: usize,
-    channels: usize,
-    pixel_um: f64,
-    description: Option<&str>,
+    &Page { width, channels, pixel_um, text }: &Page,
 ) -> TiffResult<()>
 where
     [T]: TiffValue,
@@ -118,7 +97,7 @@ where
         (half, side) = (image.halved(), side / 2);
     }
     let mut directory = encoder.image_directory()?;
-    if let Some(text) = description {
+    if let Some(text) = text {
         directory.write_tag(Tag::ImageDescription, text)?;
     }
     fill(&mut directory, &whole, pixel_um)?;
@@ -128,7 +107,7 @@ where
     directory.finish()
 }
 
-fn fill<W: Write + Seek, K: TiffKind, T: Level>(
+fn fill<W: Out, K: TiffKind, T: Level>(
     directory: &mut DirectoryEncoder<W, K>,
     image: &Image<T>,
     pixel_um: f64,
@@ -142,16 +121,14 @@ where
         for column in 0..width.div_ceil(TILE) {
             let tile = image.tile(column, row);
             offsets.push(K::convert_offset(directory.write_data(tile.as_slice())?)?);
-            sizes.push(u32::try_from(tile.len() * usize::from(T::BITS) / 8)?);
+            sizes.push(u32::try_from(size_of_val(tile.as_slice()))?);
         }
     }
-    let photometric =
-        if channels == 3 { PhotometricInterpretation::RGB } else { PhotometricInterpretation::BlackIsZero };
     directory.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;
     directory.write_tag(Tag::ImageLength, u32::try_from(height)?)?;
     directory.write_tag(Tag::BitsPerSample, vec![T::BITS; channels].as_slice())?;
     directory.write_tag(Tag::Compression, 1_u16)?;
-    directory.write_tag(Tag::PhotometricInterpretation, photometric.to_u16())?;
+    directory.write_tag(Tag::PhotometricInterpretation, photometric(channels))?;
     directory.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;
     directory.write_tag(Tag::SampleFormat, vec![SampleFormat::Uint.to_u16(); channels].as_slice())?;
     directory.write_tag(Tag::TileWidth, u32::try_from(TILE)?)?;
@@ -178,7 +155,8 @@ mod tests {
             let levels: Vec<u16> = (0..width * height * channels).map(|i| (i * 7919 % 60_013) as u16).collect();
             let mut out = Cursor::new(Vec::new());
             let mut encoder = TiffEncoder::new(&mut out).unwrap();
-            page(&mut encoder, &levels, width, channels, 0.25, Some("text")).unwrap();
+            let head = Page { width, channels, pixel_um: 0.25, text: Some("text") };
+            page(&mut encoder, &levels, &head).unwrap();
             let bytes = out.into_inner();
             let mut decoder = Decoder::new(Cursor::new(&bytes)).unwrap();
             assert!(matches!(decoder.read_image().unwrap(), DecodingResult::U16(read) if read == levels));

@@ -25,6 +25,8 @@ mod recipe;
 mod record;
 #[path = "../parsers/rle.rs"]
 mod rle;
+#[path = "../parsers/scene.rs"]
+mod scene;
 #[path = "../parsers/shard.rs"]
 mod shard;
 #[path = "../parsers/sound.rs"]
@@ -127,6 +129,11 @@ impl Numbers {
         }
         bytes
     }
+}
+
+#[test]
+fn scenes() {
+    replay("scene", scene::check);
 }
 
 #[test]

@@ -2,16 +2,18 @@
 
 #![cfg(feature = "parquet")]
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
 
 use crate::support::{HEIGHT, SEED, Scratch, WIDTH, contents, frame, recipe};
 use papsynth::Frame;
 use papsynth::model::Model;
 use papsynth_dataset::read::{GreyImage, Limits as ImageLimits};
 use papsynth_dataset::{Dataset, DatasetInfo, Format, Layout, convert, rle, verify};
-use papsynth_parquet::{Limits, Reader, Value};
 
 /// Writes frames, two a shard.
 fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
@@ -30,21 +32,27 @@ fn write(path: &Path, layout: &Layout, frames: &[Frame]) {
     dataset.finish().unwrap();
 }
 
-fn rows(path: &Path, columns: &[&str]) -> Vec<Vec<Value>> {
-    let reader = Reader::from_bytes(fs::read(path).unwrap(), &Limits::default()).unwrap();
-    reader.rows(columns, 0..u64::MAX).unwrap().collect::<Result<_, _>>().unwrap()
+/// Columns of all rows, as a reader that is not ours reads them.
+fn rows(path: &Path, columns: &[&str]) -> Vec<Vec<Field>> {
+    let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
+    let row = |row: parquet::record::Row| {
+        let column = |wanted: &&str| row.get_column_iter().find(|(name, _)| name == wanted).unwrap().1.clone();
+        columns.iter().map(column).collect()
+    };
+    reader.get_row_iter(None).unwrap().map(|found| row(found.unwrap())).collect()
 }
 
-fn text(value: &Value) -> &str {
+fn text(value: &Field) -> &str {
     match value {
-        Value::Text(text) => text,
+        Field::Str(text) => text,
         other => panic!("{other:?} is no text"),
     }
 }
 
-fn list(value: &Value) -> &[Value] {
+fn list(value: &Field) -> Vec<Field> {
     match value {
-        Value::List(values) | Value::Struct(values) => values,
+        Field::ListInternal(values) => values.elements().to_vec(),
+        Field::Group(fields) => fields.get_column_iter().map(|(_, field)| field.clone()).collect(),
         other => panic!("{other:?} is no list"),
     }
 }
@@ -61,14 +69,14 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
     assert_eq!(table.len(), lines.clone().count());
     for (row, line) in table.iter().zip(lines) {
         let printed = row.iter().map(|value| match value {
-            Value::Null => String::new(),
-            Value::Bool(flag) => flag.to_string(),
-            Value::U32(id) => id.to_string(),
-            Value::I64(whole) => whole.to_string(),
-            Value::F64(number) => number.to_string(),
-            Value::List(values) => {
-                let numbers = values.iter().map(|value| match value {
-                    Value::F64(number) => number.to_string(),
+            Field::Null => String::new(),
+            Field::Bool(flag) => flag.to_string(),
+            Field::UInt(id) => id.to_string(),
+            Field::Long(whole) => whole.to_string(),
+            Field::Double(number) => number.to_string(),
+            Field::ListInternal(values) => {
+                let numbers = values.elements().iter().map(|value| match value {
+                    Field::Double(number) => number.to_string(),
                     other => panic!("{other:?} in a list"),
                 });
                 numbers.collect::<Vec<_>>().join(";")
@@ -83,7 +91,7 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
     for (row, object) in masks.iter().zip(objects) {
         assert_eq!(rle::decode(text(&row[0]), WIDTH, HEIGHT).unwrap(), object.amodal);
         assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.front);
-        assert_eq!(row[2..], [Value::I64(WIDTH as i64), Value::I64(HEIGHT as i64)]);
+        assert_eq!(row[2..], [Field::Long(WIDTH as i64), Field::Long(HEIGHT as i64)]);
     }
     // Text alone, if that is wanted, and the other is another data set.
     let plain = Scratch::new("objects-plain");
@@ -113,18 +121,21 @@ fn rows_are_frames_in_files_by_split() {
     for (name, _) in contents(&scratch.join("huggingface/data")) {
         let columns = ["index", "image", "planes", "objects"];
         for row in rows(&scratch.join("huggingface/data").join(&name), &columns) {
-            let Value::I64(index) = row[0] else { panic!("{row:?}") };
+            let Field::Long(index) = row[0] else { panic!("{row:?}") };
             let index = usize::try_from(index).unwrap();
             assert_eq!(name, format!("{}-{:06}.parquet", split(index), index / 20));
-            let [Value::Bytes(png), path] = list(&row[1]) else { panic!("frame {index} has no image") };
+            let [Field::Bytes(png), path] = &list(&row[1])[..] else { panic!("frame {index} has no image") };
             assert_eq!(text(path), format!("{index:06}.png"));
-            assert_eq!(GreyImage::decode(png, &ImageLimits::default()).unwrap().grey, frames[index].planes[0].grey);
+            assert_eq!(
+                GreyImage::decode(png.data(), &ImageLimits::default()).unwrap().grey,
+                frames[index].planes[0].grey
+            );
             assert!(list(&row[2]).is_empty());
             let objects = &frames[index].finished.truth.objects;
             assert_eq!(list(&row[3]).len(), objects.len());
             for (found, object) in list(&row[3]).iter().zip(objects) {
                 let found = list(found);
-                assert_eq!(found[0], Value::U32(object.id));
+                assert_eq!(found[0], Field::UInt(object.id));
                 assert_eq!(rle::decode(text(&found[16]), WIDTH, HEIGHT).unwrap(), object.amodal);
             }
             seen.push(index);
@@ -152,4 +163,24 @@ fn stacks_keep_their_planes_and_are_converted_by_way_of_parquet() {
         assert!(contents(flat.path()) == contents(back.path()), "{planes} {bits}");
         assert!(verify(rows.path(), Some(0..3)).unwrap().findings.is_empty());
     }
+}
+
+#[test]
+fn images_are_read_back_only_from_files_that_are_as_recorded() {
+    let scratch = Scratch::new("as-recorded");
+    write(scratch.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &[frame(0, 1, 8, 1)]);
+    let (name, mut bytes) = contents(&scratch.join("huggingface/data")).remove(0);
+    let dataset = Dataset::open(scratch.path()).unwrap();
+    let place = dataset.places().unwrap()[0];
+    let summary = dataset.summary(place).unwrap();
+    let mut planes = 0;
+    dataset.planes(&summary, 0, &mut |_, _| planes += 1).unwrap();
+    assert_eq!(planes, 1);
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(scratch.join("huggingface/data").join(name), bytes).unwrap();
+    let dataset = Dataset::open(scratch.path()).unwrap();
+    let error = dataset.planes(&summary, 0, &mut |_, _| ()).unwrap_err().to_string();
+    assert!(error.contains("another content"), "{error}");
+    assert!(!verify(scratch.path(), None).unwrap().findings.is_empty());
 }

@@ -1,6 +1,6 @@
 //! Any bytes as the COCO document of a shard.
 
-use papsynth_dataset::read::truths;
+use papsynth_dataset::truths;
 
 /// Masks that are read lie in their image.
 pub(crate) fn check(bytes: &[u8]) {

@@ -5,8 +5,7 @@ use std::fs;
 use std::sync::LazyLock;
 
 use papsynth::model::Model;
-use papsynth_dataset::read::truths;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, ShardRecord};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, ShardRecord, truths};
 use sha2::{Digest, Sha256};
 
 #[path = "../support/mod.rs"]

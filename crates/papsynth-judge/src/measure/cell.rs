@@ -264,7 +264,7 @@ impl Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Known, Picture};
+    use crate::picture::Picture;
     use crate::region::Region;
 
     const PIXEL_UM: f64 = 0.33;
@@ -274,14 +274,7 @@ mod tests {
         let (width, height) = (260, 220);
         let at = |i: usize| crate::number::single(240.0 * libm::pow(10.0, -a((i % width) as f64, (i / width) as f64)));
         let grey = (0..width * height).map(at).collect();
-        Maps::new(&Picture {
-            name: String::new(),
-            group: String::new(),
-            grey,
-            width,
-            full_scale: 255.0,
-            nuclei: Known::Nothing,
-        })
+        Maps::new(&Picture { grey, width, ..Picture::default() })
     }
 
     fn disc(maps: &Maps, x: f64, y: f64, radius: f64) -> Region {

@@ -1,6 +1,6 @@
 //! How sharp edges are.
 
-use super::maps::Maps;
+use crate::filter::gradient;
 
 /// Edges are at least so steep, absorbance a pixel after a Gaussian of 1 pixel.
 const STEEP: f32 = 0.02;
@@ -16,15 +16,16 @@ pub(crate) struct Edge {
     pub(crate) sigma: f64,
 }
 
-/// Every place where the slope is steep, and steeper than on both sides of it.
-pub(crate) fn edges(maps: &Maps) -> Vec<Edge> {
-    let [across, down] = maps.gradient();
+/// Every place where the slope is steep, and steeper than on both sides of it: of an image after a Gaussian of 1 pixel, with the
+/// lengths of its gradient and of that after a Gaussian of 2 pixels.
+pub(crate) fn edges(smooth: &[f32], width: usize, slope: &[f32], wide_slope: &[f32]) -> Vec<Edge> {
+    let [across, down] = gradient(smooth, width);
     let mut edges = Vec::new();
-    for y in 1..maps.height - 1 {
-        for x in 1..maps.width - 1 {
-            let pixel = y * maps.width + x;
-            let slope = maps.slope[pixel];
-            if slope < STEEP {
+    for y in 1..smooth.len() / width - 1 {
+        for x in 1..width - 1 {
+            let pixel = y * width + x;
+            let steepness = slope[pixel];
+            if steepness < STEEP {
                 continue;
             }
             let (gx, gy) = (across[pixel], down[pixel]);
@@ -32,14 +33,14 @@ pub(crate) fn edges(maps: &Maps) -> Vec<Edge> {
             let beside = if gy.abs() < 0.414 * gx.abs() {
                 1
             } else if gx.abs() < 0.414 * gy.abs() {
-                maps.width
+                width
             } else if gx * gy > 0.0 {
-                maps.width + 1
+                width + 1
             } else {
-                maps.width - 1
+                width - 1
             };
-            if slope >= maps.slope[pixel - beside] && slope > maps.slope[pixel + beside] {
-                let sigma = sigma(f64::from(slope), f64::from(maps.wide_slope[pixel]));
+            if steepness >= slope[pixel - beside] && steepness > slope[pixel + beside] {
+                let sigma = sigma(f64::from(steepness), f64::from(wide_slope[pixel]));
                 edges.extend(sigma.map(|sigma| Edge { pixel, sigma }));
             }
         }
@@ -60,8 +61,8 @@ fn sigma(slope: f64, wide_slope: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::picture::{Known, Picture};
+    use crate::measure::maps::Maps;
+    use crate::picture::Picture;
 
     #[test]
     fn the_blur_of_an_edge_is_found_whatever_its_direction() {
@@ -74,15 +75,7 @@ mod tests {
                 crate::number::single(240.0 * libm::pow(10.0, -a))
             };
             let grey = (0..width * height).map(at).collect();
-            let picture = Picture {
-                name: String::new(),
-                group: String::new(),
-                grey,
-                width,
-                full_scale: 255.0,
-                nuclei: Known::Nothing,
-            };
-            let maps = Maps::new(&picture);
+            let maps = Maps::new(&Picture { grey, width, ..Picture::default() });
             let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
             assert!(sigmas.len() > 80, "{} places", sigmas.len());
             let found = crate::statistics::median(&mut sigmas);

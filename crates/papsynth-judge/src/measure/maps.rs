@@ -19,8 +19,7 @@ pub(crate) struct Maps {
     pub(crate) smoother: Vec<f32>,
     /// Length of the gradient of `smooth`.
     pub(crate) slope: Vec<f32>,
-    /// Of `smoother`.
-    pub(crate) wide_slope: Vec<f32>,
+    /// Where it is steepest.
     pub(crate) edges: Vec<Edge>,
     /// Absorbance between one scale and the next, each scale in half as many pixels a side as the one before.
     pub(crate) bands: Vec<(Vec<f32>, usize)>,
@@ -38,21 +37,19 @@ impl Maps {
         // Variances add: 1² + √3² = 2².
         let smoother = blur(&smooth, width, 3.0_f64.sqrt());
         let to_8_bits = 255.0 / picture.full_scale;
-        let mut maps = Self {
+        let (slope, wide_slope) = (slope(&smooth, width), slope(&smoother, width));
+        Self {
             width,
             height: picture.height(),
             background,
             grey: picture.grey.iter().map(|g| g * to_8_bits).collect(),
-            slope: slope(&smooth, width),
-            wide_slope: slope(&smoother, width),
-            edges: Vec::new(),
+            edges: edges(&smooth, width, &slope, &wide_slope),
+            slope,
             bands: bands(&absorbance, width),
             absorbance,
             smooth,
             smoother,
-        };
-        maps.edges = edges(&maps);
-        maps
+        }
     }
 
     /// The gradient of absorbance after a Gaussian of 1 pixel.

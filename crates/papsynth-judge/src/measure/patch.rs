@@ -304,18 +304,11 @@ fn classes() -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Known, Picture};
+    use crate::picture::Picture;
 
     fn maps(width: usize, height: usize, light: impl Fn(usize, usize) -> f64) -> Maps {
         let grey = (0..width * height).map(|i| crate::number::single(light(i % width, i / width))).collect();
-        Maps::new(&Picture {
-            name: String::new(),
-            group: String::new(),
-            grey,
-            width,
-            full_scale: 255.0,
-            nuclei: Known::Nothing,
-        })
+        Maps::new(&Picture { grey, width, ..Picture::default() })
     }
 
     #[test]

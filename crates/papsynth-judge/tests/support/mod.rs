@@ -76,14 +76,7 @@ impl Toy {
             }
         }
         let name = format!("toy {seed}");
-        Picture {
-            name,
-            group: String::new(),
-            grey,
-            width: self.width,
-            full_scale: 255.0,
-            nuclei: Known::Points(points),
-        }
+        Picture { name, grey, width: self.width, nuclei: Known::Points(points), ..Picture::default() }
     }
 
     /// Fields of seeds that follow each other.

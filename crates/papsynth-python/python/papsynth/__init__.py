@@ -12,6 +12,7 @@ from __future__ import annotations
 
 
 from . import cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture
+from ._calibrate import calibrate_camera, calibrate_microscope
 from ._dataset import Dataset, IterableDataset
 from ._errors import Fault, RecipeError
 from ._learn import judge, learn
@@ -29,6 +30,8 @@ __all__ = [
     "Frame",
     "IterableDataset",
     "RecipeError",
+    "calibrate_camera",
+    "calibrate_microscope",
     "cloth",
     "cytoskeleton",
     "detection_target",

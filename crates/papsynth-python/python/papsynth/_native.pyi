@@ -86,6 +86,21 @@ def merge(out: str | PathLike[str], frames: int) -> str: ...
 def shards(frames: int, formats: list[str] | None = None, frames_per_shard: int | None = None) -> int: ...
 def missing(out: str | PathLike[str], frames: int) -> list[int]: ...
 def verify(out: str | PathLike[str], frames: int | None = None) -> dict[str, Any]: ...
+def calibrate_microscope(
+    stack: list[Any] | None = None,
+    edge: Any = None,
+    *,
+    step_um: float | None = None,
+    windows: list[tuple[int, int, int, int]] | None = None,
+    line: tuple[float, float, float, float] | None = None,
+    pixel_um: float | None = None,
+    na: float | None = None,
+    wavelength_um: float | None = None,
+    mount_index: float | None = None,
+    immersion_index: float | None = None,
+    threads: int = 0,
+) -> str: ...
+def calibrate_camera(flats: list[list[Any]], darks: list[Any], bits: int) -> str: ...
 def judge(
     real: list[Any],
     synthetic: list[Any],

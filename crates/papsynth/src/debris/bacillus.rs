@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
 use super::kind::{Kinds, Thing};
 use super::site::Site;
 use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
@@ -61,28 +61,25 @@ const LONGEST_CHAIN: usize = 4;
 
 impl Kinds<Bacillus> for Bacilli {
     fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
-        for index in 0..ground.count(named!(self.clusters)) {
-            let mut rng = ground.stream(index, "cluster");
-            let clump = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
-            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = clump.place(&mut rng);
-                let mut own = ground.stream(number, "chain");
-                let chained = random::chance(self.chained.draw(&mut own), &mut own);
-                let bacillus = Bacillus {
-                    length_um: self.length_um.draw(&mut rng),
-                    width_um: self.width_um.draw(&mut rng),
-                    bend_deg: self.bend_deg.draw(&mut rng),
-                    rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
-                };
-                let depth_um = clump.depth_um + 0.3 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, bacillus);
+        let clusters = Clusters {
+            purpose: "cluster",
+            on_cells: &self.on_cells,
+            radius_um: &self.cluster_um,
+            members: &self.per_cluster,
+            spread_um: 0.3,
+        };
+        ground.strew_in_clusters(named!(self.clusters), &clusters, |ground, number, rng| {
+            let mut own = ground.stream(number, "chain");
+            let chained = random::chance(self.chained.draw(&mut own), &mut own);
+            Bacillus {
+                length_um: self.length_um.draw(rng),
+                width_um: self.width_um.draw(rng),
+                bend_deg: self.bend_deg.draw(rng),
+                rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
+                absorbance: self.absorbance.draw(rng),
+                phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
             }
-        }
+        });
     }
 }
 
@@ -96,10 +93,6 @@ const KINK: f64 = 0.35;
 const WAIST: f64 = 0.7;
 
 impl Thing for Bacillus {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.rods.max(1) as f64 * (1.2 * self.length_um + self.width_um)
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
@@ -55,20 +55,15 @@ pub struct BareNucleus {
 impl Kinds<BareNucleus> for BareNuclei {
     fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
         let dyes = ground.cyanophilic();
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let nucleus = BareNucleus {
-                radius_um: self.radius_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng) * ground.nuclear_stain(),
-                texture: self.texture.draw(&mut rng),
-                shreds: self.shreds.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, nucleus);
-        }
+        let stain = ground.nuclear_stain();
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| BareNucleus {
+            radius_um: self.radius_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            absorbance: self.absorbance.draw(rng) * stain,
+            texture: self.texture.draw(rng),
+            shreds: self.shreds.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -83,10 +78,6 @@ const CLUMP_UM: f64 = 0.35;
 const SHREDS: usize = 7;
 
 impl Thing for BareNucleus {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::site::Site;
 use crate::phantom::piece::Phantom;
@@ -45,26 +45,16 @@ pub struct Bubble {
 
 impl Kinds<Bubble> for Bubbles {
     fn draw(&self, ground: &mut Ground<'_, Bubble>) {
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let bubble = Bubble {
-                radius_um: self.radius_um.draw(&mut rng),
-                rim: self.rim.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, bubble);
-        }
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Bubble {
+            radius_um: self.radius_um.draw(rng),
+            rim: self.rim.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
 impl Thing for Bubble {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         1.1 * self.radius_um + 1.0
     }

@@ -135,10 +135,6 @@ const WALL_UM: f64 = 0.35;
 const INSIDE: f32 = 0.55;
 
 impl Thing for Candida {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         match self.growth {
             // Half of its length, and a branch of two segments from an end of it that bends back.

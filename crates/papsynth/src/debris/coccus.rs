@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
@@ -59,21 +59,15 @@ pub struct Colony {
 
 impl Kinds<Colony> for Cocci {
     fn draw(&self, ground: &mut Ground<'_, Colony>) {
-        for number in 0..ground.count(named!(self.colonies)) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let colony = Colony {
-                cocci: self.per_colony.draw_count(&mut rng).max(1),
-                cloud_um: self.cloud_um.draw(&mut rng),
-                chain: random::chance(self.chains.draw(&mut rng), &mut rng),
-                diameter_um: self.diameter_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, colony);
-        }
+        ground.strew_on_cells(named!(self.colonies), &self.on_cells, |rng| Colony {
+            cocci: self.per_colony.draw_count(rng).max(1),
+            cloud_um: self.cloud_um.draw(rng),
+            chain: random::chance(self.chains.draw(rng), rng),
+            diameter_um: self.diameter_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -91,10 +85,6 @@ const KINK: f64 = 0.45;
 const FARTHEST: f64 = 4.0;
 
 impl Thing for Colony {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         if self.chain {
             0.8 * self.cocci.min(LONGEST_CHAIN) as f64 * self.diameter_um * self.elongation + self.diameter_um

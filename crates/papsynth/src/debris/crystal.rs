@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::site::Site;
 use crate::phantom::piece::Phantom;
@@ -47,26 +47,16 @@ pub struct Crystal {
 impl Kinds<Crystal> for Crystals {
     fn draw(&self, ground: &mut Ground<'_, Crystal>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let crystal = Crystal {
-                diameter_um: self.diameter_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, crystal);
-        }
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Crystal {
+            diameter_um: self.diameter_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
 impl Thing for Crystal {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.7 * self.diameter_um + 1.0
     }

@@ -96,10 +96,6 @@ impl Kinds<Fleck> for Dirt {
 }
 
 impl Thing for Fleck {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.length_um + self.width_um
     }

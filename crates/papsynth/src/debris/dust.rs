@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::crystal::shard;
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::site::Site;
 use crate::phantom::piece::Phantom;
@@ -37,22 +37,14 @@ pub struct Grain {
 
 impl Kinds<Grain> for Dust {
     fn draw(&self, ground: &mut Ground<'_, Grain>) {
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let grain =
-                Grain { diameter_um: self.diameter_um.draw(&mut rng), absorbance: self.absorbance.draw(&mut rng) };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, grain);
-        }
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Grain {
+            diameter_um: self.diameter_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+        });
     }
 }
 
 impl Thing for Grain {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.65 * self.diameter_um + 1.0
     }

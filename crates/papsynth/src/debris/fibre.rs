@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
@@ -50,19 +50,13 @@ pub struct Fibre {
 
 impl Kinds<Fibre> for Fibres {
     fn draw(&self, ground: &mut Ground<'_, Fibre>) {
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let fibre = Fibre {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                waves: self.waves.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, fibre);
-        }
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Fibre {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            waves: self.waves.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -79,10 +73,6 @@ const EDGE: f32 = 2.5;
 const EDGE_WIDTH: f64 = 0.12;
 
 impl Thing for Fibre {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.7 * self.length_um + self.width_um
     }

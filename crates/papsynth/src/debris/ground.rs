@@ -62,6 +62,18 @@ pub(super) struct Cluster {
     radius_um: f64,
 }
 
+/// Clusters of objects: the purpose of their streams, and what is drawn of each.
+pub(super) struct Clusters<'a> {
+    pub(super) purpose: &'static str,
+    /// Share that lies on a cell.
+    pub(super) on_cells: &'a Number,
+    pub(super) radius_um: &'a Number,
+    /// Objects of a cluster.
+    pub(super) members: &'a Number,
+    /// Standard deviation of their depths, µm.
+    pub(super) spread_um: f64,
+}
+
 /// Where an object lies.
 pub(crate) struct Lie {
     pub(crate) centre_um: [f64; 2],
@@ -83,10 +95,11 @@ impl<'a, T> Ground<'a, T> {
     /// A number of the section that is drawn once a field, as a count.
     pub(super) fn count(&self, (name, number): (&str, &Number)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
-        let Some(sieve) = &self.field.sieve else { return self.field.numbers.count((&path, number)) as u64 };
+        let numbers = self.field.numbers;
+        let Some(sieve) = &self.field.sieve else { return numbers.count((&path, number)) as u64 };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        let wanted = self.field.numbers.draw((&path, number)).max(0.0) * sieve.share * more;
-        let further = random::chance(wanted - wanted.floor(), &mut self.field.numbers.key.stream("field", 1, &path));
+        let wanted = numbers.draw((&path, number)).max(0.0) * sieve.share * more;
+        let further = random::chance(wanted - wanted.floor(), &mut numbers.key.stream("field", 1, &path));
         wanted as u64 + u64::from(further)
     }
 
@@ -140,6 +153,60 @@ impl<'a, T> Ground<'a, T> {
         }
     }
 
+    /// Strews objects that lie anywhere, each at a height of its own. `draw` draws one from its stream.
+    pub(super) fn strew_on_glass(
+        &mut self,
+        count: (&str, &Number),
+        height_um: &Number,
+        draw: impl Fn(&mut Stream) -> T,
+    ) {
+        for number in 0..self.count(count) {
+            let mut rng = self.stream(number, "body");
+            let centre_um = self.anywhere(&mut rng);
+            let thing = draw(&mut rng);
+            let lie = Lie::any_way(centre_um, height_um.draw(&mut rng), &mut rng);
+            self.add(number, 0, lie, thing);
+        }
+    }
+
+    /// Strews objects of which a share lies on cells. `draw` draws one from its stream.
+    pub(super) fn strew_on_cells(
+        &mut self,
+        count: (&str, &Number),
+        on_cells: &Number,
+        draw: impl Fn(&mut Stream) -> T,
+    ) {
+        for number in 0..self.count(count) {
+            let mut rng = self.stream(number, "body");
+            let (centre_um, depth_um) = self.spot(on_cells, &mut rng);
+            let thing = draw(&mut rng);
+            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            self.add(number, 0, lie, thing);
+        }
+    }
+
+    /// Strews clusters of objects. `draw` draws one, by its number, from its stream.
+    pub(super) fn strew_in_clusters(
+        &mut self,
+        count: (&str, &Number),
+        clusters: &Clusters<'_>,
+        draw: impl Fn(&Self, u64, &mut Stream) -> T,
+    ) {
+        for index in 0..self.count(count) {
+            let mut rng = self.stream(index, clusters.purpose);
+            let cluster = self.cluster(clusters.on_cells, clusters.radius_um, &mut rng);
+            for member in 0..clusters.members.draw_count(&mut rng).max(1) as u64 {
+                let number = member_number(index, member);
+                let mut rng = self.stream(number, "body");
+                let centre_um = cluster.place(&mut rng);
+                let thing = draw(self, number, &mut rng);
+                let depth_um = cluster.depth_um + clusters.spread_um * random::normal(&mut rng);
+                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+                self.add(number, cluster_id(index), lie, thing);
+            }
+        }
+    }
+
     /// Lets an object lie there; what is alone is of cluster 0.
     pub(super) fn add(&mut self, number: u64, cluster: u32, lie: Lie, thing: T) {
         if let Some(sieve) = self.field.sieve.as_ref().filter(|_| !self.lies_on_glass) {
@@ -180,7 +247,7 @@ pub(super) fn member_number(cluster: u64, member: u64) -> u64 {
 }
 
 /// Whether two places are nearer to each other than a distance.
-pub(super) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
+pub(crate) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
     dx * dx + dy * dy < distance * distance
 }

@@ -12,9 +12,6 @@ pub(super) trait Kinds<T> {
 
 /// The numbers drawn of one object.
 pub(super) trait Thing {
-    /// The strength of its stain.
-    fn absorbance(&self) -> f64;
-
     /// How far it may reach from its middle, µm, where pixels have that size.
     fn reach_um(&self, pixel_um: f64) -> f64;
 

@@ -183,10 +183,6 @@ impl Cluster {
 }
 
 impl Thing for Leukocyte {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.3 * self.cell_um).max((2.0 + 2.0 * self.alpha) * self.radius_um)
     }

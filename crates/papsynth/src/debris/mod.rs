@@ -143,7 +143,7 @@ macro_rules! kinds {
             pub(crate) fn absorbance(&self) -> f64 {
                 match self {
                     Self::Cell(cell) => cell.cytoplasm_absorbance,
-                    $(Self::$Kind(thing) => thing.absorbance(),)*
+                    $(Self::$Kind(thing) => thing.absorbance,)*
                 }
             }
         }

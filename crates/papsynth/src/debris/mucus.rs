@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
@@ -61,21 +61,15 @@ pub struct Strand {
 impl Kinds<Strand> for Mucus {
     fn draw(&self, ground: &mut Ground<'_, Strand>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count(named!(self.strands)) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let strand = Strand {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                fibres: self.fibres.draw_count(&mut rng).max(1),
-                fibre_um: self.fibre_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, strand);
-        }
+        ground.strew_on_cells(named!(self.strands), &self.on_cells, |rng| Strand {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            fibres: self.fibres.draw_count(rng).max(1),
+            fibre_um: self.fibre_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -97,10 +91,6 @@ const TAPER: f64 = 0.3;
 const NECK: f64 = 0.35;
 
 impl Thing for Strand {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.8 * self.length_um + self.width_um
     }

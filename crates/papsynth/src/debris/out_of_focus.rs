@@ -70,10 +70,6 @@ const NOISE_CELL: f64 = 0.7;
 const NOISE_STRENGTH: f32 = 0.6;
 
 impl Thing for Blob {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.2 + 1.5 * self.alpha) * self.radius_um
     }

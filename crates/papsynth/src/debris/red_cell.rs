@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
 use super::kind::{Kinds, Thing};
 use super::site::Site;
 use crate::phantom::piece::Phantom;
@@ -61,26 +61,21 @@ pub struct RedCell {
 impl Kinds<RedCell> for RedCells {
     fn draw(&self, ground: &mut Ground<'_, RedCell>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count(named!(self.clusters)) {
-            let mut rng = ground.stream(index, "cluster");
-            let cluster = ground.cluster(&self.on_cells, &self.cluster_um, &mut rng);
-            for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = cluster.place(&mut rng);
-                let red_cell = RedCell {
-                    diameter_um: self.diameter_um.draw(&mut rng),
-                    pallor: self.pallor.draw(&mut rng),
-                    ghost: random::chance(self.ghosts.draw(&mut rng), &mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut rng),
-                    dyes,
-                };
-                let depth_um = cluster.depth_um + 0.5 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, red_cell);
-            }
-        }
+        let clusters = Clusters {
+            purpose: "cluster",
+            on_cells: &self.on_cells,
+            radius_um: &self.cluster_um,
+            members: &self.per_cluster,
+            spread_um: 0.5,
+        };
+        ground.strew_in_clusters(named!(self.clusters), &clusters, |_, _, rng| RedCell {
+            diameter_um: self.diameter_um.draw(rng),
+            pallor: self.pallor.draw(rng),
+            ghost: random::chance(self.ghosts.draw(rng), rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -92,10 +87,6 @@ const SEAM: f64 = 0.18;
 const THICKEST: f64 = 0.68;
 
 impl Thing for RedCell {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.diameter_um
     }

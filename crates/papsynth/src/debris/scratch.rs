@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::Stroke;
 use super::site::Site;
@@ -47,18 +47,12 @@ pub struct Scratch {
 
 impl Kinds<Scratch> for Scratches {
     fn draw(&self, ground: &mut Ground<'_, Scratch>) {
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let scratch = Scratch {
-                length_um: self.length_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-            };
-            let lie = Lie::any_way(centre_um, self.height_um.draw(&mut rng), &mut rng);
-            ground.add(number, 0, lie, scratch);
-        }
+        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Scratch {
+            length_um: self.length_um.draw(rng),
+            width_um: self.width_um.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+        });
     }
 }
 
@@ -69,10 +63,6 @@ const PARTS: usize = 24;
 const SKIPPED: f64 = 0.15;
 
 impl Thing for Scratch {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.length_um + self.width_um
     }

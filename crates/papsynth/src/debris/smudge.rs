@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie};
+use super::ground::Ground;
 use super::kind::{Kinds, Thing};
 use super::paint::Painting;
 use super::site::Site;
@@ -64,22 +64,16 @@ pub struct Smudge {
 impl Kinds<Smudge> for Smudges {
     fn draw(&self, ground: &mut Ground<'_, Smudge>) {
         let dyes = ground.dyes(&self.dyes);
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let (centre_um, depth_um) = ground.spot(&self.on_cells, &mut rng);
-            let smudge = Smudge {
-                diameter_um: self.diameter_um.draw(&mut rng),
-                elongation: self.elongation.draw(&mut rng),
-                grain_um: self.grain_um.draw(&mut rng),
-                granularity: self.granularity.draw(&mut rng),
-                ragged: self.ragged.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut rng),
-                dyes,
-            };
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, smudge);
-        }
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Smudge {
+            diameter_um: self.diameter_um.draw(rng),
+            elongation: self.elongation.draw(rng),
+            grain_um: self.grain_um.draw(rng),
+            granularity: self.granularity.draw(rng),
+            ragged: self.ragged.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            phase_rad: self.phase_rad.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -93,10 +87,6 @@ const WAVES: [(f64, f64); 2] = [(0.42, 0.42), (0.16, 0.22)];
 const FADE: f64 = 0.35;
 
 impl Thing for Smudge {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (REACH - 1.0) * self.ragged.min(1.5))
     }

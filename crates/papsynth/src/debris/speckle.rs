@@ -71,10 +71,6 @@ impl Kinds<Speckle> for Speckles {
 }
 
 impl Thing for Speckle {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, pixel_um: f64) -> f64 {
         (self.dilations as f64 + 3.0) * pixel_um
     }

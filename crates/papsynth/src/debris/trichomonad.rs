@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ground::{Ground, Lie, cluster_id, member_number};
+use super::ground::{Clusters, Ground};
 use super::kind::{Kinds, Thing};
 use super::paint::{Painting, Stroke};
 use super::site::Site;
@@ -58,25 +58,20 @@ pub struct Trichomonad {
 impl Kinds<Trichomonad> for Trichomonads {
     fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count(named!(self.groups)) {
-            let mut rng = ground.stream(index, "group");
-            let group = ground.cluster(&self.on_cells, &self.group_um, &mut rng);
-            for member in 0..self.per_group.draw_count(&mut rng).max(1) as u64 {
-                let number = member_number(index, member);
-                let mut rng = ground.stream(number, "body");
-                let centre_um = group.place(&mut rng);
-                let trichomonad = Trichomonad {
-                    length_um: self.length_um.draw(&mut rng),
-                    width: self.width.draw(&mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    nucleus: self.nucleus.draw(&mut rng),
-                    dyes,
-                };
-                let depth_um = group.depth_um + 0.5 * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                ground.add(number, cluster_id(index), lie, trichomonad);
-            }
-        }
+        let clusters = Clusters {
+            purpose: "group",
+            on_cells: &self.on_cells,
+            radius_um: &self.group_um,
+            members: &self.per_group,
+            spread_um: 0.5,
+        };
+        ground.strew_in_clusters(named!(self.groups), &clusters, |_, _, rng| Trichomonad {
+            length_um: self.length_um.draw(rng),
+            width: self.width.draw(rng),
+            absorbance: self.absorbance.draw(rng),
+            nucleus: self.nucleus.draw(rng),
+            dyes,
+        });
     }
 }
 
@@ -96,10 +91,6 @@ const FLAGELLUM_UM: f64 = 0.25;
 const FLAGELLUM: f64 = 0.3;
 
 impl Thing for Trichomonad {
-    fn absorbance(&self) -> f64 {
-        self.absorbance
-    }
-
     fn reach_um(&self, _pixel_um: f64) -> f64 {
         1.1 * self.length_um
     }

@@ -54,6 +54,14 @@ impl Recipe {
         found
     }
 
+    /// The recipe of a TOML text. Whether its numbers are within their ranges is not checked.
+    ///
+    /// # Errors
+    /// If the text is not TOML, or a field is unknown or of another type.
+    pub fn from_toml(text: &str) -> Result<Self, toml::de::Error> {
+        toml::from_str(text)
+    }
+
     /// Takes those sections of another recipe whose names are chosen.
     pub fn replace(&mut self, other: &Self, chosen: impl Fn(&str) -> bool) {
         macro_rules! take {

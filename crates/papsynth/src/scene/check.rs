@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::field::{Object, Scene};
+use crate::debris::Body;
 use crate::error::{Cause, Error};
 use crate::recipe::camera::Camera;
 use crate::recipe::imaging::{Colour, Gaussians, Microscope, Monochrome};
@@ -18,13 +19,16 @@ const MOST_PIXELS: usize = 1 << 30;
 /// How far an object may reach from its middle, in points of the grid on which it is rendered.
 const FARTHEST_POINTS: f64 = 8192.0;
 
+/// How many times that its middle may lie from the corner of the image.
+const MOST_REACHES: f64 = 512.0;
+
 /// The range of each number, by the name of its field or by the end of its path. Of lists it is that of each number.
 ///
 /// The ranges are wider than those of recipes: they keep memory, time and arithmetic within bounds. Those of light, optics
 /// and camera are the recipe's, unless they stand here.
 #[rustfmt::skip]
 const RANGES: &[(&str, f64, f64)] = &[
-    ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.01, 10.0),
+    ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.04, 5.0),
     ("planes_um", -1e5, 1e5), ("first_um", -1e5, 1e5), ("step_um", 0.0, 1e4), ("planes", 1.0, 1e5),
     ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1),
     ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("x2", 0.0, 1.0), ("y2", 0.0, 1.0), ("top", -10.0, 10.0),
@@ -34,10 +38,10 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("direction_deg", -1e6, 1e6), ("bend_deg", -1e6, 1e6), ("dyes", 0.0, 1e6), ("dyes.nucleus", 0.0, 1e6),
     ("bacillus", 0.0, 1e6), ("speckle", 0.0, 1e6), ("absorbance", 0.0, 1e4), ("cytoplasm_absorbance", 0.0, 1e4),
     ("texture", 0.0, 1e4), ("shreds", 0.0, 1e4), ("halo", 0.0, 1e4), ("nucleus", 0.0, 1e4), ("phase_rad", -1e3, 1e3),
-    ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
-    ("segment_um", 0.05, 500.0), ("yeast_um", 0.05, 500.0), ("cell_um", 0.1, 500.0), ("cloud_um", 0.0, 2e3),
-    ("fibre_um", 0.01, 100.0), ("grain_um", 0.05, 100.0), ("beyond_um", 0.0, 200.0), ("wrinkle_um", 0.01, 100.0),
-    ("clouds_um", 0.05, 1e3), ("fray_um", 0.0, 50.0), ("rim_um", 0.0, 200.0), ("edge_um", 0.0, 50.0),
+    ("fold.radius_um", 0.01, 5.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
+    ("segment_um", 0.05, 50.0), ("yeast_um", 0.05, 20.0), ("cell_um", 0.1, 100.0), ("cloud_um", 0.0, 500.0),
+    ("fibre_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("beyond_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
+    ("clouds_um", 0.05, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
     ("rods", 1.0, 100.0), ("segments", 1.0, 100.0), ("cocci", 1.0, 1e5), ("lobes", 1.0, 16.0), ("fibres", 1.0, 1e3),
     ("dilations", 0.0, 200.0), ("notches", 0.0, 100.0), ("tongues", 0.0, 100.0), ("wrinkles", 0.0, 1e3),
     ("nucleoli", 0.0, 100.0), ("body.rim", 1e-3, 10.0), ("rim", 0.0, 100.0), ("body.width", 0.05, 10.0),
@@ -107,11 +111,18 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
     if !ids.insert(object.id) {
         return Err(Cause::SameId);
     }
-    let reach_um = object.body.reach_um(pixel_um);
+    let reach_um = object.body.reach_um(pixel_um).max(match &object.body {
+        Body::Cell(cell) => 2.0 * cell.nucleus.radius_um.max(cell.halo.map_or(0.0, |halo| halo.radius_um)),
+        _ => 0.0,
+    });
     if reach_um > farthest_um {
         return Err(Cause::Reach(reach_um, farthest_um));
     }
-    Ok(object)
+    let most_um = MOST_REACHES * farthest_um;
+    match object.centre_um.into_iter().find(|at| at.abs() > most_um) {
+        Some(value) => Err(Cause::OutOfRange { field: "centre_um".to_owned(), value, low: -most_um, high: most_um }),
+        None => Ok(object),
+    }
 }
 
 fn at_most(field: &str, found: usize, most: usize) -> Result<(), Cause> {

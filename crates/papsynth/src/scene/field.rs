@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::imaging::{Fusion, Restoration, SceneBackground, SceneCamera, SceneDyes, SceneLight, SceneOptics};
+use super::imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneLight, SceneOptics};
 use super::view::View;
 use crate::debris::{Body, Coat};
 use crate::key::{Key, Stream};
+use crate::recipe::camera::SceneCamera;
 
 /// One field of view: how it is imaged and what lies in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

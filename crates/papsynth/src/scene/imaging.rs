@@ -3,9 +3,7 @@
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
 
-pub use crate::recipe::camera::SceneCamera;
-pub use crate::recipe::imaging::SceneMicroscope;
-use crate::recipe::imaging::{Mixing, Rendition};
+use crate::recipe::imaging::{Mixing, Rendition, SceneMicroscope};
 use crate::recipe::specimen::Restore;
 
 /// Planes that are fused to one picture of extended focus.

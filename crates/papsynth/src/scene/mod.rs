@@ -24,13 +24,12 @@ pub use crate::debris::{
     Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Kind,
     Leukocyte, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
 };
+pub use crate::recipe::camera::SceneCamera;
+pub use crate::recipe::imaging::SceneMicroscope;
 pub use cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Tint};
 pub use draw::draw;
 pub use field::{Object, Plot, Scene, SlideFrame};
-pub use imaging::{
-    Fusion, Restoration, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneMicroscope,
-    SceneOptics,
-};
+pub use imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneIllumination, SceneLight, SceneOptics};
 pub(crate) use layout::check_layout;
 pub(crate) use plots::{BEYOND, PLOT_PX, Population};
 pub use view::View;

@@ -20,7 +20,7 @@ use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
 use super::strew::strew;
 use super::view::View;
-use crate::debris::ground::Sieve;
+use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -346,11 +346,6 @@ fn mean_of(number: &Number) -> f64 {
     const DRAWS: u64 = 256;
     let mut rng = Key { seed: 0, index: 0 }.stream("slide", 0, "mean");
     ((0..DRAWS).map(|_| number.draw_count(&mut rng).max(1) as f64).sum::<f64>()) / DRAWS as f64
-}
-
-fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
-    let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
-    dx * dx + dy * dy < distance * distance
 }
 
 impl Relief {

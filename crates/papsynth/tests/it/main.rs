@@ -4,4 +4,5 @@ mod camera;
 mod golden;
 mod light;
 mod same_bytes;
+mod scenes;
 mod slide;

@@ -1,7 +1,8 @@
 //! Fourier transforms of many sequences side by side, one in each lane of a vector.
 //!
 //! The forward transform is Σ xⱼ exp −2πi jk/n, without a factor; the inverse is the forward one of the reversed sequence.
-//! Any length is transformed; prime factors above 5 take time in proportion to themselves.
+//! Any length is transformed; prime factors above 5 take time in proportion to themselves. [`LaneFft::process`] transforms many sequences,
+//! [`LaneFft::forward`] and [`LaneFft::inverse`] a single one, [`ComplexPlane`] an image.
 //!
 //! ```
 //! use portable_numerics::fourier::{LaneFft, Lanes, ZERO};

@@ -32,14 +32,15 @@ impl<T: Real> LaneFft<T> {
     /// Plans a transform of `len` numbers. Prime factors above 5 are slow.
     #[must_use]
     pub fn new(len: usize) -> Self {
-        let (mut passes, mut rest, mut stride) = (Vec::new(), len, 1);
+        let (mut passes, mut rest, mut stride, mut roots_of) = (Vec::new(), len, 1, Roots::new(len));
         while rest > 1 {
             let radix = [4, 2, 3, 5].into_iter().find(|&radix| rest.is_multiple_of(radix));
             let radix = radix.unwrap_or_else(|| (7..).find(|&prime| rest.is_multiple_of(prime)).unwrap_or(rest));
             let butterflies = rest / radix;
             let places = (0..butterflies).flat_map(|p| (1..radix).map(move |k| p * k));
-            let twiddles = places.map(|place| root(place, rest)).collect();
-            let roots = if radix > 5 { (0..radix).map(|k| root(k, radix)).collect() } else { Vec::new() };
+            let twiddles = places.map(|place| roots_of.root(place * stride)).collect();
+            let own_roots = if radix > 5 { radix } else { 0 };
+            let roots = (0..own_roots).map(|k| roots_of.root(k * (len / radix))).collect();
             passes.push(Pass { radix, butterflies, stride, twiddles, roots });
             rest = butterflies;
             stride *= radix;
@@ -57,6 +58,33 @@ impl<T: Real> LaneFft<T> {
         if run(&self.passes, values, spare) {
             core::mem::swap(values, spare);
         }
+    }
+
+    /// Returns the transform of a single sequence of `[re, im]`.
+    ///
+    /// # Panics
+    ///
+    /// If `values` has another length than the plan.
+    #[must_use]
+    pub fn forward(&self, values: &[[T; 2]]) -> Vec<[T; 2]> {
+        let mut lanes: Vec<Lanes<T, 1>> = values.iter().map(|value| value.map(|part| [part])).collect();
+        let mut spare = lanes.clone();
+        self.process(&mut lanes, &mut spare);
+        lanes.into_iter().map(|value| value.map(|[part]| part)).collect()
+    }
+
+    /// Returns the sequence of which `values` is the transform, times its length.
+    ///
+    /// # Panics
+    ///
+    /// As [`Self::forward`].
+    #[must_use]
+    pub fn inverse(&self, values: &[[T; 2]]) -> Vec<[T; 2]> {
+        let mut reversed = self.forward(values);
+        if let Some(rest) = reversed.get_mut(1..) {
+            rest.reverse();
+        }
+        reversed
     }
 }
 
@@ -76,19 +104,31 @@ impl<T: Real> Plans<T> {
     }
 }
 
-/// exp −2πi k/n, from the sine and cosine of an eighth of a turn at most.
-fn root<T: Real>(k: usize, n: usize) -> [T; 2] {
-    // Eighths of nths: whole, even where n is odd.
-    let (n, k) = (n as u64, 8 * (k % n) as u64);
-    let is_below = k > 4 * n;
-    let k = if is_below { 8 * n - k } else { k };
-    let is_left = k > 2 * n;
-    let k = if is_left { 4 * n - k } else { k };
-    let is_steep = k > n;
-    let k = if is_steep { 2 * n - k } else { k };
-    let (sin, cos) = libm::sincos(TAU * (k as f64 / (8 * n) as f64));
-    let (cos, sin) = if is_steep { (sin, cos) } else { (cos, sin) };
-    [if is_left { -cos } else { cos }, if is_below { sin } else { -sin }].map(T::nearest)
+/// The numbers exp −2πi k/n of one n, each from the sine and cosine of an eighth of a turn at most, which are computed once.
+struct Roots {
+    n: usize,
+    /// Sine and cosine of 2πi/8n.
+    eighth: Vec<Option<(f64, f64)>>,
+}
+
+impl Roots {
+    fn new(n: usize) -> Self {
+        Self { n, eighth: vec![None; n + 1] }
+    }
+
+    fn root<T: Real>(&mut self, k: usize) -> [T; 2] {
+        // Eighths of nths: whole, even where n is odd.
+        let (n, k) = (self.n, 8 * (k % self.n));
+        let is_below = k > 4 * n;
+        let k = if is_below { 8 * n - k } else { k };
+        let is_left = k > 2 * n;
+        let k = if is_left { 4 * n - k } else { k };
+        let is_steep = k > n;
+        let k = if is_steep { 2 * n - k } else { k };
+        let (sin, cos) = *self.eighth[k].get_or_insert_with(|| libm::sincos(TAU * (k as f64 / (8 * n) as f64)));
+        let (cos, sin) = if is_steep { (sin, cos) } else { (cos, sin) };
+        [if is_left { -cos } else { cos }, if is_below { sin } else { -sin }].map(T::nearest)
+    }
 }
 
 /// Says whether the spectrum is in `spare`.
@@ -324,11 +364,12 @@ mod tests {
     #[test]
     fn roots_are_cosines_and_sines() {
         for n in 1..300 {
+            let mut roots = Roots::new(n);
             for k in 0..2 * n {
-                let [re, im] = root::<f64>(k, n);
+                let [re, im] = roots.root::<f64>(k);
                 let (sin, cos) = libm::sincos(TAU * (k % n) as f64 / n as f64);
                 assert!((re - cos).abs() + (im + sin).abs() < 2e-15, "{k}/{n}");
-                assert_eq!(root::<f64>(n - k % n, n), [re, -im], "{k}/{n} mirrored");
+                assert_eq!(roots.root::<f64>(n - k % n), [re, -im], "{k}/{n} mirrored");
             }
         }
     }
@@ -361,6 +402,22 @@ mod tests {
         for len in lengths {
             let (single, double) = (error::<f32, 16>(len), error::<f64, 8>(len));
             assert!(single < 1e-6 && double < 2e-15, "{len}: {single}, {double}");
+        }
+    }
+
+    #[test]
+    fn single_sequences_are_those_of_lanes_and_come_back() {
+        for len in [1, 2, 7, 30, 64, 101, 640] {
+            let values: Vec<[f64; 2]> = (0..len).map(|i| [(i * i % 7) as f64, (i * i % 11) as f64]).collect();
+            let fft = LaneFft::new(len);
+            let spectrum = fft.forward(&values);
+            let mut lanes: Vec<Lanes<f64, 8>> = values.iter().map(|v| v.map(|part| [part; 8])).collect();
+            fft.process(&mut lanes, &mut vec![[[0.0; 8]; 2]; len]);
+            assert!(spectrum.iter().zip(&lanes).all(|(one, lane)| *one == lane.map(|parts| parts[3])), "{len}");
+            for (back, value) in fft.inverse(&spectrum).iter().zip(&values) {
+                let error = (0..2).map(|i| (back[i] / len as f64 - value[i]).abs()).fold(0.0, f64::max);
+                assert!(error < 1e-13, "{len}: {error}");
+            }
         }
     }
 

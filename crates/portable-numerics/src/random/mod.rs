@@ -5,7 +5,7 @@
 //! | sampler | numbers | takes | for |
 //! |---|---|---|---|
 //! | [`normal`], [`Normals`] | `f64`, any size | a generator | scalar draws |
-//! | [`Ziggurat`] | `f32`, any size | a generator | millions of draws in order, four times as fast |
+//! | [`Ziggurat`] | `f32`, any size | a generator | white noise: many draws in order, nearly all without a logarithm |
 //! | [`normals_of_words`] | `f32`, up to 6.76 | two random words for each pair | rows of pixels whose words are a function of position; no branch, so that vectors compute it |
 
 mod draws;

@@ -48,7 +48,7 @@ pub fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
         check.faults.sort_by_key(|fault| fault.span.as_ref().map(|span| span.start));
         return Err(check.faults);
     }
-    toml::from_str(text).map_err(|error: toml::de::Error| vec![type_fault(&error, table.get_ref(), &schema)])
+    Recipe::from_toml(text).map_err(|error| vec![type_fault(&error, table.get_ref(), &schema)])
 }
 
 /// Classes of cells that a recipe names and a model lacks.

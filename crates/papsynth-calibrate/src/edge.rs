@@ -1,0 +1,135 @@
+//! σ in the plane of the image, from a straight edge in focus.
+
+use std::f64::consts::{PI, SQRT_2};
+
+use optics_psf::calibrate::{self, EdgeFit, Window};
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::find;
+
+/// Least side of a window.
+const LEAST_SIDE_PX: f64 = 8.0;
+
+/// Where a straight edge lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum EdgeAt {
+    /// The sharpest straight edge of the image is found.
+    Found,
+    /// In the square around the middle of the line between two points whose side is as long as the line, pixels.
+    Line([f64; 4]),
+}
+
+/// An edge.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Edge {
+    /// Left, top, width, height, pixels.
+    pub window: [usize; 4],
+    /// σ of the blur, with the width of the pixel in it, pixels.
+    pub sigma_px: f64,
+    /// Its standard error.
+    pub error_px: f64,
+    /// Grey level of the dark side.
+    pub dark: f64,
+    /// Grey level of the light side.
+    pub light: f64,
+    /// Towards the light, x right and y down.
+    pub normal: [f64; 2],
+    /// Root mean square of what the fit leaves.
+    pub difference: f64,
+}
+
+impl Edge {
+    /// Measures an edge in an image of rows of `width` pixels, grey levels of any unit.
+    ///
+    /// # Errors
+    /// If there is no straight edge, or it cannot be fitted.
+    ///
+    /// # Panics
+    /// If the image is not whole rows.
+    pub fn measure(image: &[f32], width: usize, at: EdgeAt) -> Result<Self, Error> {
+        let (window, fit) = match at {
+            EdgeAt::Found => find::straight_edge(image, width).ok_or(Error::NoEdge)?,
+            EdgeAt::Line(line) => {
+                let height = image.len() / width;
+                let window = square_around(line, width, height).ok_or(Error::Line { line, width, height })?;
+                (window, calibrate::edge(image, width, window).map_err(Error::Edge)?)
+            }
+        };
+        let EdgeFit { sigma_px, dark, light, normal, difference } = fit;
+        // From the slopes of the least squares: ∫ t²φ² = 1 ∕ (4√π).
+        let length = window.width.min(window.height) as f64;
+        let error_px = difference / (light - dark) * (4.0 * PI.sqrt() * sigma_px / length).sqrt();
+        Ok(Self { window: find::numbers(window), sigma_px, error_px, dark, light, normal, difference })
+    }
+
+    /// Distance of each pixel of the window from the middle of the edge, towards the light, and its grey level. The
+    /// middle is where the fit leaves least.
+    ///
+    /// # Panics
+    /// If the window does not lie in the image.
+    #[must_use]
+    pub fn profile(&self, image: &[f32], width: usize) -> Vec<[f64; 2]> {
+        let [left, top, wide, high] = self.window;
+        let [cx, cy] = [wide, high].map(|side| (side as f64 - 1.0) / 2.0);
+        let samples: Vec<[f64; 2]> = (0..high)
+            .flat_map(|y| (0..wide).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let d = self.normal[0] * (x as f64 - cx) + self.normal[1] * (y as f64 - cy);
+                [d, f64::from(image[(top + y) * width + left + x])]
+            })
+            .collect();
+        let rest =
+            |shift: f64| -> f64 { samples.iter().map(|[d, value]| value - self.at(d - shift)).map(|r| r * r).sum() };
+        let best = |from: f64, step: f64, count: u32| {
+            let shifts = (0..=count).map(|i| from + step * f64::from(i));
+            shifts.min_by(|a, b| rest(*a).total_cmp(&rest(*b))).unwrap_or(from)
+        };
+        // To a quarter of a pixel, then to a hundredth.
+        let reach = cx + cy;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "four times a window's side")]
+        let coarse = best(-reach, 0.25, (8.0 * reach) as u32);
+        let shift = best(coarse - 0.25, 0.01, 50);
+        samples.into_iter().map(|[d, value]| [d - shift, value]).collect()
+    }
+
+    /// Grey level of the fitted edge at a distance from its middle, pixels.
+    #[must_use]
+    pub fn at(&self, distance_px: f64) -> f64 {
+        self.dark + (self.light - self.dark) * 0.5 * libm::erfc(-distance_px / (self.sigma_px * SQRT_2))
+    }
+}
+
+/// The square around a line's middle whose side is as long as the line.
+fn square_around([x0, y0, x1, y1]: [f64; 4], width: usize, height: usize) -> Option<Window> {
+    let (dx, dy) = (x1 - x0, y1 - y0);
+    let side = (dx * dx + dy * dy).sqrt().round();
+    let first = |a: f64, b: f64| (0.5 * (a + b) - 0.5 * (side - 1.0)).round();
+    let (left, top) = (first(x0, x1), first(y0, y1));
+    let inside = side >= LEAST_SIDE_PX
+        && left >= 0.0
+        && top >= 0.0
+        && left + side <= width as f64
+        && top + side <= height as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "inside the image")]
+    inside.then_some(Window { left: left as usize, top: top as usize, width: side as usize, height: side as usize })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_asks_for_the_square_around_its_middle() {
+        let square = |line| square_around(line, 64, 48).map(find::numbers);
+        // Across or along.
+        assert_eq!(square([10.0, 20.0, 26.0, 20.0]), Some([11, 13, 16, 16]));
+        assert_eq!(square([18.0, 12.0, 18.0, 28.0]), Some([11, 13, 16, 16]));
+        assert_eq!(square([0.0, 0.0, 47.0, 47.0]), None);
+        assert_eq!(square([10.0, 20.0, 17.0, 20.0]), None);
+        assert_eq!(square([0.0, 0.0, 16.0, 0.0]), None);
+        assert_eq!(square([f64::NAN, 0.0, 16.0, 0.0]), None);
+        assert_eq!(square([f64::INFINITY, 0.0, 16.0, 0.0]), None);
+    }
+}

@@ -1,0 +1,23 @@
+//! A nucleus of a focus stack.
+
+use serde::{Deserialize, Serialize};
+
+/// One nucleus.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Nucleus {
+    /// Left, top, width, height, pixels.
+    pub window: [usize; 4],
+    /// Its plane in focus, counted from 0.
+    pub focused: usize,
+    /// σ in each plane, pixels.
+    pub sigma_px: Vec<f64>,
+}
+
+impl Nucleus {
+    /// σ in each plane, with the number of planes from focus.
+    pub(crate) fn points(&self) -> impl Iterator<Item = (i64, f64)> {
+        let focused = self.focused.cast_signed() as i64;
+        self.sigma_px.iter().zip(0_i64..).map(move |(sigma, plane)| (plane - focused, *sigma))
+    }
+}

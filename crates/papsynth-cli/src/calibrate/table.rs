@@ -1,0 +1,121 @@
+//! Measurements as tables.
+
+use std::fmt::Write;
+
+use papsynth_calibrate::{Bound, Camera, Condenser, Edge, Focus, Saturation};
+
+/// Blur against focus offset.
+pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let mut line = |text: String| {
+        let _ = writeln!(out, "{}", text.trim_end());
+    };
+    line("blur against focus offset (Fig. 10)".to_owned());
+    for nucleus in &record.nuclei {
+        let [x, y, w, h] = nucleus.window;
+        line(format!("  window {x},{y},{w},{h}: in focus in plane {}", nucleus.focused));
+    }
+    let um = |known: bool, name: &str| if known { format!("{name:>10}") } else { String::new() };
+    line(format!(
+        "{:>8}{}{:>8}{:>10}{}{:>16}{:>10}",
+        "planes",
+        um(record.step_um.is_some(), "um"),
+        "nuclei",
+        "sigma px",
+        um(pixel_um.is_some(), "sigma um"),
+        "quartiles px",
+        "line px"
+    ));
+    for o in &record.offsets {
+        let n = o.planes.abs() as f64;
+        let side = if o.planes < 0 { &record.before } else { &record.after };
+        let fit = if o.fitted { format!("{:.2}", side.at(n)) } else { "-".to_owned() };
+        line(format!(
+            "{:>+8}{}{:>8}{:>10.2}{}{:>16}{:>10}",
+            o.planes,
+            record.step_um.map_or_else(String::new, |step| format!("{:>+10.2}", o.planes as f64 * step)),
+            o.nuclei,
+            o.sigma_px,
+            pixel_um.map_or_else(String::new, |pixel| format!("{:>10.3}", o.sigma_px * pixel)),
+            format!("{:.2} to {:.2}", o.quartiles_px[0], o.quartiles_px[1]),
+            fit
+        ));
+    }
+    for (name, side) in [("before focus", &record.before), ("after focus", &record.after)] {
+        line(format!(
+            "{name:<14}{:.3} px a plane, {:+.2} px in focus, R2 {:.4}; through 0: {:.3} px a plane",
+            side.slope_px, side.intercept_px, side.r_squared, side.proportional_px
+        ));
+    }
+    line(format!("symmetry      the slopes differ by {:.1} %", 100.0 * record.asymmetry));
+    let (k, error) = (record.proportional_px, record.proportional_error_px);
+    line(format!("blur          {k:.3} +- {error:.3} px a plane"));
+    if let Some(step) = record.step_um {
+        line(format!("              {:.3} +- {:.3} px for each um of travel", k / step, error / step));
+    }
+    if let (Some(step), Some(pixel)) = (record.step_um, pixel_um) {
+        let scale = pixel / step;
+        line(format!("              {:.3} +- {:.3} um for each um of travel", k * scale, error * scale));
+    }
+    if let Some(Condenser { na, error, bound }) = &record.condenser {
+        let space = if *bound == Bound::Inside { "" } else { " " };
+        line(format!("condenser NA  {}{space}{na:.3} +- {error:.3}", bound.words()));
+    }
+    out
+}
+
+/// Blur in focus.
+pub(super) fn edge(record: &Edge, pixel_um: Option<f64>) -> String {
+    let mut out = String::new();
+    let [x, y, w, h] = record.window;
+    let (sigma, error) = (record.sigma_px, record.error_px);
+    let turn = libm::atan2(record.normal[1], record.normal[0]).to_degrees();
+    // Writing to a string cannot fail.
+    let _ = writeln!(out, "edge");
+    let _ = writeln!(out, "  window {x},{y},{w},{h}: lighter towards {turn:.0} degrees (0 right, 90 down)");
+    let _ = writeln!(
+        out,
+        "levels        {:.4} dark, {:.4} light, {:.4} left by the fit",
+        record.dark, record.light, record.difference
+    );
+    let _ = writeln!(out, "sigma_xy      {sigma:.3} +- {error:.3} px, the pixel's own width included");
+    if let Some(pixel) = pixel_um {
+        let _ = writeln!(out, "              {:.4} +- {:.4} um", sigma * pixel, error * pixel);
+    }
+    out
+}
+
+/// Photon transfer.
+pub(super) fn camera(record: &Camera) -> String {
+    let mut out = String::from("photon transfer (EMVA 1288)\n");
+    // Writing to a string cannot fail.
+    let mut line = |text: String| {
+        let _ = writeln!(out, "{}", text.trim_end());
+    };
+    line(format!("{:>8}{:>12}{:>14}{:>12}  level", "frames", "mean dn", "variance dn2", "at highest"));
+    for level in &record.levels {
+        line(format!(
+            "{:>8}{:>12.2}{:>14.3}{:>10.2} %  {}",
+            level.frames,
+            level.mean_dn,
+            level.variance_dn2,
+            100.0 * level.at_highest,
+            level.name
+        ));
+    }
+    line(format!(
+        "gain          {:.5} dn per electron, {:.2} electrons per dn",
+        record.gain_dn_per_e,
+        1.0 / record.gain_dn_per_e
+    ));
+    line(format!("full scale    {:.0} electrons in {} bits", record.full_scale_e, record.bits));
+    let Saturation { reached, dn, e } = &record.saturation;
+    let from = if *reached { "" } else { "not reached: above " };
+    line(format!("saturation    {from}{e:.0} electrons, {dn:.1} dn above the dark"));
+    line(format!("offset        {:.2} dn", record.offset_dn));
+    line(format!("dark noise    {:.2} electrons", record.dark_noise_e));
+    line(format!("DSNU          {:.2} electrons", record.dsnu_e));
+    line(format!("PRNU          {:.2} %", 100.0 * record.prnu));
+    out
+}

@@ -1,0 +1,48 @@
+//! Bytes of values, and SHA-256.
+
+use std::fs::File;
+use std::io::{self, Read};
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+/// How much is read at a time to be hashed.
+const HASH_BLOCK: usize = 1 << 16;
+
+/// Why serialisation cannot fail here.
+const HAS_JSON: &str = "structs whose maps have text keys have a JSON form";
+
+/// A value as compact JSON.
+pub(crate) fn json(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(value).expect(HAS_JSON)
+}
+
+/// A value as JSON with a field a line.
+pub(crate) fn json_lines(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec_pretty(value).expect(HAS_JSON)
+}
+
+/// Size and SHA-256 of the rest of a file.
+pub(crate) fn measure(file: &mut File) -> io::Result<(u64, String)> {
+    let mut hash = Sha256::new();
+    let mut block = vec![0; HASH_BLOCK];
+    let mut bytes = 0;
+    loop {
+        match file.read(&mut block)? {
+            0 => return Ok((bytes, hex(&hash.finalize()))),
+            read => {
+                hash.update(&block[..read]);
+                bytes += read as u64;
+            }
+        }
+    }
+}
+
+/// SHA-256 as hexadecimal digits.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}

@@ -1,0 +1,238 @@
+//! Pictures for people: truth drawn over the image.
+
+use std::io;
+use std::path::Path;
+
+use papsynth::truth::{Group, Mask};
+use papsynth::{Finished, Plane};
+
+use crate::error::Error;
+use crate::files::write_file;
+use crate::read::LevelImage;
+use crate::write::{self, rgb_png};
+use papsynth::white_level as white;
+
+/// A picture in colour.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Columns.
+    pub width: usize,
+    /// Red, green and blue of each pixel, row by row.
+    pub rgb: Vec<u8>,
+}
+
+impl Picture {
+    /// A plane as it is, in 8 bits.
+    #[must_use]
+    pub fn plain(plane: &Plane, finished: &Finished) -> Self {
+        Self::of(plane, finished, &[])
+    }
+
+    /// A plane with the outlines of all objects: cytoplasm green, nuclei orange, everything else blue.
+    #[must_use]
+    pub fn overlay(plane: &Plane, finished: &Finished) -> Self {
+        let objects = &finished.truth.objects;
+        let masks: Vec<_> = objects.iter().map(|object| (object.group(), object.amodal.clone())).collect();
+        Self::of(plane, finished, &masks)
+    }
+
+    fn of(plane: &Plane, finished: &Finished, masks: &[(Group, Mask)]) -> Self {
+        let (view, camera) = (&finished.scene.view, &finished.scene.camera);
+        let mut picture = Self::blank(view.width, view.height, BACKGROUND);
+        let levels = plane.grey.clone();
+        let image = LevelImage { width: view.width, channels: plane.channels, levels, white: white(camera.bits) };
+        let place = Place { x: 0, y: 0, width: view.width, height: view.height };
+        picture.draw(&image, image.white, masks, place);
+        picture
+    }
+
+    /// The picture as a PNG file.
+    ///
+    /// # Errors
+    /// If it has no pixel, or more columns or rows than PNG allows.
+    pub fn to_png(&self) -> io::Result<Vec<u8>> {
+        rgb_png(&self.rgb, self.width)
+    }
+
+    fn blank(width: usize, height: usize, colour: [u8; 3]) -> Self {
+        Self { width, rgb: colour.repeat(width * height) }
+    }
+
+    fn set(&mut self, x: usize, y: usize, colour: [u8; 3]) {
+        let at = (y * self.width + x) * 3;
+        if x < self.width
+            && let Some(pixel) = self.rgb.get_mut(at..at + 3)
+        {
+            pixel.copy_from_slice(&colour);
+        }
+    }
+
+    /// Draws an image, no larger than it is, and outlines over it.
+    fn draw(&mut self, image: &LevelImage, white: u16, masks: &[(Group, Mask)], place: Place) {
+        let (width, height) = (image.width, image.height());
+        for y in 0..place.height {
+            let rows = span(y, place.height, height);
+            for x in 0..place.width {
+                let columns = span(x, place.width, width);
+                let count = (rows.len() * columns.len()) as u64;
+                let mean = |channel: usize| {
+                    let row =
+                        |row: usize| columns.clone().map(move |x| u64::from(image.level(x, row, channel))).sum::<u64>();
+                    let sum: u64 = rows.clone().map(row).sum();
+                    let full = count * u64::from(white);
+                    u8::try_from((sum * 255 + full / 2) / full.max(1)).unwrap_or(u8::MAX)
+                };
+                let colour = if image.channels == 3 { [mean(0), mean(1), mean(2)] } else { [mean(0); 3] };
+                self.set(place.x + x, place.y + y, colour);
+            }
+        }
+        // Nuclei lie over everything else, as they are looked at most.
+        for group in [Group::Cytoplasm, Group::Debris, Group::Nucleus] {
+            for (_, mask) in masks.iter().filter(|(of, _)| *of == group) {
+                for [x, y] in edge(mask) {
+                    let x = x as usize * place.width / width;
+                    let y = y as usize * place.height / height;
+                    self.set(place.x + x, place.y + y, colour(group));
+                }
+            }
+        }
+    }
+
+    /// Writes digits; other characters are left blank.
+    fn write(&mut self, text: &str, x: usize, y: usize) {
+        for (i, digit) in text.chars().map(|c| c.to_digit(10)).enumerate() {
+            let rows = digit.map_or([0; 7], |d| DIGITS[d as usize]);
+            for (row, bits) in rows.iter().enumerate() {
+                for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
+                    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                        self.set(x + i * 12 + 2 * column + dx, y + 2 * row + dy, [255; 3]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A rectangle of a picture.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    x: usize,
+    y: usize,
+    width: usize,
+    height: usize,
+}
+
+const BACKGROUND: [u8; 3] = [32; 3];
+
+/// Colours that people with defective colour vision tell apart, too (Okabe and Ito).
+fn colour(group: Group) -> [u8; 3] {
+    match group {
+        Group::Cytoplasm => [0, 158, 115],
+        Group::Nucleus => [213, 94, 0],
+        Group::Debris => [86, 180, 233],
+    }
+}
+
+/// Digits of 5 x 7 pixels; the highest of the five bits is the leftmost.
+const DIGITS: [[u8; 7]; 10] = [
+    [0x0E, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0E],
+    [0x04, 0x0C, 0x04, 0x04, 0x04, 0x04, 0x0E],
+    [0x0E, 0x11, 0x01, 0x02, 0x04, 0x08, 0x1F],
+    [0x1F, 0x02, 0x04, 0x02, 0x01, 0x11, 0x0E],
+    [0x02, 0x06, 0x0A, 0x12, 0x1F, 0x02, 0x02],
+    [0x1F, 0x10, 0x1E, 0x01, 0x01, 0x11, 0x0E],
+    [0x06, 0x08, 0x10, 0x1E, 0x11, 0x11, 0x0E],
+    [0x1F, 0x01, 0x02, 0x04, 0x08, 0x08, 0x08],
+    [0x0E, 0x11, 0x11, 0x0E, 0x11, 0x11, 0x0E],
+    [0x0E, 0x11, 0x11, 0x0F, 0x01, 0x02, 0x0C],
+];
+
+/// Pixels of `from` that fall into pixel `i` of `to`; at least one.
+fn span(i: usize, to: usize, from: usize) -> std::ops::Range<usize> {
+    let start = i * from / to;
+    start..((i + 1) * from / to).max(start + 1).min(from)
+}
+
+/// The pixels of a mask with a neighbour outside it.
+fn edge(mask: &Mask) -> Vec<[u32; 2]> {
+    let Some(bounds) = mask.bounds() else { return Vec::new() };
+    // A pixel wider on every side, so that each pixel has four neighbours.
+    let width = bounds.width as usize + 2;
+    let at = |x: u32, y: u32| (y - bounds.y + 1) as usize * width + (x - bounds.x + 1) as usize;
+    let mut inside = vec![false; width * (bounds.height as usize + 2)];
+    for run in mask.runs() {
+        inside[at(run.x0, run.y)..at(run.x1, run.y)].fill(true);
+    }
+    let on_edge = |i: usize| !(inside[i - 1] && inside[i + 1] && inside[i - width] && inside[i + width]);
+    let pixels = mask.runs().iter().flat_map(|run| (run.x0..run.x1).map(|x| [x, run.y]));
+    pixels.filter(|&[x, y]| on_edge(at(x, y))).collect()
+}
+
+/// Small pictures of the first frames with their truth, side by side, each under its name.
+pub(crate) struct ContactSheet {
+    picture: Picture,
+    frames: usize,
+}
+
+impl ContactSheet {
+    /// More are not shown.
+    pub(crate) const MAX_FRAMES: usize = 24;
+    const COLUMNS: usize = 4;
+    /// Largest picture of a frame: a quarter of the default field.
+    const SIZE: [usize; 2] = [344, 260];
+    const GAP: usize = 8;
+    const CAPTION: usize = 22;
+
+    pub(crate) fn new(frames: usize) -> Self {
+        let shown = frames.clamp(1, Self::MAX_FRAMES);
+        let columns = shown.min(Self::COLUMNS);
+        let [width, height] = Self::cell();
+        let rows = shown.div_ceil(columns);
+        Self { picture: Picture::blank(columns * width + Self::GAP, rows * height + Self::GAP, BACKGROUND), frames: 0 }
+    }
+
+    fn cell() -> [usize; 2] {
+        [Self::SIZE[0] + Self::GAP, Self::SIZE[1] + Self::CAPTION + Self::GAP]
+    }
+
+    pub(crate) fn add(&mut self, name: &str, image: &LevelImage, white: u16, masks: &[(Group, Mask)]) {
+        let [cell_width, cell_height] = Self::cell();
+        let x = Self::GAP + self.frames % Self::COLUMNS * cell_width;
+        let y = Self::GAP + self.frames / Self::COLUMNS * cell_height;
+        self.frames += 1;
+        self.picture.write(name, x, y);
+        let [width, height] = fitted([image.width, image.height()], Self::SIZE);
+        self.picture.draw(image, white, masks, Place { x, y: y + Self::CAPTION, width, height });
+    }
+
+    pub(crate) fn into_picture(self) -> Picture {
+        self.picture
+    }
+}
+
+/// The largest size of the same proportions within a box, and not larger than it was.
+fn fitted([width, height]: [usize; 2], [most_width, most_height]: [usize; 2]) -> [usize; 2] {
+    if width <= most_width && height <= most_height {
+        [width, height]
+    } else if width * most_height >= height * most_width {
+        [most_width, (height * most_width / width).max(1)]
+    } else {
+        [(width * most_height / height).max(1), most_height]
+    }
+}
+
+/// Writes grey levels, row by row, the channels of a pixel side by side, as a PNG.
+///
+/// # Errors
+/// If the system refuses; then there is no such file, or still the former one.
+pub fn write_png(
+    path: &Path,
+    levels: &[u16],
+    width: usize,
+    channels: usize,
+    bits: u32,
+    pixel_um: f64,
+) -> Result<(), Error> {
+    let bytes = write::png(levels, width, channels, bits, pixel_um).map_err(Error::io("write", path))?;
+    write_file(path, &bytes)
+}

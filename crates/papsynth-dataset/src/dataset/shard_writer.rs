@@ -1,0 +1,320 @@
+//! One shard, frame by frame, plane by plane, in every format of the data set.
+
+use std::collections::BTreeSet;
+
+use papsynth::scene::Scene;
+use papsynth::truth::{Mask, Truth};
+use papsynth::{Finished, Plane, white_level as white};
+
+use super::record::{FORMAT_VERSION, ShardRecord, WRITER};
+use super::set::{Dataset, read_record};
+use crate::error::Error;
+use crate::files::{Output, Pending};
+use crate::formats::parquet::Table;
+use crate::formats::{Field, Files, Sink, names};
+use crate::truth::{Document, Form, FrameSummary, Geometry, Image, Info, table, typed_cells, typed_columns};
+
+impl Dataset {
+    /// Writes a shard, whose frames will follow one by one.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub fn shard_writer(&self, shard: u64) -> Result<ShardWriter<'_>, Error> {
+        ShardWriter::new(self, shard)
+    }
+}
+
+/// Writes the files of one shard. Frames come one after the other, planes as they arrive; neither is kept. Dropped before it is
+/// committed, it leaves no record, and the shard counts as not made.
+pub struct ShardWriter<'a> {
+    dataset: &'a Dataset,
+    shard: u64,
+    files: Files<'a>,
+    sinks: Vec<Box<dyn Sink + 'a>>,
+    truth: TruthFiles,
+    frame: Option<Begun>,
+    done: Vec<FrameSummary>,
+}
+
+/// A frame of which planes are still to come.
+struct Begun {
+    geometry: Geometry,
+    /// Masks of the planes' saturated pixels.
+    saturated: Vec<Mask>,
+    floored: Vec<usize>,
+    /// Grey levels of a single plane.
+    picture: Vec<u16>,
+}
+
+/// COCO document and table of a shard, as they grow.
+struct TruthFiles {
+    coco: Output,
+    table: Output,
+    /// The table as Parquet, if it is wanted.
+    objects: Option<(Pending, Table<'static>)>,
+    annotations: u64,
+    images: Vec<Image>,
+}
+
+impl<'a> ShardWriter<'a> {
+    fn new(dataset: &'a Dataset, shard: u64) -> Result<Self, Error> {
+        let folder = &dataset.folder;
+        // From now on the shard is not whole, whatever it was before.
+        folder.inside(names::SHARDS)?;
+        folders_are_own(dataset, shard)?;
+        folder.remove(&names::record(shard))?;
+        let files = Files::new(folder, &dataset.layout, shard);
+        let sinks = dataset.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
+        let truth = TruthFiles::begin(dataset, shard)?;
+        Ok(Self { dataset, shard, files, sinks, truth, frame: None, done: Vec::new() })
+    }
+
+    /// Begins the frame of a scene, whose planes will follow.
+    ///
+    /// # Errors
+    /// If the scene is not one of this shard or not the next one, or the system refuses.
+    pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
+        self.begin_with(Geometry::of(scene))
+    }
+
+    pub(crate) fn begin_with(&mut self, geometry: Geometry) -> Result<(), Error> {
+        let index = geometry.key.index;
+        let wrong = |message: String| Err(Error::Frame { index, message });
+        if geometry.key.seed != self.dataset.identity.seed {
+            let (there, here) = (geometry.key.seed, self.dataset.identity.seed);
+            return wrong(format!("the scene is of seed {there}, the data set of {here}"));
+        }
+        let frames = self.dataset.frames_of_shard(self.shard);
+        if !frames.contains(&index) || self.done.last().is_some_and(|last| last.index >= index) {
+            return wrong(format!(
+                "shard {} has the frames {} to {}, in this order",
+                self.shard,
+                frames.start,
+                frames.end - 1
+            ));
+        }
+        if let Some(frame) = &self.frame {
+            return wrong(format!("frame {} is not finished yet", frame.geometry.key.index));
+        }
+        let (pixels, planes) = (geometry.pixels(), geometry.planes_um.len());
+        if pixels == 0 || planes == 0 {
+            return wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"));
+        }
+        for sink in &mut self.sinks {
+            sink.begin(&geometry, &self.files)?;
+        }
+        let (saturated, floored) = (Vec::with_capacity(planes), Vec::with_capacity(planes));
+        self.frame = Some(Begun { geometry, saturated, floored, picture: Vec::new() });
+        Ok(())
+    }
+
+    /// Writes the next plane.
+    ///
+    /// # Errors
+    /// If it is not the next one or of another size than the scene, or the system refuses.
+    pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
+        let frame = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        frame.check_plane(plane)?;
+        for sink in &mut self.sinks {
+            sink.plane(plane, &frame.geometry, &self.files)?;
+        }
+        if Form::of(frame.geometry.planes_um.len()) == Form::Single {
+            frame.picture.clone_from(&plane.grey);
+        }
+        frame.saturated.push(plane.saturated.clone());
+        frame.floored.push(plane.floored);
+        Ok(())
+    }
+
+    /// Writes everything else of the frame.
+    ///
+    /// # Errors
+    /// If planes are missing, something is of another size than the scene, or the system refuses.
+    pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
+        let frame = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        if Geometry::of(&finished.scene) != frame.geometry {
+            let other = finished.scene.key.index;
+            return Err(frame
+                .geometry
+                .wrong(format!("the truth handed over is that of another scene, of frame {other}")));
+        }
+        let sharp = match Form::of(frame.geometry.planes_um.len()) {
+            Form::Single => Vec::new(),
+            Form::Stack => finished.sharp(),
+        };
+        if self.dataset.layout.scenes {
+            let name = names::scene(finished.scene.key.index);
+            self.files.write(&name, finished.scene.to_json().as_bytes())?;
+        }
+        self.end_with(&finished.truth, sharp)
+    }
+
+    /// The same with the grey levels of the picture of a stack with everything in focus.
+    pub(crate) fn end_with(&mut self, truth: &Truth, sharp: Vec<u16>) -> Result<&FrameSummary, Error> {
+        let frame = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        frame.check(truth, &sharp)?;
+        let geometry = &frame.geometry;
+        let picture = if sharp.is_empty() { frame.picture } else { sharp };
+        let summary = FrameSummary::of(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
+        let files = self.dataset.images_of(&summary, self.shard);
+        let document = Document::of_frame(truth, &summary, &frame.saturated, &self.dataset.categories, files)
+            .map_err(|error| geometry.wrong(format!("the recipe knows no category `{}`", error.name)))?;
+        let field = Field::new(geometry, &summary, truth, &document, &picture);
+        for sink in &mut self.sinks {
+            sink.field(&field, &mut self.files)?;
+        }
+        let rows = table(truth, geometry.key.index, self.done.is_empty());
+        self.truth.add(document, &rows, truth, geometry.key.index)?;
+        self.done.push(summary);
+        Ok(&self.done[self.done.len() - 1])
+    }
+
+    /// Gives the files their names and writes, last, the record that makes the shard whole.
+    ///
+    /// # Errors
+    /// If a frame was begun and not ended, or the system refuses.
+    pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
+        if let Some(frame) = &self.frame {
+            return Err(frame.geometry.wrong("is not finished".to_owned()));
+        }
+        let mut files = self.files;
+        for sink in self.sinks {
+            sink.close(&mut files)?;
+        }
+        let mut files = files.written;
+        for pending in self.truth.end()? {
+            files.push(pending.commit()?);
+        }
+        files.sort_by(|a, b| a.path.cmp(&b.path));
+        let record = ShardRecord {
+            version: FORMAT_VERSION,
+            writer: WRITER.to_owned(),
+            identity: self.dataset.identity.clone(),
+            layout: self.dataset.layout.clone(),
+            shard: self.shard,
+            frames: self.done,
+            files,
+            sha256: String::new(),
+        }
+        .sealed();
+        let folder = &self.dataset.folder;
+        // First the files and their names, then what says that they are there.
+        folder.sync_names(&record.files)?;
+        let name = names::record(self.shard);
+        folder.sync_names([&folder.write(&name, &record.to_json())?])?;
+        folder.release(record.files.iter().map(|file| file.path.as_str()).chain([name.as_str()]));
+        Ok(record.frames)
+    }
+}
+
+/// Where links lead outside nothing can be written: that is said while the record still stands.
+fn folders_are_own(dataset: &Dataset, shard: u64) -> Result<(), Error> {
+    if dataset.folder.is_remote() {
+        return Ok(());
+    }
+    let Ok(record) = read_record(&dataset.folder, shard) else { return Ok(()) };
+    let folders: BTreeSet<&str> =
+        record.files.iter().filter_map(|file| file.path.rsplit_once('/')).map(|(folder, _)| folder).collect();
+    folders.into_iter().try_for_each(|name| dataset.folder.no_link(name))
+}
+
+fn not_begun(dataset: &Dataset, shard: u64) -> Error {
+    Error::Frame { index: dataset.frames_of_shard(shard).start, message: "no frame was begun".to_owned() }
+}
+
+impl TruthFiles {
+    fn begin(dataset: &Dataset, shard: u64) -> Result<Self, Error> {
+        let output = |name: String| Output::new(dataset.folder.pending(&name)?);
+        let mut coco = output(names::coco(shard))?;
+        coco.bytes(b"{\"info\":")?;
+        coco.json(&Info::default())?;
+        coco.bytes(b",\"licenses\":[],\"categories\":")?;
+        coco.json(&dataset.categories)?;
+        coco.bytes(b",\"annotations\":[")?;
+        let begin = |pending: Pending| {
+            let table = Table::begin(pending.handle()?, pending.path(), typed_columns())?;
+            Ok::<_, Error>((pending, table))
+        };
+        let objects = dataset.layout.objects_parquet.then(|| dataset.folder.pending(&names::objects(shard)));
+        let objects = objects.transpose()?.map(begin).transpose()?;
+        Ok(Self { coco, table: output(names::table(shard))?, objects, annotations: 0, images: Vec::new() })
+    }
+
+    fn add(&mut self, frame: Document, rows: &[u8], truth: &Truth, index: u64) -> Result<(), Error> {
+        let before = self.annotations;
+        for annotation in frame.annotations {
+            self.coco.bytes(if self.annotations == 0 { b"\n" } else { b",\n" })?;
+            self.coco.json(&annotation.renumbered(before))?;
+            self.annotations += 1;
+        }
+        self.images.extend(frame.images);
+        if let Some((_, table)) = &mut self.objects {
+            truth.objects.iter().try_for_each(|object| table.row(typed_cells(truth, object, index)))?;
+        }
+        self.table.bytes(rows)
+    }
+
+    fn end(mut self) -> Result<Vec<Pending>, Error> {
+        self.coco.bytes(b"],\"images\":[")?;
+        self.coco.json_lines(self.images.iter().map(Ok))?;
+        self.coco.bytes(b"]}\n")?;
+        let mut ended = vec![self.coco.into_pending()?, self.table.into_pending()?];
+        if let Some((pending, table)) = self.objects {
+            table.end()?;
+            ended.push(pending);
+        }
+        Ok(ended)
+    }
+}
+
+impl Begun {
+    fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
+        let (values, bits) = (self.geometry.values(), self.geometry.bits);
+        let (next, planes) = (self.saturated.len(), self.geometry.planes_um.len());
+        if plane.index != next || next >= planes {
+            let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
+            return Err(self.geometry.wrong(message));
+        }
+        self.check_size("grey levels", plane.grey.len(), values)?;
+        self.check_size("noise-free values", plane.noise_free.len(), values)?;
+        match plane.grey.iter().copied().max() {
+            Some(brightest) if brightest > white(bits) => {
+                Err(self.geometry.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything must fit to the scene before a file is written.
+    fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
+        let (view, due) = (&self.geometry.view, self.geometry.planes_um.len());
+        let wrong = |message: String| Err(self.geometry.wrong(message));
+        if self.saturated.len() != due {
+            return wrong(format!("{} of {due} planes were written", self.saturated.len()));
+        }
+        if due > 1 {
+            self.check_size("all-in-focus values", sharp.len(), self.geometry.values())?;
+        }
+        if [truth.width, truth.height] != [view.width, view.height] {
+            let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
+            return wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}"));
+        }
+        let outside = truth.objects.iter().find(|object| {
+            [&object.amodal, &object.front]
+                .iter()
+                .filter_map(|mask| mask.bounds())
+                .any(|b| (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height)
+        });
+        outside.map_or(Ok(()), |object| wrong(format!("the mask of object {} leaves the image", object.id)))
+    }
+
+    fn check_size(&self, what: &str, found: usize, values: usize) -> Result<(), Error> {
+        if found == values {
+            return Ok(());
+        }
+        let channels = self.geometry.channels;
+        let pixels = values / channels;
+        let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
+        Err(self.geometry.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
+    }
+}

@@ -1,0 +1,24 @@
+//! Whether a path is a folder or the address of an object store.
+
+use std::path::Path;
+
+#[cfg(feature = "cloud")]
+use super::cloud::Bucket;
+use super::store::Home;
+use crate::error::Error;
+
+impl Home {
+    /// The home of a data set at a path, or at an address such as `s3://bucket/prefix` in a build with the feature `cloud`.
+    ///
+    /// # Errors
+    /// If an address names no object store, this build lacks the feature `cloud`, or the folder for temporary files cannot be made.
+    pub fn at(path: &Path) -> Result<Self, Error> {
+        if !Self::is_address(path) {
+            return Ok(Self::from(path));
+        }
+        #[cfg(feature = "cloud")]
+        return Self::in_store(Bucket::open(&path.to_string_lossy())?);
+        #[cfg(not(feature = "cloud"))]
+        Err(Error::folder(path, "object stores need a build of papsynth with `--features cloud`"))
+    }
+}

@@ -1,0 +1,239 @@
+//! Run-length masks as COCO writes them.
+//!
+//! Column by column from the left, the number of pixels outside, inside, outside, … the mask; each number from the
+//! fourth on as the difference to the last but one, in groups of five bits as printable characters.
+
+use papsynth::truth::{Mask, Run};
+
+use crate::error::Problem;
+
+/// Largest side of an image whose masks are decoded, as wide as a field may be: a bound on what a short hostile string
+/// can ask for.
+const MAX_SIDE: usize = 1 << 15;
+
+/// The `counts` of a mask in an image of `width` x `height` pixels.
+///
+/// # Panics
+/// If the mask has a pixel outside the image.
+#[must_use]
+pub fn encode(mask: &Mask, width: usize, height: usize) -> String {
+    let mut out = String::new();
+    let counts = counts(mask, width, height);
+    for (i, &count) in counts.iter().enumerate() {
+        let before = if i > 2 { counts[i - 2] } else { 0 };
+        push(count - before, &mut out);
+    }
+    out
+}
+
+/// The `counts` of a mask in an image of the size of its box; none of an empty one.
+#[cfg(feature = "zarr")]
+pub(crate) fn encode_in_box(mask: &Mask) -> String {
+    let Some(bounds) = mask.bounds() else { return String::new() };
+    let moved = |run: &Run| Run { y: run.y - bounds.y, x0: run.x0 - bounds.x, x1: run.x1 - bounds.x };
+    let within = Mask::from_runs(mask.runs().iter().map(moved).collect());
+    encode(&within, bounds.width as usize, bounds.height as usize)
+}
+
+/// Pixels outside, inside, outside, … in column-major order; the last count is left out if it is 0, the first is not.
+fn counts(mask: &Mask, width: usize, height: usize) -> Vec<i64> {
+    // Rows `start..end` of each column, which grow as rows arrive from the top.
+    let mut columns: Vec<Vec<[u32; 2]>> = vec![Vec::new(); width];
+    for run in mask.runs() {
+        for column in &mut columns[run.x0 as usize..run.x1 as usize] {
+            match column.last_mut() {
+                Some(last) if last[1] == run.y => last[1] += 1,
+                _ => column.push([run.y, run.y + 1]),
+            }
+        }
+    }
+    let mut counts = Vec::new();
+    let mut inside: Option<[u64; 2]> = None;
+    let mut end = 0;
+    let mut close = |[from, to]: [u64; 2]| {
+        counts.extend([(from - end) as i64, (to - from) as i64]);
+        end = to;
+    };
+    for (x, column) in columns.iter().enumerate() {
+        for row in column {
+            let [from, to] = row.map(|y| (x * height) as u64 + u64::from(y));
+            match &mut inside {
+                // The foot of a column and the head of the next are neighbours.
+                Some(last) if last[1] == from => last[1] = to,
+                _ => {
+                    if let Some(last) = inside.replace([from, to]) {
+                        close(last);
+                    }
+                }
+            }
+        }
+    }
+    if let Some(last) = inside {
+        close(last);
+    }
+    let total = (width * height) as u64;
+    if end < total {
+        counts.push((total - end) as i64);
+    }
+    counts
+}
+
+/// Five bits a character from the lowest up, the sixth says that more follow; the last character's fifth bit is the sign.
+fn push(mut value: i64, out: &mut String) {
+    loop {
+        #[expect(clippy::cast_sign_loss, reason = "five bits")]
+        let bits = (value & 0x1f) as u8;
+        value >>= 5;
+        let last = value == if bits & 0x10 == 0 { 0 } else { -1 };
+        out.push(char::from(48 + bits + if last { 0 } else { 0x20 }));
+        if last {
+            return;
+        }
+    }
+}
+
+/// The mask that `counts` stand for in an image of `width` x `height` pixels.
+///
+/// # Errors
+/// If the string is no sequence of counts, or they do not fill the image exactly.
+pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, Problem> {
+    let wrong = |message: String| Problem::broken("RLE", message);
+    if width.max(height) > MAX_SIDE {
+        return Err(wrong(format!("the image is {width} x {height}; at most {MAX_SIDE} pixels a side are accepted")));
+    }
+    let total = width * height;
+    let mut rows: Vec<Vec<[u32; 2]>> = vec![Vec::new(); height];
+    let mut last_two = [0_i64; 2];
+    let (mut position, mut number) = (0_usize, 0_usize);
+    let mut bytes = counts.bytes();
+    while let Some(difference) = pull(&mut bytes).map_err(|m| wrong(m.to_owned()))? {
+        let count = difference + if number > 2 { last_two[0] } else { 0 };
+        last_two = [last_two[1], count];
+        let length = usize::try_from(count).map_err(|_| wrong(format!("count {number} is negative")))?;
+        let end = position.saturating_add(length);
+        if end > total {
+            return Err(wrong(format!("the counts exceed the {total} pixels of the image")));
+        }
+        if number % 2 == 1 {
+            for pixel in position..end {
+                let x = u32::try_from(pixel / height).unwrap_or(u32::MAX);
+                match rows[pixel % height].last_mut() {
+                    Some(run) if run[1] == x => run[1] += 1,
+                    _ => rows[pixel % height].push([x, x + 1]),
+                }
+            }
+        }
+        (position, number) = (end, number + 1);
+    }
+    if position != total {
+        return Err(wrong(format!("the counts fill {position} of {total} pixels")));
+    }
+    let runs = (0_u32..).zip(rows).flat_map(|(y, row)| row.into_iter().map(move |[x0, x1]| Run { y, x0, x1 }));
+    Ok(Mask::from_runs(runs.collect()))
+}
+
+/// The next number, if there is one.
+fn pull(bytes: &mut std::str::Bytes) -> Result<Option<i64>, &'static str> {
+    /// A count has at most 2³² pixels, in seven groups of five bits.
+    const MAX_SHIFT: u32 = 35;
+    let mut value = 0_i64;
+    let mut shift = 0;
+    loop {
+        let Some(byte) = bytes.next() else {
+            return if shift == 0 { Ok(None) } else { Err("it ends within a number") };
+        };
+        let group = match byte.checked_sub(48) {
+            Some(group) if group < 64 && shift <= MAX_SHIFT => group,
+            Some(group) if group < 64 => return Err("a number is too large"),
+            _ => return Err("a character is none of its alphabet"),
+        };
+        value |= i64::from(group & 0x1f) << shift;
+        shift += 5;
+        if group & 0x20 == 0 {
+            let sign = if group & 0x10 == 0 { 0 } else { -1_i64 << shift };
+            return Ok(Some(value | sign));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn mask(pixels: &[bool], width: usize) -> Mask {
+        let tile: Vec<f32> = pixels.iter().map(|&p| f32::from(u8::from(p))).collect();
+        Mask::from_tile(&tile, width, [0, 0], width, pixels.len() / width, |v| v > 0.5)
+    }
+
+    /// Column by column, pixel by pixel.
+    fn slow_counts(pixels: &[bool], width: usize) -> Vec<i64> {
+        let height = pixels.len() / width;
+        let mut counts = vec![0];
+        let mut value = false;
+        for i in 0..pixels.len() {
+            let pixel = pixels[i % height * width + i / height];
+            if pixel != value {
+                counts.push(0);
+                value = pixel;
+            }
+            *counts.last_mut().unwrap() += 1;
+        }
+        counts
+    }
+
+    #[test]
+    fn strings_are_those_of_pycocotools() {
+        let checkers: Vec<bool> = (0..35).map(|i| (i / 7 + i % 7) % 2 == 0).collect();
+        assert_eq!(encode(&mask(&checkers, 7), 7, 5), r"011000000000000000000000000000000000");
+        assert_eq!(encode(&mask(&[false; 12], 4), 4, 3), "<");
+        assert_eq!(encode(&mask(&[true; 12], 4), 4, 3), "0<");
+        let block: Vec<bool> = (0..40_000).map(|i| (50..150).contains(&(i % 200)) && i / 200 >= 20).collect();
+        assert_eq!(
+            encode(&mask(&block, 200), 200, 200),
+            r"Ti9d5d000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000lg9"
+        );
+    }
+
+    #[test]
+    fn what_is_no_mask_is_refused() {
+        for (text, what) in [
+            ("", "fill 0 of 12"),
+            ("3", "fill 3 of 12"),
+            ("=", "exceed"),
+            ("\u{20}", "alphabet"),
+            ("é", "alphabet"),
+            ("P", "ends within"),
+            ("oooooooooo0", "too large"),
+            ("O", "negative"),
+        ] {
+            let problem = decode(text, 4, 3).unwrap_err().to_string();
+            assert!(problem.contains(what), "{text}: {problem}");
+        }
+        assert!(decode("0", usize::MAX, usize::MAX).is_err());
+        assert_eq!(decode("", 0, 0).unwrap(), Mask::default());
+    }
+
+    proptest! {
+        #[test]
+        fn masks_are_counted_as_pixel_by_pixel_and_read_back(
+            width in 1_usize..24,
+            pixels in proptest::collection::vec(proptest::bool::weighted(0.6), 24 * 20),
+            height in 1_usize..20,
+        ) {
+            let pixels = &pixels[..width * height];
+            let mask = mask(pixels, width);
+            prop_assert_eq!(counts(&mask, width, height), slow_counts(pixels, width));
+            prop_assert_eq!(decode(&encode(&mask, width, height), width, height), Ok(mask));
+        }
+
+        #[test]
+        fn any_text_is_a_mask_or_refused(text in ".{0,40}", plain in "[0-o]{0,40}", width in 0_usize..300, height in 0_usize..300) {
+            for text in [text, plain] {
+                if let Ok(mask) = decode(&text, width, height) {
+                    prop_assert!(mask.area() <= (width * height) as u64);
+                }
+            }
+        }
+    }
+}

@@ -1,3 +1,0 @@
-//! Integration tests, linked as one program.
-
-mod http;

@@ -1,4 +1,0 @@
-//! Integration tests, linked as one program.
-
-mod hostile;
-mod round_trip;

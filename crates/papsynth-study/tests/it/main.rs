@@ -1,5 +1,0 @@
-//! Integration tests, linked as one program.
-
-mod http;
-#[path = "../support/mod.rs"]
-mod support;

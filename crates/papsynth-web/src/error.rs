@@ -1,0 +1,48 @@
+//! What can go wrong.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a page cannot be served.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The port cannot be listened at.
+    #[error("cannot listen at 127.0.0.1, port {port}: {source}; expected a port that is free, or none for any")]
+    Listen {
+        /// The port.
+        port: u16,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A data set or slide cannot be read.
+    #[error(transparent)]
+    Dataset(#[from] papsynth_dataset::Error),
+    /// A study cannot be kept on the disk.
+    #[error(transparent)]
+    Study(#[from] papsynth_study::Error),
+    /// The folder holds nothing that is shown.
+    #[error("{}: {message}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What is wrong, and what would help.
+        message: String,
+    },
+}
+
+impl Error {
+    /// Whether the system failed, so that trying again may help; everything else lies in what was asked for.
+    #[must_use]
+    pub fn is_io(&self) -> bool {
+        match self {
+            Self::Dataset(error) => error.is_io(),
+            Self::Study(error) => error.is_io(),
+            Self::Listen { .. } | Self::Folder { .. } => false,
+        }
+    }
+
+    pub(crate) fn folder(path: &Path, message: impl Into<String>) -> Self {
+        Self::Folder { path: path.to_owned(), message: message.into() }
+    }
+}

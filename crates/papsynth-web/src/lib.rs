@@ -1,0 +1,13 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod error;
+mod page;
+mod server;
+mod study;
+mod view;
+
+pub use error::Error;
+pub use server::{JSON, LONGEST_BODY, Reply, Request, Server, Site};
+pub use study::{Study, serve_study};
+pub use view::View;

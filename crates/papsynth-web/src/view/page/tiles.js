@@ -1,0 +1,201 @@
+"use strict";
+
+// The middle of the canvas is (view.x, view.y) in pixels of the picture, each of which has view.zoom pixels of the page. Of every
+// tile in view the level that suits the zoom is asked for; until it is here, its part of a coarser one stands for it.
+
+/** Tiles that are asked for at a time, that are kept; the largest zoom; how far the pointer may move in a click. */
+const [AT_ONCE, KEPT, NEAREST, CLICK_PX, RETRY_MS] = [6, 400, 32, 4, 2000];
+
+const canvas = element("canvas");
+const context = canvas.getContext("2d");
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+let info = null;
+let picture = null;
+const view = { number: 0, plane: 0, x: 0, y: 0, zoom: 1 };
+
+/** The plane that was shown before: it stands in while the next one is on its way. */
+let before = 0;
+
+/** Whether the labels of a group are shown, and how opaque. */
+const groups = new Map();
+
+/** Where was clicked. */
+let mark = null;
+
+/** Tiles by their address: an image, "asked", "absent" or "broken". The last that were used are the last. */
+const tiles = new Map();
+let underway = 0;
+
+// What is asked
+
+function say(text) {
+  element("message").textContent = text;
+  element("message").hidden = !text;
+}
+
+async function load(address) {
+  tiles.set(address, "asked");
+  underway += 1;
+  try {
+    const response = await request(address);
+    tiles.set(address, await createImageBitmap(await response.blob()));
+  } catch (error) {
+    tiles.set(address, error.status === 404 ? "absent" : "broken");
+    if (error.status !== 404) say(error.status ? error.message : "The program does not answer. It is asked again.");
+    if (!error.status) {
+      await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+      tiles.delete(address);
+      say("");
+    }
+  }
+  underway -= 1;
+  redraw();
+}
+
+/** A tile if it is here; it counts as used. */
+function ready(address) {
+  const tile = tiles.get(address);
+  if (!(tile instanceof ImageBitmap)) return null;
+  tiles.delete(address);
+  tiles.set(address, tile);
+  return tile;
+}
+
+/** Lets the tiles go that were not used for longest; those of two views may always stay. */
+function forget(needed) {
+  for (const [address, tile] of tiles) {
+    if (tiles.size <= Math.max(KEPT, 2 * needed)) return;
+    if (tile === "asked") continue;
+    if (tile instanceof ImageBitmap) tile.close();
+    tiles.delete(address);
+  }
+}
+
+// What is drawn
+
+const addressOf = (layer, level, row, column) => `${layer}/${level}/${row}-${column}.png`;
+const planeLayer = (plane) => `tile/${view.number}/${plane}`;
+
+/** A column and a row of the picture in pixels of the screen; whole ones, so that tiles meet without a seam. */
+const onScreenX = (x) => Math.round(((x - view.x) * view.zoom + canvas.clientWidth / 2) * devicePixelRatio);
+const onScreenY = (y) => Math.round(((y - view.y) * view.zoom + canvas.clientHeight / 2) * devicePixelRatio);
+
+/** The level whose pixels are at most as large as those of the screen, or the finest. */
+const levelNow = () => clamp(Math.floor(1e-6 - Math.log2(view.zoom * devicePixelRatio)), 0, picture.levels - 1);
+
+/** The tiles of a level in view, those in the middle first. */
+function inView(level) {
+  const side = picture.tile * 2 ** level;
+  const [across, down] = [canvas.clientWidth / view.zoom / 2, canvas.clientHeight / view.zoom / 2];
+  const along = (middle, half, end) =>
+    [Math.floor(clamp(middle - half, 0, end - 1) / side), Math.floor(clamp(middle + half, 0, end - 1) / side)];
+  const [left, right] = along(view.x, across, picture.width);
+  const [top, bottom] = along(view.y, down, picture.height);
+  const found = [];
+  for (let row = top; row <= bottom; row += 1) {
+    for (let column = left; column <= right; column += 1) found.push([row, column]);
+  }
+  const far = ([row, column]) => Math.hypot((row + 0.5) * side - view.y, (column + 0.5) * side - view.x);
+  return found.sort((a, b) => far(a) - far(b));
+}
+
+/** Draws the part of a picture's layer under a tile: the tile, or its part of the nearest coarser one that is here. */
+function drawTile(layers, level, row, column) {
+  const side = picture.tile;
+  const [left, top] = [column * side, row * side];
+  const [width, height] = [picture.width, picture.height].map((full) => Math.ceil(full / 2 ** level));
+  const [right, bottom] = [Math.min(left + side, width), Math.min(top + side, height)];
+  const [x0, y0] = [onScreenX(left * 2 ** level), onScreenY(top * 2 ** level)];
+  const x1 = onScreenX(Math.min(right * 2 ** level, picture.width));
+  const y1 = onScreenY(Math.min(bottom * 2 ** level, picture.height));
+  for (let up = 0; level + up < picture.levels; up += 1) {
+    const [over, beside] = [row >> up, column >> up];
+    for (const layer of layers) {
+      const tile = ready(addressOf(layer, level + up, over, beside));
+      if (!tile) continue;
+      const [u, v] = [left / 2 ** up - beside * side, top / 2 ** up - over * side];
+      context.imageSmoothingEnabled = up > 0 || view.zoom * devicePixelRatio < 1;
+      const [across, down] = [(right - left) / 2 ** up, (bottom - top) / 2 ** up];
+      context.drawImage(tile, u, v, across, down, x0, y0, x1 - x0, y1 - y0);
+      return;
+    }
+  }
+}
+
+let drawing = false;
+
+function redraw() {
+  document.body.dataset.ready = false;
+  if (drawing) return;
+  drawing = true;
+  requestAnimationFrame(() => {
+    drawing = false;
+    if (picture) draw();
+  });
+}
+
+function draw() {
+  const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.round(side * devicePixelRatio));
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  context.clearRect(0, 0, width, height);
+  // Where the picture lies, also where nothing of it is made yet.
+  const [x, y] = [onScreenX(0), onScreenY(0)];
+  context.fillStyle = "#24282d";
+  context.fillRect(x, y, onScreenX(picture.width) - x, onScreenY(picture.height) - y);
+  const layers = [[[planeLayer(view.plane), planeLayer(before)], 1]];
+  for (const [name, { on, opacity }] of groups) if (on) layers.push([[`label/${view.number}/${name}`], opacity]);
+  const [level, coarsest] = [levelNow(), picture.levels - 1];
+  const [fine, coarse] = [inView(level), inView(coarsest)];
+  const needed = [];
+  for (const [[layer]] of layers) {
+    for (const [row, column] of coarse) needed.push(addressOf(layer, coarsest, row, column));
+    for (const [row, column] of fine) needed.push(addressOf(layer, level, row, column));
+  }
+  for (const [names, opacity] of layers) {
+    context.globalAlpha = opacity;
+    for (const [row, column] of fine) drawTile(names, level, row, column);
+  }
+  context.globalAlpha = 1;
+  drawMark();
+  const isHere = needed.every((address) => tiles.has(address) && tiles.get(address) !== "asked");
+  if (isHere) {
+    before = view.plane;
+    // The planes beside this one will be asked for next.
+    for (const plane of [view.plane - 1, view.plane + 1]) {
+      if (!(plane in picture.planes_um)) continue;
+      for (const [row, column] of fine) needed.push(addressOf(planeLayer(plane), level, row, column));
+    }
+  }
+  for (const address of needed) if (underway < AT_ONCE && !tiles.has(address)) load(address);
+  forget(needed.length);
+  document.body.dataset.ready = isHere;
+  drawScale();
+  keepPlace();
+}
+
+function drawMark() {
+  if (!mark) return;
+  const [x, y] = [onScreenX(mark.x + 0.5), onScreenY(mark.y + 0.5)];
+  const [inner, outer] = [5, 13].map((length) => length * devicePixelRatio);
+  for (const [width, colour] of [[5, "#fff"], [2, "#111"]]) {
+    context.beginPath();
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + inner * dx, y + inner * dy);
+      context.lineTo(x + outer * dx, y + outer * dy);
+    }
+    Object.assign(context, { lineWidth: width * devicePixelRatio, strokeStyle: colour });
+    context.stroke();
+  }
+}
+
+/** A bar of 1, 2 or 5 times a power of ten, at most 160 pixels long. */
+function drawScale() {
+  const most = (160 * picture.pixel_um) / view.zoom;
+  const power = 10 ** Math.floor(Math.log10(most));
+  const um = [5, 2, 1].map((times) => times * power).find((length) => length <= most) ?? power;
+  const text = um >= 1000 ? `${um / 1000} mm` : `${Number(um.toPrecision(1))} µm`;
+  element("scale-bar").style.width = `${(um / picture.pixel_um) * view.zoom}px`;
+  element("scale-text").textContent = text;
+  element("scale").setAttribute("aria-label", `Scale bar of ${text}`);
+}

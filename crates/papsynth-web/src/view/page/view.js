@@ -1,0 +1,320 @@
+"use strict";
+
+// What hands and keys do, and what the panel says. What is shown of it, tiles.js draws.
+
+// Where one looks
+
+function fit() {
+  Object.assign(view, { x: picture.width / 2, y: picture.height / 2, zoom: farthest() });
+  redraw();
+}
+
+/** The zoom that shows all of the picture. */
+const farthest = () =>
+  Math.max(0.96 * Math.min(canvas.clientWidth / picture.width, canvas.clientHeight / picture.height), 1e-6);
+
+function move(dx, dy) {
+  view.x = clamp(view.x + dx / view.zoom, 0, picture.width);
+  view.y = clamp(view.y + dy / view.zoom, 0, picture.height);
+  redraw();
+}
+
+/** Zooms so that the place under a point of the canvas stays there. */
+function zoomBy(factor, x = canvas.clientWidth / 2, y = canvas.clientHeight / 2) {
+  const [dx, dy] = [x - canvas.clientWidth / 2, y - canvas.clientHeight / 2];
+  const zoom = clamp(view.zoom * factor, Math.min(farthest(), 1) / 2, NEAREST);
+  view.x += dx / view.zoom - dx / zoom;
+  view.y += dy / view.zoom - dy / zoom;
+  view.zoom = zoom;
+  move(0, 0);
+}
+
+/** What the panel says of the plane in view. */
+let perPlane = [];
+
+function showPlane(plane) {
+  view.plane = clamp(plane, 0, Math.max(picture.planes_um.length - 1, 0));
+  element("plane").value = view.plane;
+  const um = picture.planes_um[view.plane] ?? 0;
+  const text = `${minus(um, 2)} µm`;
+  element("plane").setAttribute("aria-valuetext", text);
+  element("plane-text").textContent = `${text} · ${view.plane + 1} of ${picture.planes_um.length}`;
+  for (const { node, values, unit } of perPlane) node.textContent = ofPlane(values, unit);
+  redraw();
+}
+
+/** The number of the picture that was asked for last. */
+let wanted = 0;
+
+/** Shows a picture, all of it unless it is told where to look. */
+async function showPicture(number, place) {
+  wanted = number;
+  try {
+    const next = await (await request(`picture/${number}`)).json();
+    if (wanted !== number) return;
+    say("");
+    // The same place of pictures of the same size, so that they can be compared.
+    const stays = picture && next.width === picture.width && next.height === picture.height;
+    picture = next;
+    view.number = number;
+    [mark, perPlane] = [null, []];
+    element("objects").replaceChildren(made("p", "Click on something to see what it is.", "quiet"));
+    element("here-at").textContent = "";
+    element("name").textContent = picture.name;
+    element("number").value = number + 1;
+    element("previous").disabled = number === 0;
+    element("next").disabled = number + 1 >= info.pictures;
+    const um = [picture.width, picture.height].map((px) => px * picture.pixel_um);
+    const [unit, digits, name] = Math.max(...um) < 1000 ? [1, 0, "µm"] : [1000, 2, "mm"];
+    const size = `${um.map((side) => (side / unit).toFixed(digits)).join(" × ")} ${name}`;
+    const focus = picture.planes_um.length === 0 ? " · everything in focus" : "";
+    element("about").textContent = `${picture.width} × ${picture.height} px · ${size}${focus}`;
+    element("focus").hidden = picture.planes_um.length < 2;
+    element("plane").max = Math.max(picture.planes_um.length - 1, 0);
+    if (place) Object.assign(view, place, { zoom: clamp(place.zoom, farthest() / 2, NEAREST) });
+    else if (!stays) fit();
+    const middle = Math.floor(picture.planes_um.length / 2);
+    showPlane(place?.plane ?? (stays ? view.plane : middle));
+    before = view.plane;
+    move(0, 0);
+  } catch (error) {
+    say(error.message);
+    element("number").value = number + 1;
+  }
+}
+
+const go = (number) => {
+  const there = clamp(number, 0, info.pictures - 1);
+  if (there !== wanted) showPicture(there);
+};
+
+let keeping = 0;
+
+/** The address as this page left it. */
+let kept = "";
+
+/** Keeps place and labels in the address, so that it can be loaded anew and handed on. */
+function keepPlace() {
+  clearTimeout(keeping);
+  keeping = setTimeout(() => {
+    // Somebody has typed another, which is being looked at.
+    if (location.hash !== kept) return;
+    const shown = [...groups].filter(([, { on }]) => on);
+    const labels = shown.map(([name, { opacity }]) => `${name}:${Math.round(opacity * 100)}`).join(",");
+    const { number, plane, x, y, zoom } = view;
+    const place = `#n=${number}&p=${plane}&x=${x.toFixed(1)}&y=${y.toFixed(1)}&z=${Number(zoom.toPrecision(5))}`;
+    history.replaceState(null, "", `${place}&l=${labels}`);
+    kept = location.hash;
+  }, 150);
+}
+
+function keptPlace() {
+  kept = location.hash;
+  const words = new URLSearchParams(location.hash.slice(1));
+  const [number, plane, x, y, zoom] = ["n", "p", "x", "y", "z"].map((key) => Number.parseFloat(words.get(key)));
+  const labels = new Map(words.get("l")?.split(",").map((word) => word.split(":")));
+  for (const name of groups.keys()) {
+    setGroup(name, labels.has(name), clamp(Number(labels.get(name)) / 100 || 1, 0.05, 1));
+  }
+  if (![number, plane, x, y, zoom].every(Number.isFinite) || zoom <= 0) return { number: 0 };
+  const place = { plane: Math.floor(plane), x, y, zoom };
+  return { number: clamp(Math.floor(number), 0, info.pictures - 1), place };
+}
+
+// What lies there
+
+function made(tag, text, className) {
+  const node = document.createElement(tag);
+  node.append(...[text].flat());
+  if (className) node.className = className;
+  return node;
+}
+
+const ofPlane = (values, unit) => `${minus(values[view.plane] ?? values[0], 1)}${unit}`;
+
+function card(object) {
+  const node = made("article", []);
+  const heading = made("h3", [object.class ?? object.group, made("span", `${object.part ?? ""} ${object.id}`.trim())]);
+  node.style.borderLeftColor = object.colour;
+  const list = made("dl", []);
+  const row = (name, value) => {
+    const cell = made("dd", value ?? "");
+    if (value !== undefined && value !== "") list.append(made("dt", name), cell);
+    return cell;
+  };
+  row("Bethesda", object.bethesda);
+  row("traits", object.traits?.replaceAll(";", ", "));
+  row("tint", object.tint);
+  if (object.class !== undefined) {
+    row("depth", `${minus(object.depth_um, 1)} µm`);
+    const planes = (name, values, unit) =>
+      values.length && perPlane.push({ node: row(name, ofPlane(values, unit)), values, unit });
+    planes("defocus", object.defocus_um, " µm");
+    planes("contrast / noise", object.detectability, "");
+    row("area", `${object.area_um2.toFixed(object.area_um2 < 100 ? 1 : 0)} µm²`);
+    row("stain", object.stain.toFixed(2));
+    row("cluster", object.cluster || "");
+    const hints = [object.front ? "" : "behind another", object.truncated ? "cut by the border" : ""].filter(Boolean);
+    row("", hints.join(", "));
+  }
+  node.append(heading, list);
+  return node;
+}
+
+async function look(x, y) {
+  if (x < 0 || y < 0 || x >= picture.width || y >= picture.height) return;
+  mark = { x, y };
+  redraw();
+  element("here-at").textContent = `${x}, ${y} px`;
+  try {
+    const { objects } = await (await request(`at/${view.number}/${x}/${y}`)).json();
+    if (mark?.x !== x || mark?.y !== y) return;
+    perPlane = [];
+    const nodes = objects.length ? objects.map(card) : [made("p", "Nothing but the slide.", "quiet")];
+    element("objects").replaceChildren(...nodes);
+  } catch (error) {
+    element("objects").replaceChildren(made("p", error.message, "quiet"));
+  }
+}
+
+// Hands and keys
+
+const placeOf = (event) => {
+  const box = canvas.getBoundingClientRect();
+  const [x, y] = [event.clientX - box.x, event.clientY - box.y];
+  return { x, y, px: view.x + (x - box.width / 2) / view.zoom, py: view.y + (y - box.height / 2) / view.zoom };
+};
+
+/** Fingers, or the mouse, that are down. */
+const down = new Map();
+let travelled = 0;
+
+canvas.addEventListener("pointerdown", (event) => {
+  if (event.button !== 0) return;
+  canvas.setPointerCapture(event.pointerId);
+  if (down.size === 0) travelled = 0;
+  down.set(event.pointerId, placeOf(event));
+});
+
+canvas.addEventListener("pointermove", (event) => {
+  if (!picture) return;
+  const to = placeOf(event);
+  const from = down.get(event.pointerId);
+  if (from) {
+    travelled += Math.hypot(to.x - from.x, to.y - from.y);
+    const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const apart = (point) => Math.max(Math.hypot(point.x - other.x, point.y - other.y), 1);
+      zoomBy(apart(to) / apart(from), other.x, other.y);
+    } else if (travelled > CLICK_PX) {
+      canvas.classList.add("dragged");
+      move(from.x - to.x, from.y - to.y);
+    }
+    down.set(event.pointerId, to);
+  }
+  const [x, y] = [placeOf(event).px, placeOf(event).py];
+  const um = (px) => minus(px * picture.pixel_um, 1);
+  element("position").textContent = `${Math.floor(x)}, ${Math.floor(y)} px · ${um(x)}, ${um(y)} µm`;
+});
+
+const release = (event) => {
+  const was = down.delete(event.pointerId);
+  if (down.size === 0) canvas.classList.remove("dragged");
+  if (!was || event.type !== "pointerup" || travelled > CLICK_PX || !picture) return;
+  const { px, py } = placeOf(event);
+  look(Math.floor(px), Math.floor(py));
+};
+canvas.addEventListener("pointerup", release);
+canvas.addEventListener("pointercancel", release);
+
+canvas.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  if (!picture) return;
+  // With Shift some systems turn the wheel sideways.
+  const turn = (event.deltaY || event.deltaX) * [1, 33, 400][event.deltaMode];
+  const { x, y } = placeOf(event);
+  if (event.shiftKey) showPlane(view.plane - Math.sign(turn));
+  else zoomBy(2 ** (-turn / 250), x, y);
+}, { passive: false });
+
+const step = () => 0.15 * Math.min(canvas.clientWidth, canvas.clientHeight);
+const [nearer, deeper, higher] = [() => zoomBy(Math.SQRT2), () => showPlane(view.plane - 1), () => showPlane(view.plane + 1)];
+const [previous, next] = [() => go(wanted - 1), () => go(wanted + 1)];
+const KEYS = {
+  ArrowLeft: () => move(-step(), 0),
+  ArrowRight: () => move(step(), 0),
+  ArrowUp: () => move(0, -step()),
+  ArrowDown: () => move(0, step()),
+  ...{ "+": nearer, "=": nearer, "-": () => zoomBy(Math.SQRT1_2), 0: fit },
+  ...{ "[": deeper, PageDown: deeper, "]": higher, PageUp: higher, n: next, p: previous },
+};
+
+document.addEventListener("keydown", (event) => {
+  if (!picture || event.ctrlKey || event.metaKey || event.altKey) return;
+  // A slider and a number have arrows of their own.
+  if (event.target instanceof HTMLInputElement && event.target.type !== "checkbox") return;
+  const group = [...groups.keys()][Number(event.key) - 1];
+  const act = group ? () => setGroup(group, !groups.get(group).on) : Object.hasOwn(KEYS, event.key) && KEYS[event.key];
+  if (!act) return;
+  event.preventDefault();
+  act();
+});
+
+function setGroup(name, on, opacity = groups.get(name).opacity) {
+  const group = groups.get(name);
+  Object.assign(group, { on, opacity });
+  group.check.checked = on;
+  group.slider.value = Math.round(opacity * 100);
+  redraw();
+}
+
+function addGroup(name) {
+  const [check, slider] = [made("input", []), made("input", [])];
+  Object.assign(check, { type: "checkbox", id: `group-${name}` });
+  Object.assign(slider, { type: "range", min: 5, max: 100, value: 100 });
+  slider.setAttribute("aria-label", `Opacity of ${name}`);
+  groups.set(name, { on: false, opacity: 1, check, slider });
+  check.addEventListener("change", () => setGroup(name, check.checked));
+  slider.addEventListener("input", () => setGroup(name, true, slider.value / 100));
+  const row = made("div", [made("label", [check, name]), slider]);
+  element("groups").append(row);
+}
+
+element("plane").addEventListener("input", (event) => showPlane(Number(event.target.value)));
+element("previous").addEventListener("click", previous);
+element("next").addEventListener("click", next);
+element("number").addEventListener("change", ({ target }) => go(Math.floor(Number(target.value) || 1) - 1));
+new ResizeObserver(redraw).observe(canvas);
+
+// What was not there may have been made since.
+addEventListener("focus", () => {
+  for (const [address, tile] of tiles) if (tile === "absent" || tile === "broken") tiles.delete(address);
+  redraw();
+});
+addEventListener("hashchange", () => {
+  const { number, place } = keptPlace();
+  showPicture(number, place);
+});
+
+async function begin() {
+  try {
+    info = await (await request("info")).json();
+  } catch (error) {
+    say(error.status ? error.message : "The program does not answer.");
+    return;
+  }
+  document.title = `${info.title} – papsynth view`;
+  element("title").textContent = info.title;
+  element("count").textContent = info.pictures;
+  element("number").max = info.pictures;
+  element("pictures").hidden = info.pictures < 2;
+  info.groups.forEach(addGroup);
+  if (info.pictures === 0) {
+    say("There is no picture yet.");
+    return;
+  }
+  const { number, place } = keptPlace();
+  await showPicture(number, place);
+}
+
+begin();

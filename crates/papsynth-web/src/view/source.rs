@@ -1,0 +1,75 @@
+//! What can be shown: a data set or a slide, asked the same things.
+
+use papsynth::truth::Group;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::grid::Grid;
+use crate::server::Reply;
+
+/// A folder that is shown.
+pub(crate) trait Source: Send {
+    /// What it is called: "data set" or "slide".
+    fn kind(&self) -> &'static str;
+
+    /// How many pictures there are now.
+    fn count(&mut self) -> Result<usize, Reply>;
+
+    /// What a picture is like.
+    fn picture(&mut self, picture: usize) -> Result<Picture, Reply>;
+
+    /// A tile of a plane.
+    fn tile(&mut self, picture: usize, plane: usize, at: At) -> Result<Reply, Reply>;
+
+    /// A tile of the labels of a group.
+    fn label(&mut self, picture: usize, group: Group, at: At) -> Result<Reply, Reply>;
+
+    /// What lies under a pixel, nearest first.
+    fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply>;
+}
+
+/// Which tile.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct At {
+    pub(crate) level: usize,
+    pub(crate) row: usize,
+    pub(crate) column: usize,
+}
+
+/// What the page must know of a picture before it asks for tiles.
+#[derive(Debug, Serialize)]
+pub(crate) struct Picture {
+    pub(crate) name: String,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Side of a pixel, µm.
+    pub(crate) pixel_um: f64,
+    /// Travel of the stage to each plane, µm; nothing if the picture has everything in focus.
+    pub(crate) planes_um: Vec<f64>,
+    pub(crate) levels: usize,
+    /// Side of a tile, px.
+    pub(crate) tile: usize,
+}
+
+impl Picture {
+    pub(crate) fn new(name: String, grid: &Grid, pixel_um: f64, planes_um: Vec<f64>) -> Self {
+        let Grid { width, height, tile, levels } = *grid;
+        Self { name, width, height, pixel_um, planes_um, levels, tile }
+    }
+}
+
+/// That a plane is there.
+pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
+    if plane < planes {
+        return Ok(());
+    }
+    Err(Reply::refusal(404, &format!("there is no plane {plane}; the last is {}", planes.saturating_sub(1))))
+}
+
+/// That a pixel is there.
+pub(crate) fn check_pixel(x: usize, y: usize, width: usize, height: usize) -> Result<(), Reply> {
+    if x < width && y < height {
+        return Ok(());
+    }
+    Err(Reply::refusal(404, &format!("there is no pixel {x}, {y} in {width} x {height}")))
+}

@@ -1,0 +1,10 @@
+//! Integration tests, linked as one program.
+
+mod server;
+mod study;
+mod study_http;
+#[path = "../support/mod.rs"]
+mod support;
+mod view;
+mod view_http;
+mod view_slide;
