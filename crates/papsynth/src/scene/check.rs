@@ -7,9 +7,6 @@ use serde_json::Value;
 use super::field::{Object, Scene};
 use crate::debris::Body;
 use crate::error::{Cause, Error};
-use crate::recipe::camera::Camera;
-use crate::recipe::imaging::{Colour, Gaussians, Microscope, Monochrome};
-use crate::recipe::section::Part;
 
 /// Most objects, planes and pixels of a scene.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -24,8 +21,7 @@ const MOST_REACHES: f64 = 512.0;
 
 /// The range of each number, by the name of its field or by the end of its path. Of lists it is that of each number.
 ///
-/// The ranges are wider than those of recipes: they keep memory, time and arithmetic within bounds. Those of light, optics
-/// and camera are the recipe's, unless they stand here.
+/// The ranges are wider than those of recipes: they keep memory, time and arithmetic within bounds.
 #[rustfmt::skip]
 const RANGES: &[(&str, f64, f64)] = &[
     ("view.width", 1.0, 32_768.0), ("view.height", 1.0, 32_768.0), ("pixel_um", 0.04, 5.0),
@@ -33,7 +29,16 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("noise_correlation", 0.0, 0.5), ("noise_skew", -0.1, 0.1),
     ("level", 1e-3, 2.0), ("exponent", 0.0, 10.0), ("x2", 0.0, 1.0), ("y2", 0.0, 1.0), ("top", -10.0, 10.0),
     ("scatter", 0.0, 1.0), ("scatter_um", 0.1, 1e5),
-    ("feather_um", 0.0, 5.0), ("offset_dn", 0.0, 32_768.0),
+    ("wavelength_um", 0.4, 0.7), ("bandwidth_um", 0.0, 0.1), ("lamp_k", 2000.0, 10_000.0), ("chromatic_um", -10.0, 10.0),
+    ("na", 0.05, 1.6), ("condenser_na", 0.05, 1.6), ("mount_index", 1.0, 2.0), ("immersion_index", 1.0, 2.0),
+    ("cover_error_um", -50.0, 50.0), ("spherical", -1.0, 1.0), ("coma", -1.0, 1.0), ("astigmatism", -1.0, 1.0),
+    ("extra_blur_um", 0.0, 10.0), ("stray_light", 0.0, 0.5), ("oversampling", 1.0, 4.0), ("slab_um", 0.1, 10.0),
+    ("directions", 1.0, 65_536.0), ("sigma_xy_um", 0.0, 20.0), ("sigma_z_um_per_um", 0.0, 10.0), ("feather_um", 0.0, 5.0),
+    ("bits", 8.0, 16.0), ("full_well_e", 10.0, 1e7), ("read_noise_e", 0.0, 1e5), ("read_noise_rms_e", 0.0, 1e5),
+    ("offset_dn", 0.0, 32_768.0), ("glare_removed", 0.0, 0.8), ("prnu", 0.0, 0.5), ("dsnu_e", 0.0, 1e5),
+    ("exposure_s", 0.0, 1e6), ("dark_current_e_per_s", 0.0, 1e6), ("dark_reference_c", -200.0, 150.0),
+    ("temperature_c", -200.0, 150.0), ("dark_doubling_c", 0.1, 100.0), ("blooming", 0.0, 1.0),
+    ("blooming_vertical", 0.0, 1.0), ("binning_px", 1.0, 8.0), ("jpeg_quality", 0.0, 100.0),
     ("id", 1.0, 4_294_967_295.0), ("centre_um", -1e6, 1e6), ("depth_um", -1e4, 1e4), ("rotation_deg", -1e6, 1e6),
     ("direction_deg", -1e6, 1e6), ("bend_deg", -1e6, 1e6), ("dyes", 0.0, 1e6), ("dyes.nucleus", 0.0, 1e6),
     ("bacillus", 0.0, 1e6), ("speckle", 0.0, 1e6), ("absorbance", 0.0, 1e4), ("cytoplasm_absorbance", 0.0, 1e4),
@@ -132,27 +137,11 @@ fn at_most(field: &str, found: usize, most: usize) -> Result<(), Cause> {
 }
 
 /// The range of a number.
-fn range(path: &str, name: &str) -> Option<[f64; 2]> {
-    let own = RANGES.iter().find(|(end, ..)| match end.split_once('.') {
+fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
+    RANGES.iter().find(|(end, ..)| match end.split_once('.') {
         Some((_, last)) => last == name && path.ends_with(end),
         None => *end == name,
-    });
-    own.map(|(_, low, high)| [*low, *high]).or_else(|| declared(path))
-}
-
-/// The range that a recipe declares for a number of light, optics or camera: a scene names it as the recipe does.
-fn declared(path: &str) -> Option<[f64; 2]> {
-    let (section, _) = path.split_once('.')?;
-    let forms: &[&dyn Part] = match section {
-        "camera" => &[&Camera::default()],
-        "light" => &[&Monochrome::default(), &Colour::default()],
-        "optics" => &[&Microscope::default(), &Gaussians::default()],
-        _ => return None,
-    };
-    let mut numbers = Vec::new();
-    forms.iter().for_each(|form| form.list(section, None, &mut numbers));
-    let found = numbers.iter().find(|number| number.path == path)?;
-    Some([found.bounds.low, found.bounds.high])
+    })
 }
 
 /// Compares every number with the range of its field, and says where a text or a truth value stands in place of a number.
@@ -164,8 +153,8 @@ fn within(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
         }),
         Value::Array(values) => values.iter().try_for_each(|value| within(value, path, name)),
         Value::Number(number) => match (range(path, name), number.as_f64()) {
-            (Some([low, high]), Some(value)) if !(low..=high).contains(&value) => {
-                Err(Cause::OutOfRange { field: path.to_owned(), value, low, high })
+            (Some((_, low, high)), Some(value)) if !(*low..=*high).contains(&value) => {
+                Err(Cause::OutOfRange { field: path.to_owned(), value, low: *low, high: *high })
             }
             _ => Ok(()),
         },
@@ -207,7 +196,7 @@ mod tests {
                 fields.iter().for_each(|(name, value)| all_have_a_range(value, &format!("{path}.{name}"), name));
             }
             Value::Array(values) => values.iter().for_each(|value| all_have_a_range(value, path, name)),
-            Value::Number(_) => assert!(range(path.trim_start_matches('.'), name).is_some() || ANY.contains(&name), "{path}"),
+            Value::Number(_) => assert!(range(path, name).is_some() || ANY.contains(&name), "{path}"),
             _ => {}
         }
     }
