@@ -1,8 +1,7 @@
 //! Toy fields: round cells with round nuclei on a lit slide, each made of numbers that are known.
 
 use papsynth_judge::{Known, Picture};
-use portable_numerics::random::{normal, uniform};
-use rand_core::SeedableRng;
+use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// What toy fields are like.
@@ -96,4 +95,15 @@ impl Disc {
         let grain = 1.0 + strength * (libm::sin(frequency * x) + libm::sin(frequency * (0.6 * x - 0.8 * y)));
         self.a * grain * 0.5 * (1.0 + libm::erf(inside / (blur * std::f64::consts::SQRT_2)))
     }
+}
+
+/// A number between 0 and 1.
+pub(crate) fn uniform(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A normal number, by Box and Muller.
+pub(crate) fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let radius = (-2.0 * libm::log(1.0 - uniform(rng))).sqrt();
+    radius * libm::cos(std::f64::consts::TAU * uniform(rng))
 }
