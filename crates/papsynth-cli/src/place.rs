@@ -5,7 +5,7 @@ use std::path::Path;
 use papsynth_dataset::Home;
 
 use crate::args::Verb;
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
 /// The data set at a path or an address.
 pub(crate) fn home(path: &Path) -> Result<Home, Failure> {

@@ -19,8 +19,6 @@ pub(crate) struct Maps {
     pub(crate) smoother: Vec<f32>,
     /// Length of the gradient of `smooth`.
     pub(crate) slope: Vec<f32>,
-    /// Of `smoother`.
-    pub(crate) wide_slope: Vec<f32>,
     pub(crate) edges: Vec<Edge>,
     /// Absorbance between one scale and the next, each scale in half as many pixels a side as the one before.
     pub(crate) bands: Vec<(Vec<f32>, usize)>,
@@ -46,7 +44,6 @@ impl Maps {
             grey: picture.grey.iter().map(|g| g * to_8_bits).collect(),
             edges: edges(&smooth, width, &slope, &wide_slope),
             slope,
-            wide_slope,
             bands: bands(&absorbance, width),
             absorbance,
             smooth,
