@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 
-use super::values::{parse_class, parse_pixel};
+use super::values::parse_pixel;
 
 /// Learn what cells of a class are like, from real material.
 ///
@@ -61,4 +61,13 @@ pub(crate) struct Learn {
     /// Model file to write; an older model is replaced, no other file
     #[arg(long, value_name = "MODEL.json")]
     pub(crate) out: PathBuf,
+}
+
+/// A name that can stand in a recipe without quotes.
+fn parse_class(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match !text.is_empty() && text.chars().all(plain) {
+        true => Ok(text.to_owned()),
+        false => Err("expected letters, digits, `-` and `_`".to_owned()),
+    }
 }

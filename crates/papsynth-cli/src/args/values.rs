@@ -67,16 +67,6 @@ pub(super) fn parse_pair(text: &str) -> Result<[u32; 2], String> {
     Ok([number(first)?, number(second)?])
 }
 
-/// A name that can stand in a recipe without quotes.
-#[cfg(feature = "learn")]
-pub(super) fn parse_class(text: &str) -> Result<String, String> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    match !text.is_empty() && text.chars().all(plain) {
-        true => Ok(text.to_owned()),
-        false => Err("expected letters, digits, `-` and `_`".to_owned()),
-    }
-}
-
 #[cfg(any(feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
 pub(super) fn parse_pixel(text: &str) -> Result<f64, String> {
     /// What a recipe's `field.pixel_um` may be as well.
@@ -99,6 +89,7 @@ mod tests {
         }
     }
 
+    #[cfg(any(feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
     #[test]
     fn pixel_sizes_are_bounded() {
         assert_eq!(parse_pixel("0.25"), Ok(0.25));

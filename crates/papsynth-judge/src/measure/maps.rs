@@ -19,7 +19,6 @@ pub(crate) struct Maps {
     pub(crate) smoother: Vec<f32>,
     /// Length of the gradient of `smooth`.
     pub(crate) slope: Vec<f32>,
-    /// Where it is steepest.
     pub(crate) edges: Vec<Edge>,
     /// Absorbance between one scale and the next, each scale in half as many pixels a side as the one before.
     pub(crate) bands: Vec<(Vec<f32>, usize)>,
