@@ -175,8 +175,9 @@ fn draw_body(
         edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
         clumping: own_number(named!(recipe.nucleus.clumping)),
         wedge: {
-            let mut rng = own("nucleus.wedge");
-            let wedge = recipe.nucleus.wedge.draw(&mut rng);
+            let (name, wedge) = named!(recipe.nucleus.wedge);
+            let mut rng = own(name);
+            let wedge = wedge.draw(&mut rng);
             [0, 1].map(|_| wedge * random::normal(&mut rng))
         },
         pyknotic,
@@ -221,8 +222,9 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
     let excess = cytoplasm.excess.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
-    let mut wedge_rng = own("cytoplasm.wedge");
-    let slope = cytoplasm.wedge.draw(&mut wedge_rng);
+    let (name, slope) = named!(recipe.cytoplasm.wedge);
+    let mut wedge_rng = own(name);
+    let slope = slope.draw(&mut wedge_rng);
     let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
     let own = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let pliable = |named: (&str, &Number)| pliability * own(named);
