@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::field::{Object, Scene};
-use crate::debris::Body;
+use crate::debris::{Body, NucleusForm};
 use crate::error::{Cause, Error};
 
 /// Most objects, planes and pixels of a scene.
@@ -44,10 +44,10 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("bacillus", 0.0, 1e6), ("speckle", 0.0, 1e6), ("absorbance", 0.0, 1e4), ("cytoplasm_absorbance", 0.0, 1e4),
     ("texture", 0.0, 1e4), ("shreds", 0.0, 1e4), ("halo", 0.0, 1e4), ("nucleus", 0.0, 1e4), ("phase_rad", -1e3, 1e3),
     ("fold.radius_um", 0.01, 5.0), ("radius_um", 0.01, 5e3), ("diameter_um", 0.05, 5e3), ("length_um", 0.05, 5e3), ("width_um", 0.01, 5e3),
-    ("segment_um", 0.05, 50.0), ("yeast_um", 0.05, 20.0), ("cell_um", 0.1, 100.0), ("cloud_um", 0.0, 500.0),
+    ("segment_um", 0.05, 50.0), ("yeast_um", 0.05, 20.0), ("cell_um", 0.0, 100.0), ("cloud_um", 0.0, 500.0),
     ("fibre_um", 0.01, 5.0), ("grain_um", 0.05, 5.0), ("beyond_um", 0.0, 20.0), ("wrinkle_um", 0.01, 5.0),
     ("clouds_um", 0.05, 100.0), ("fray_um", 0.0, 5.0), ("rim_um", 0.0, 10.0), ("edge_um", 0.0, 3.0),
-    ("rods", 1.0, 100.0), ("segments", 1.0, 100.0), ("cocci", 1.0, 1e5), ("lobes", 1.0, 16.0), ("fibres", 1.0, 1e3),
+    ("rods", 1.0, 100.0), ("segments", 1.0, 100.0), ("cocci", 1.0, 1e5), ("lobes", 0.0, 16.0), ("fibres", 1.0, 1e3),
     ("dilations", 0.0, 200.0), ("notches", 0.0, 100.0), ("tongues", 0.0, 100.0), ("wrinkles", 0.0, 1e3),
     ("nucleoli", 0.0, 100.0), ("body.rim", 1e-3, 10.0), ("rim", 0.0, 100.0), ("body.width", 0.05, 10.0),
     ("elongation", 0.1, 100.0), ("alpha", 0.0, 1.0), ("beta", 0.0, 2.0), ("waves", 0.0, 10.0), ("pallor", 0.0, 1.0),
@@ -122,6 +122,18 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
     });
     if reach_um > farthest_um {
         return Err(Cause::Reach(reach_um, farthest_um));
+    }
+    // Round leukocytes are drawn without lobes and without a size of their cytoplasm.
+    if let Body::Leukocyte(cell) = &object.body
+        && cell.form == NucleusForm::Lobed
+    {
+        for (field, value, low, high) in
+            [("cell_um", cell.cell_um, 0.1, 100.0), ("lobes", cell.lobes as f64, 1.0, 16.0)]
+        {
+            if value < low {
+                return Err(Cause::OutOfRange { field: format!("body.{field}"), value, low, high });
+            }
+        }
     }
     let most_um = MOST_REACHES * farthest_um;
     match object.centre_um.into_iter().find(|at| at.abs() > most_um) {
