@@ -20,7 +20,7 @@ use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
 use super::strew::strew;
 use super::view::View;
-use crate::debris::ground::Sieve;
+use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
