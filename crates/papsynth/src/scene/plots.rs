@@ -204,8 +204,7 @@ impl Population {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let count = named!("layout", layout.count);
                 let wanted = field.draw(count) * self.share;
-                let further =
-                    random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, count.0));
+                let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, count.0));
                 for cluster in 0..wanted as u64 + u64::from(further) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
