@@ -235,9 +235,9 @@ macro_rules! section {
     (@draw $Kind:ident $low:tt $value:expr, $rng:expr) => { $value };
 }
 
-/// The name of a number and the number itself: `named!(recipe.slide.depth_um)` is `("slide.depth_um", &…)`, and
-/// `named!(self.count)` is `("count", &…)`. With the path of a section, the name is the dotted path:
-/// `named!("layout", swath.width_um)` is `("layout.width_um", &…)`.
+/// The name of a number and the number itself: `named!(recipe.slide.depth_um)` names it `slide.depth_um`, and
+/// `named!(self.count)` names it `count`. With the path of a section, the name is the dotted path:
+/// `named!("layout", swath.width_um)` names it `layout.width_um`.
 macro_rules! named {
     ($section:literal, $owner:ident.$number:ident) => {
         (concat!($section, ".", stringify!($number)), &$owner.$number)

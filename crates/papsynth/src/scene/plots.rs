@@ -202,9 +202,9 @@ impl Population {
         for row in at[1] - reach..=at[1] + reach {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
-                let wanted = field.draw(named!("layout", layout.count)) * self.share;
-                let further =
-                    random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, "layout.count"));
+                let count = named!("layout", layout.count);
+                let wanted = field.draw(count) * self.share;
+                let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, count.0));
                 for cluster in 0..wanted as u64 + u64::from(further) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
