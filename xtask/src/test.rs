@@ -38,7 +38,7 @@ pub(crate) fn suite(
         // All but examples, which would be linked.
         tests.arg("--tests");
     }
-    shell::run(tests.args(arguments))?;
+    shell::run(tests.arg("--no-fail-fast").args(arguments))?;
     if arguments.is_empty() {
         shell::run(cargo(workspace, &["test"]).arg("--doc"))?;
     }

@@ -19,9 +19,12 @@ const SMALL: [usize; 2] = [192, 144];
 /// A field of small works: a few cells.
 const FIELD: [usize; 2] = [344, 260];
 
+/// What is counted of a work: its name, how often it is done before, and what makes it.
+type Counted = (&'static str, usize, fn() -> Work);
+
 /// Every work: its name, how often it is done before it is counted, and what makes it. The first time makes tables that are made
 /// once; a few cells a field meet the four periodic diagrams of the cytoskeleton only by and by: as many fields as meet them all.
-const WORKS: [(&str, usize, fn() -> Work); 12] = [
+const WORKS: [Counted; 12] = [
     ("sheets_paper", 1, || sheets(&ClothParams { steps: 6, ..ClothParams::paper() })),
     ("sheets_default", 1, || sheets(&ClothParams { steps: 2, ..ClothParams::default() })),
     ("thickness", 1, thickness),

@@ -13,8 +13,8 @@ pub struct Texture {
 /// A pixel of a source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Origin {
-    /// Which of the sources given to [`Quilter::new`].
+    /// Which of the sources given to [`Quilter::new`](crate::Quilter::new).
     pub source: usize,
-    /// Index into the pixels given to [`Source::new`].
+    /// Index into the pixels given to [`Source::new`](crate::Source::new).
     pub pixel: usize,
 }

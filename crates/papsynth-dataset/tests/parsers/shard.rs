@@ -8,10 +8,7 @@ use papsynth::model::Model;
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, ShardRecord, truths};
 use sha2::{Digest, Sha256};
 
-#[path = "../support/mod.rs"]
-mod support;
-
-use support::{SEED, Scratch, frame, recipe};
+use crate::support::{SEED, Scratch, frame, recipe};
 
 const RECORD: &str = "shards/000000.json";
 const COCO: &str = "shards/000000.coco.json";

@@ -17,7 +17,7 @@ fn get(study: &mut Study, target: &str) -> Reply {
 
 fn post(study: &mut Study, target: &str, body: &str) -> Reply {
     let content_type = Some(JSON.as_bytes());
-    study.reply(&Request { method: "POST", target, content_type, body: body.as_bytes(), ..Request::default() })
+    study.reply(&Request { method: "POST", target, content_type, body: body.as_bytes() })
 }
 
 fn state(study: &mut Study) -> serde_json::Value {
@@ -193,6 +193,6 @@ fn nonsense_is_refused_without_a_change() {
     assert_eq!(state(&mut study), before);
     let garbage = [0xff_u8, 0xfe, 0];
     let content_type = Some(JSON.as_bytes());
-    let request = Request { method: "POST", target: "/answer", content_type, body: &garbage, ..Request::default() };
+    let request = Request { method: "POST", target: "/answer", content_type, body: &garbage };
     assert_eq!(study.reply(&request).status, 400);
 }

@@ -11,6 +11,9 @@ const COMMENT_WIDTH: usize = 110;
 
 impl Recipe {
     /// The recipe as TOML, every field with its meaning as a comment.
+    ///
+    /// # Panics
+    /// Never: every recipe can be written as JSON.
     #[must_use]
     pub fn to_commented_toml(&self) -> String {
         let schema = Self::schema();
@@ -25,6 +28,9 @@ impl Recipe {
     }
 
     /// The recipe as plain TOML.
+    ///
+    /// # Panics
+    /// Never: every recipe can be written as TOML.
     #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("every recipe can be written as TOML")

@@ -15,9 +15,11 @@ const LEAST: usize = 235;
 fn recipes() -> [Recipe; 3] {
     let mut paper = Preset::Paper2015.recipe();
     paper.layout = Layout::Swath(Swath::default());
-    let mut colour = Recipe::default();
-    colour.light = Light::Colour(Colour::default());
-    colour.layout = Layout::Labels(Labels { path: "labels.png".to_owned(), ..Labels::default() });
+    let colour = Recipe {
+        light: Light::Colour(Colour::default()),
+        layout: Layout::Labels(Labels { path: "labels.png".to_owned(), ..Labels::default() }),
+        ..Recipe::default()
+    };
     [Recipe::default(), paper, colour]
 }
 
