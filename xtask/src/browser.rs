@@ -45,19 +45,16 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let folder = workspace.target.join("browser");
     let (synthetic, other, real) = (folder.join("synthetic"), folder.join("other"), folder.join("real"));
     let small = ["--frames", "2", "--set", "field.width_px=640", "--set", "field.height_px=520"];
-    dataset::generate(workspace, &[], &synthetic, small)?;
+    // The program of the tests, which they have built already.
+    shell::run(workspace.cargo_light(&["build"]).args(["--bin", "papsynth"]))?;
+    let program = workspace.target.join("debug").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
+    let generate = |out: &Path, more: &[&str]| dataset::generate(Command::new(&program), out, small.iter().chain(more));
+    generate(&synthetic, &[])?;
     // What stands for real: pictures without truth, of another preset. Whether it is makes no difference to the page.
-    dataset::generate(workspace, &[], &other, small.iter().chain(&["--preset", "high-grade", "--seed", "1"]))?;
+    generate(&other, &["--preset", "high-grade", "--seed", "1"])?;
     copy_pictures(&other.join("images"), &real)?;
-    let program = workspace.target.join("release").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
-    ensure!(program.exists(), "{} was not built", workspace.shown(&program));
     let stack = folder.join("stack");
-    dataset::generate(
-        workspace,
-        &[],
-        &stack,
-        small.iter().chain(&["--set", "focus.planes=5", "--set", "focus.step_um=1.5"]),
-    )?;
+    generate(&stack, &["--set", "focus.planes=5", "--set", "focus.step_um=1.5"])?;
     let run = |script: &Path, folders: &[&PathBuf]| {
         shell::run(Command::new(&python).arg(script).arg(&program).arg(chromium).args(folders))
     };

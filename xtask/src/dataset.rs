@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use anyhow::{Context, Result};
 
@@ -24,8 +25,9 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     arguments.finish()?;
     let folder = workspace.target.join("dataset");
     let (fields, stack) = (folder.join("fields"), folder.join("stack"));
-    generate(workspace, LEAN, &fields, ["--frames", "8"])?;
-    generate(workspace, LEAN, &stack, ["--frames", "1", "--set", "focus.planes=11", "--set", "focus.step_um=0.8"])?;
+    generate(program(workspace, ""), &fields, ["--frames", "8"])?;
+    let planes = ["--frames", "1", "--set", "focus.planes=11", "--set", "focus.step_um=0.8"];
+    generate(program(workspace, ""), &stack, planes)?;
     println!("\nEight labelled fields and a focus stack:");
     for folder in [fields, stack] {
         look_at(workspace, &folder)?;
@@ -33,24 +35,24 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Options of Cargo for the program that makes, checks and converts data sets, and does nothing else: the quickest build.
-pub(crate) const LEAN: &[&str] = &["--no-default-features"];
+/// The program that makes, checks and converts data sets and does nothing else, in release, with these features: the quickest build.
+pub(crate) fn program(workspace: &Workspace, features: &str) -> Command {
+    let mut command = workspace.cargo();
+    command.args(["run", "--release", "--package", "papsynth-cli", "--no-default-features"]);
+    command.args(["--features", features, "--"]);
+    command
+}
 
-/// Runs `papsynth generate` in release into a folder that is empty before. `build` are options of Cargo: which features
-/// the program has.
+/// Runs `papsynth generate` of a program into a folder that is empty before.
 pub(crate) fn generate<I: AsRef<OsStr>>(
-    workspace: &Workspace,
-    build: &[&str],
+    mut program: Command,
     out: &Path,
     arguments: impl IntoIterator<Item = I>,
 ) -> Result<()> {
     if out.exists() {
         fs::remove_dir_all(out).with_context(|| format!("cannot empty {}", out.display()))?;
     }
-    let mut command = workspace.cargo();
-    command.args(["run", "--release", "--package", "papsynth-cli"]).args(build);
-    command.args(["--", "generate", "--out"]).arg(out).args(arguments);
-    shell::run(&mut command)
+    shell::run(program.args(["generate", "--out"]).arg(out).args(arguments))
 }
 
 /// Prints what lies in a folder, a line for each folder in it and each file.

@@ -61,7 +61,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ("sixteen-bits", &["--frames", "1", "--camera", "scmos"]),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, &[], &out, own.iter().chain(&SMALL))?;
+        dataset::generate(dataset::program(workspace, ""), &out, own.iter().chain(&SMALL))?;
         shell::run(Command::new(&python).arg(script(workspace, "external.py")?).arg(&out))?;
     }
     let pages = workspace.root.join("docs/formats");
@@ -70,8 +70,6 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         true => (workspace::heavy_features_of("papsynth-cli"), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
         false => (String::new(), LIGHT_FORMATS.to_owned()),
     };
-    // The features that the browser has as well, so that both share one build.
-    let build = ["--features", features.as_str()];
     let formats = ["--format", formats.as_str()];
     for (name, own) in [
         ("all-fields", ["--frames", "3", "--frames-per-shard", "2"].as_slice()),
@@ -79,7 +77,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         ("all-colour", &[colour.as_slice(), &["--camera", "scmos", "--flatten", "max"]].concat()),
     ] {
         let out = folder.join(name);
-        dataset::generate(workspace, &build, &out, own.iter().chain(&SMALL).chain(&formats))?;
+        dataset::generate(dataset::program(workspace, &features), &out, own.iter().chain(&SMALL).chain(&formats))?;
         shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
         written.push(out);
     }
@@ -97,7 +95,7 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
             "--set",
             "field.height_px=1000",
         ];
-        dataset::generate(workspace, &build, &out, own)?;
+        dataset::generate(dataset::program(workspace, &features), &out, own)?;
         heavier(workspace, &written, &pages)?;
         train(workspace, &written)?;
         read_zarr(workspace, written.iter().chain([&out]), &pages)?;
@@ -177,9 +175,7 @@ fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBu
 /// A small slide, its deposit in the upper left corner.
 fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
     let _ = std::fs::remove_dir_all(out);
-    let mut cargo = workspace.cargo();
-    cargo.args(["run", "--release", "--package", "papsynth-cli"]).args(dataset::LEAN).arg("--features");
-    cargo.args([workspace::heavy_features_of("papsynth-cli").as_str(), "--"]);
+    let mut cargo = dataset::program(workspace, &workspace::heavy_features_of("papsynth-cli"));
     cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
     for place in ["x_um=200", "y_um=150", "radius_um=400"] {
         cargo.args(["--set", &format!("scan.deposit.{place}")]);

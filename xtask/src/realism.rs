@@ -76,7 +76,7 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
             // Few real fields are of one slide.
             let words: [OsString; 5] =
                 [recipe.into(), "--frames".into(), FRAMES.into(), "--set".into(), "slide.fields=1".into()];
-            dataset::generate(workspace, &[], &fields, words)?;
+            dataset::generate(program(workspace), &fields, words)?;
             let report = folder.join(format!("report-{what}-{grade}"));
             let mut judge = program(workspace);
             judge.arg("judge").arg(&halves[1]).arg(&fields).arg("--out").arg(&report);
@@ -206,7 +206,7 @@ fn forest(
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
     let recipe = recipe.map(OsString::from);
-    dataset::generate(workspace, &[], &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
+    dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
     let mut command = Command::new(&python);
     command.arg(&script).arg(&fields).arg(stack.join("extended_focus.png")).arg(stack.join("nuclei.png"));
     let output = command.output().with_context(|| format!("cannot run {}", workspace.shown(&script)))?;
