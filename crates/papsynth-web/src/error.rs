@@ -17,10 +17,10 @@ pub enum Error {
     },
     /// A data set or slide cannot be read.
     #[error(transparent)]
-    Dataset(#[from] papsynth_dataset::Error),
+    Dataset(Box<papsynth_dataset::Error>),
     /// A study cannot be kept on the disk.
     #[error(transparent)]
-    Study(#[from] papsynth_study::Error),
+    Study(Box<papsynth_study::Error>),
     /// The folder holds nothing that is shown.
     #[error("{}: {message}", path.display())]
     Folder {
@@ -29,6 +29,18 @@ pub enum Error {
         /// What is wrong, and what would help.
         message: String,
     },
+}
+
+impl From<papsynth_dataset::Error> for Error {
+    fn from(error: papsynth_dataset::Error) -> Self {
+        Self::Dataset(Box::new(error))
+    }
+}
+
+impl From<papsynth_study::Error> for Error {
+    fn from(error: papsynth_study::Error) -> Self {
+        Self::Study(Box::new(error))
+    }
 }
 
 impl Error {

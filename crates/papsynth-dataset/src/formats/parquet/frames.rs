@@ -1,6 +1,7 @@
 //! The frames of the format `huggingface`: a row each, in a file for each split of a shard.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fmt::Write;
 
 use papsynth::Plane;
@@ -148,15 +149,18 @@ impl Sink for Shard {
         let planes = std::mem::take(&mut self.planes).into_iter().enumerate();
         let planes = planes.map(|(number, png)| picture(format!("{key}.{number:03}{PICTURE}"), png));
         row.push(Value::List(planes.collect()));
-        if !self.files.contains_key(&split) {
-            let classes: Vec<String> = field.document.categories.iter().map(|category| category.name.clone()).collect();
-            let pending = files.folder.pending(&name)?;
-            let features = metadata(&columns(), &classes);
-            let writer = Writer::new(Box::new(pending.handle()?), columns(), &[("huggingface", &features)]);
-            self.files.insert(split, (pending, writer.map_err(failed("write", &path))?));
-        }
-        let written = self.files.get_mut(&split).map_or(Ok(()), |(_, writer)| writer.row(row));
-        written.map_err(failed("write", &path))
+        let (_, writer) = match self.files.entry(split) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let classes: Vec<String> =
+                    field.document.categories.iter().map(|category| category.name.clone()).collect();
+                let pending = files.folder.pending(&name)?;
+                let features = metadata(&columns(), &classes);
+                let writer = Writer::new(Box::new(pending.handle()?), columns(), &[("huggingface", &features)]);
+                entry.insert((pending, writer.map_err(failed("write", &path))?))
+            }
+        };
+        writer.row(row).map_err(failed("write", &path))
     }
 
     fn close(self: Box<Self>, files: &mut Files) -> Result<(), Error> {

@@ -310,10 +310,10 @@ mod tests {
     fn memory_is_bounded_by_a_group() {
         let scratch = Scratch::new("bounded-rows");
         let mut writer = begin(&scratch, vec![Column::new("data", Kind::Bytes)]);
-        for n in 1..=70_usize {
+        for n in 1..=70_u64 {
             writer.row(vec![vec![7_u8; 1 << 20].into()]).unwrap();
-            let written = scratch.join("table.parquet").metadata().unwrap().len() as usize;
-            assert!((n << 20) <= written + GROUP_BYTES + BUFFER_BYTES, "{written} bytes are written after {n} rows");
+            let written = scratch.join("table.parquet").metadata().unwrap().len();
+            assert!((n << 20) <= written + (GROUP_BYTES + BUFFER_BYTES) as u64, "{written} bytes are written after {n} rows");
         }
         writer.finish().unwrap();
         assert_eq!(reader(&scratch).num_row_groups(), 3);
