@@ -45,8 +45,8 @@ fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
     let folder = workspace.target.join("browser");
     let (synthetic, other, real) = (folder.join("synthetic"), folder.join("other"), folder.join("real"));
     let small = ["--frames", "2", "--set", "field.width_px=640", "--set", "field.height_px=520"];
-    // The program of the tests, which they have built already.
-    shell::run(workspace.cargo_light(&["build"]).args(["--bin", "papsynth"]))?;
+    // The program of the integration tests: built with them, because without their dependencies libraries have other features.
+    shell::run(workspace.cargo_light(&["test", "--no-run"]).args(["--test", "it"]))?;
     let program = workspace.target.join("debug").join(format!("papsynth{}", std::env::consts::EXE_SUFFIX));
     let generate = |out: &Path, more: &[&str]| dataset::generate(Command::new(&program), out, small.iter().chain(more));
     generate(&synthetic, &[])?;

@@ -313,7 +313,10 @@ mod tests {
         for n in 1..=70_u64 {
             writer.row(vec![vec![7_u8; 1 << 20].into()]).unwrap();
             let written = scratch.join("table.parquet").metadata().unwrap().len();
-            assert!((n << 20) <= written + (GROUP_BYTES + BUFFER_BYTES) as u64, "{written} bytes are written after {n} rows");
+            assert!(
+                (n << 20) <= written + (GROUP_BYTES + BUFFER_BYTES) as u64,
+                "{written} bytes are written after {n} rows"
+            );
         }
         writer.finish().unwrap();
         assert_eq!(reader(&scratch).num_row_groups(), 3);
