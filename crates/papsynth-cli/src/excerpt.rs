@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-/// Longest line of a file that is worth showing: beyond it an excerpt helps nobody.
+/// Longest line of a file that is worth showing: a longer line would fill the screen.
 const LONGEST_SHOWN_LINE: usize = 400;
 
 /// A place in a text that the user wrote.

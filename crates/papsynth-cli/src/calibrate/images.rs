@@ -72,7 +72,7 @@ pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>
 pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure> {
     let mut flats: Option<(Flats, u32)> = None;
     for Exposure { name, files, light } in &exposures(folder, args.dark.as_deref())? {
-        // One level at a time: nobody's memory holds them all.
+        // One level at a time, so that memory never holds them all.
         let images =
             files.iter().map(|file| GreyImage::read(file, &Limits::default())).collect::<Result<Vec<_>, _>>()?;
         let (flats, bits) = match &mut flats {
