@@ -1,11 +1,10 @@
-//! The state of sheets that are solved side by side, one in each lane.
+//! The state of sheets that are solved side by side, one in each lane, and both solvers.
 
-use crate::kernel::Real;
-use crate::lanes::{Curve, Lane, Node};
+use crate::lanes::{Binding, Curve, Lane, Node, advance, confine, project, single, verlet};
 use crate::mesh::{Disc, Pair};
 use crate::outline::distance;
 use crate::ring::{Ring, View};
-use crate::{Point, Vertex};
+use crate::{Point, VerletParams, Vertex, XpbdParams};
 
 /// What all sheets of a mesh share: which vertices are bound, and where each may meet the outline.
 #[derive(Debug)]
@@ -14,7 +13,7 @@ pub(crate) struct Topology {
     pub(crate) edges: [Vec<Pair>; 3],
     /// Distances across edges, likewise.
     pub(crate) bends: [Vec<Pair>; 3],
-    pub(crate) views: Vec<View>,
+    views: Vec<View>,
     pub(crate) rim: usize,
 }
 
@@ -45,28 +44,28 @@ pub(crate) struct Start {
 
 /// The state of `L` sheets.
 #[derive(Debug)]
-pub(crate) struct Batch<T, const L: usize> {
-    pub(crate) now: Vec<Node<T, L>>,
-    pub(crate) before: Vec<Node<T, L>>,
-    pub(crate) ring: Ring<T, L>,
+pub(crate) struct Batch<const L: usize> {
+    now: Vec<Node<L>>,
+    before: Vec<Node<L>>,
+    ring: Ring<L>,
     /// The outline at the start and at the end.
-    pub(crate) ways: [Curve<T, L>; 2],
+    ways: [Curve<L>; 2],
     /// Rest lengths of [`Topology::edges`] and [`Topology::bends`].
-    pub(crate) edges: [Vec<Lane<T, L>>; 3],
-    pub(crate) bends: [Vec<Lane<T, L>>; 3],
+    edges: [Vec<Lane<L>>; 3],
+    bends: [Vec<Lane<L>>; 3],
 }
 
-impl<T: Real, const L: usize> Batch<T, L> {
+impl<const L: usize> Batch<L> {
     /// # Panics
     ///
     /// If `starts` is empty; lanes beyond its length repeat the first.
-    pub(crate) fn new(topology: &Topology, starts: &[&Start]) -> Batch<T, L> {
+    pub(crate) fn new(topology: &Topology, starts: &[&Start]) -> Self {
         let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).copied().unwrap_or(starts[0]));
-        let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| T::of(value(s))));
-        let now: Vec<Node<T, L>> = (0..lanes[0].rest.len())
+        let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| single(value(s))));
+        let now: Vec<Node<L>> = (0..lanes[0].rest.len())
             .map(|v| [row(&|s| s.rest[v][0]), row(&|s| s.rest[v][1]), row(&|s| s.heights[v])])
             .collect();
-        let ways = [0, 1].map(|way| -> Curve<T, L> {
+        let ways = [0, 1].map(|way| -> Curve<L> {
             (0..lanes[0].outline[way].len()).map(|k| [0, 1].map(|axis| row(&|s| s.outline[way][k][axis]))).collect()
         });
         let lengths = |pairs: &Vec<Pair>| {
@@ -84,6 +83,83 @@ impl<T: Real, const L: usize> Batch<T, L> {
 
     /// The vertices of one lane.
     pub(crate) fn lane(&self, l: usize) -> Vec<Vertex> {
-        self.now.iter().map(|n| [n[0][l].to_f64(), n[1][l].to_f64(), n[2][l].to_f64()]).collect()
+        self.now.iter().map(|n| n.map(|lane| f64::from(lane[l]))).collect()
+    }
+
+    /// The paper's way: Eq. 4 on every vertex and on the outline, distances restored by projection, a ground plane.
+    #[inline(always)]
+    pub(crate) fn verlet(&mut self, topology: &Topology, steps: usize, params: &VerletParams) {
+        let keep = single(1.0 - params.damping);
+        let gravity = single(-params.gravity * params.dt_squared);
+        let attraction = single(params.attraction * params.dt_squared);
+        let rigid = Binding { weights: [1.0; 2], gain: 0.5, gives_way: f32::MAX };
+        for step in 1..=steps {
+            for _ in 0..params.passes {
+                for (pairs, lengths) in topology.edges.iter().zip(&self.edges) {
+                    project(&mut self.now, pairs, lengths, rigid);
+                }
+            }
+            let ring = self.ring.points.iter_mut().zip(&mut self.ring.before);
+            for ((point, before), target) in ring.zip(&self.ways[1]) {
+                for axis in 0..2 {
+                    for l in 0..L {
+                        let now = point[axis][l];
+                        point[axis][l] = verlet(now, before[axis][l], (target[axis][l] - now) * attraction, keep);
+                        before[axis][l] = now;
+                    }
+                }
+            }
+            advance(&mut self.now, &mut self.before, keep, gravity);
+            self.ring.press(&mut self.now, &topology.views, 0, step);
+            confine(&mut self.now, f32::MAX);
+        }
+    }
+
+    /// Small steps of extended position-based dynamics, the rim tied to an outline that eases from start to end.
+    #[inline(always)]
+    pub(crate) fn xpbd(&mut self, topology: &Topology, steps: usize, params: &XpbdParams) {
+        let (all, small) = ((steps * params.substeps) as f64, params.substeps as f64);
+        let keep = single(libm::pow(1.0 - params.damping, 1.0 / small));
+        let gravity = single(-params.gravity / (small * small));
+        // Of pairs with one end held on the rim, and of free ones. α̃ = α / Δt², with Δt in steps.
+        let bindings = |compliance: f64, gives_way: f32| {
+            [[0.0, 1.0], [1.0, 1.0]].map(|weights: [f64; 2]| Binding {
+                weights: weights.map(single),
+                gain: single(1.0 / (weights[0] + weights[1] + compliance * small * small)),
+                gives_way,
+            })
+        };
+        let stretch = bindings(params.stretch_compliance, f32::MAX);
+        let bend = bindings(params.bend_compliance, single(params.bend_yield));
+        for substep in 1..=steps * params.substeps {
+            let s = substep as f64 / all;
+            self.tie(topology.rim, single(s * s * (3.0 - 2.0 * s)));
+            advance(&mut self.now[topology.rim..], &mut self.before[topology.rim..], keep, gravity);
+            // The first set of pairs lies within the rim, which moves as it is told.
+            for set in 1..3 {
+                project(&mut self.now, &topology.edges[set], &self.edges[set], stretch[set - 1]);
+            }
+            for set in 1..3 {
+                project(&mut self.now, &topology.bends[set], &self.bends[set], bend[set - 1]);
+            }
+            confine(&mut self.now, single(params.ceiling));
+            if substep.is_multiple_of(params.substeps) {
+                self.ring.press(&mut self.now, &topology.views, topology.rim, substep / params.substeps);
+            }
+        }
+    }
+
+    /// Moves the outline, and the rim with it, to the place `moved` of the way from start to end.
+    #[inline(always)]
+    fn tie(&mut self, rim: usize, moved: f32) {
+        let [from, to] = &self.ways;
+        for (((point, node), a), b) in self.ring.points.iter_mut().zip(&mut self.now[..rim]).zip(from).zip(to) {
+            for axis in 0..2 {
+                for l in 0..L {
+                    point[axis][l] = a[axis][l] + (b[axis][l] - a[axis][l]) * moved;
+                    node[axis][l] = point[axis][l];
+                }
+            }
+        }
     }
 }

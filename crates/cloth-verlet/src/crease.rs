@@ -2,7 +2,6 @@
 
 use crate::outline::{moments, sides};
 use crate::params::range;
-use crate::sheet::edges;
 use crate::{Error, Point, Sheet};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -110,7 +109,7 @@ impl Sheet {
                 *v = [v[0] + (x - s) * normal[0], v[1] + (x - s) * normal[1], v[2] + z];
             }
         }
-        self.edges = Arc::new(edges(&self.triangles, self.vertices.len()));
+        self.pair_up();
         Ok(())
     }
 
@@ -121,19 +120,12 @@ impl Sheet {
         ahead.retain(|&t| self.triangles[t].iter().any(|&v| far[v as usize] - line > tolerance));
         let before = self.triangles.len();
         for &t in &*ahead {
-            // −1 this side, 0 on the line, 1 beyond.
-            let place = |v: u32| {
-                let s = far[v as usize] - line;
-                if s.abs() <= tolerance {
-                    0
-                } else if s < 0.0 {
-                    -1
-                } else {
-                    1
-                }
-            };
             let corners = self.triangles[t];
-            let places = corners.map(place);
+            // −1 this side, 0 on the line, 1 beyond.
+            let places = corners.map(|v| {
+                let s = far[v as usize] - line;
+                i32::from(s > tolerance) - i32::from(s < -tolerance)
+            });
             if !(places.contains(&-1) && places.contains(&1)) {
                 continue;
             }
@@ -172,9 +164,7 @@ impl Sheet {
             let radius = mix(self.radius[i], self.radius[j]);
             Arc::make_mut(&mut self.radius).push(radius);
             far.push(line);
-            #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
-            let new = far.len() as u32 - 1;
-            new
+            crate::refine::index(far.len() - 1)
         })
     }
 }
@@ -245,40 +235,21 @@ fn clipped(polygon: &[Point], line: f64) -> Vec<Vec<Point>> {
     let Some(start) = polygon.iter().position(|p| p[1] > line) else {
         return vec![polygon.to_vec()];
     };
+    let mut polygon = polygon.to_vec();
+    polygon.rotate_left(start);
     // Stretches below the line, each from where it comes down to where it goes up.
     let mut chains: Vec<Vec<Point>> = Vec::new();
-    let mut below = false;
-    let around =
-        (0..polygon.len()).map(|k| (polygon[(start + k) % polygon.len()], polygon[(start + k + 1) % polygon.len()]));
-    for (a, b) in around {
+    for (a, b) in sides(&polygon) {
         let crossing = || [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
-        match (below, b[1] <= line) {
-            (false, true) => {
-                chains.push(vec![crossing(), b]);
-                below = true;
-            }
-            (true, true) => chains.extend_last(b),
-            (true, false) => {
-                chains.extend_last(crossing());
-                below = false;
-            }
-            (false, false) => {}
+        let (from, to) = (a[1] <= line, b[1] <= line);
+        if to && !from {
+            chains.push(vec![crossing()]);
+        }
+        if let Some(chain) = chains.last_mut().filter(|_| from || to) {
+            chain.push(if to { b } else { crossing() });
         }
     }
     joined(chains)
-}
-
-/// Adds to the last of several chains.
-trait ExtendLast {
-    fn extend_last(&mut self, point: Point);
-}
-
-impl ExtendLast for Vec<Vec<Point>> {
-    fn extend_last(&mut self, point: Point) {
-        if let Some(last) = self.last_mut() {
-            last.push(point);
-        }
-    }
 }
 
 /// Closes chains along the line on which all of them start and end: of the crossings in order along it, each second gap is inside.
@@ -314,16 +285,16 @@ fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::Parts;
+    use crate::sheet::rim;
     use crate::testing::{angular, area, rng, wavy};
     use crate::{Cloth, ClothParams, View};
 
     const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, turn: Turn::Flap };
 
     fn flat() -> Sheet {
-        let sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
-        let vertices = sheet.rest.iter().map(|r| [30.0 + r[0], r[1] - 20.0, 0.0]).collect();
-        Sheet::new(Parts { vertices, rest: sheet.rest, radius: sheet.radius, triangles: sheet.triangles }, None)
+        let mut sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
+        sheet.vertices = sheet.rest.iter().map(|r| [30.0 + r[0], r[1] - 20.0, 0.0]).collect();
+        sheet
     }
 
     #[test]
@@ -371,24 +342,8 @@ mod tests {
         for (direction_rad, turn) in [(2.0, Turn::Flap), (0.3, Turn::Roll { turns: 1 })] {
             let crease = Crease { direction_rad, turn, ..CREASE };
             let mut sheet = flat();
-            // The flat sheet's own rim.
-            let rim: Vec<Point> = {
-                let mut next = BTreeMap::new();
-                for e in sheet.edges.iter() {
-                    match e.sides {
-                        [_, crate::sheet::OUTSIDE] => next.insert(e.ends[0], e.ends[1]),
-                        [crate::sheet::OUTSIDE, _] => next.insert(e.ends[1], e.ends[0]),
-                        _ => None,
-                    };
-                }
-                let mut at = 0;
-                (0..next.len())
-                    .map(|_| {
-                        at = next[&at];
-                        [sheet.vertices[at as usize][0], sheet.vertices[at as usize][1]]
-                    })
-                    .collect()
-            };
+            let place = |&(v, _): &(u32, u32)| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]];
+            let rim: Vec<Point> = rim(&sheet.edges).iter().map(place).collect();
             let pieces = crease_outline(&rim, &crease).unwrap();
             let areas: f64 = pieces.iter().map(|p| area(p)).sum();
             sheet.fold(&crease).unwrap();
@@ -406,7 +361,6 @@ mod tests {
             let insides: Vec<crate::outline::Inside> = pieces.iter().map(|p| crate::outline::Inside::new(p)).collect();
             let mut wrong = 0;
             for (k, &value) in image.iter().enumerate() {
-                #[expect(clippy::cast_precision_loss, reason = "pixel numbers")]
                 let p = [view.origin[0] + (k % 250) as f64, view.origin[1] + (k / 250) as f64];
                 let covered = |x: f64, y: f64| insides.iter().any(|i| i.contains([p[0] + x, p[1] + y]));
                 // A pixel cut by the silhouette may be thick although its centre is free.

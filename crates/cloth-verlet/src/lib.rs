@@ -7,7 +7,6 @@ mod crease;
 mod error;
 #[cfg(any(feature = "mint", feature = "nalgebra"))]
 mod interop;
-mod kernel;
 mod lanes;
 mod mesh;
 mod outline;
@@ -19,8 +18,6 @@ mod ring;
 mod sheet;
 #[cfg(test)]
 mod testing;
-mod verlet;
-mod xpbd;
 
 pub use cloth::{Cloth, Job};
 pub use crease::{Crease, Turn, crease_outline};

@@ -1,9 +1,9 @@
 //! The disc that every sheet is cut from: one triangulation for all, so that sheets can be solved side by side.
 
+use crate::sheet::edges;
 use crate::{Error, Point};
 use multiversion::multiversion;
 use spade::{DelaunayTriangulation, Triangulation};
-use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 /// The paper's mesh: 75 vertices on the rim of 538.
@@ -43,7 +43,7 @@ impl Disc {
             relax(&mut points, rim, &triangles);
         }
         let triangles = delaunay(&points)?;
-        let (edges, bends) = pairs(&triangles);
+        let (edges, bends) = pairs(&triangles, points.len());
         let harmonics = harmonics(&points, rim);
         Ok(Disc { rim, triangles, edges: ordered(&edges, &points), bends: ordered(&bends, &points), harmonics, points })
     }
@@ -69,18 +69,12 @@ fn add_multiples(xs: &mut [f64], ys: &mut [f64], weights: &[f64], [x, y]: Point)
 }
 
 /// Number of vertices on the rim and inside, in the proportion of the paper's mesh.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "counts far below 2^32"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts far below 2^32")]
 fn split(vertices: usize) -> (usize, usize) {
     let rim = (RIM_OF_PAPER.0 * (vertices as f64 / RIM_OF_PAPER.1).sqrt()).round() as usize;
     (rim, vertices - rim)
 }
 
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
 fn sunflower(rim: usize, inner: usize) -> Vec<Point> {
     let reach = 1.0 - PI / rim as f64;
     let on_rim = (0..rim).map(|k| (1.0, TAU * k as f64 / rim as f64));
@@ -118,32 +112,25 @@ fn relax(points: &mut [Point], rim: usize, triangles: &[[u32; 3]]) {
 }
 
 /// Edges, and for each inner edge the two vertices opposite it.
-fn pairs(triangles: &[[u32; 3]]) -> (Vec<Pair>, Vec<Pair>) {
-    let mut opposite: BTreeMap<Pair, Vec<u32>> = BTreeMap::new();
-    for &[a, b, c] in triangles {
-        for (i, j, k) in [(a, b, c), (b, c, a), (c, a, b)] {
-            opposite.entry([i.min(j), i.max(j)]).or_default().push(k);
-        }
-    }
-    let bends = opposite.values().filter(|o| o.len() == 2).map(|o| [o[0].min(o[1]), o[0].max(o[1])]).collect();
-    (opposite.into_keys().collect(), bends)
+fn pairs(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Pair>, Vec<Pair>) {
+    let mut edges = edges(triangles, vertices);
+    edges.sort_unstable_by_key(|e| e.ends);
+    let bends = edges.iter().filter_map(|e| match e.opposite(triangles)[..] {
+        [a, b] => Some([a.min(b), a.max(b)]),
+        _ => None,
+    });
+    (edges.iter().map(|e| e.ends).collect(), bends.collect())
 }
 
 /// Orders pairs for the solver: patch by patch, so that what a patch needs stays in the first cache, the patches scattered over the disc,
 /// so that no direction is preferred; within a patch in sets without a common vertex, so that neighbours in the list never
 /// wait for each other.
 fn ordered(pairs: &[Pair], points: &[Point]) -> Vec<Pair> {
-    let patches = patches(pairs, points);
-    patches.iter().flat_map(|patch| coloured(patch, points.len())).collect()
+    patches(pairs, points).iter().flat_map(|patch| coloured(patch, points.len())).collect()
 }
 
 /// Pairs by the square of a grid over the disc that their middle lies in.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "patch numbers, far below 2^32"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "patch numbers, far below 2^32")]
 fn patches(pairs: &[Pair], points: &[Point]) -> Vec<Vec<Pair>> {
     let side = (points.len() as f64 / PATCH).sqrt().ceil() as usize;
     let mut patches = vec![Vec::new(); side * side];
@@ -176,11 +163,8 @@ fn coloured(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
 
 /// Weights of the trigonometric polynomial through the rim, continued inwards:
 /// w = (1/K) ∑_l r^|l| cos l(θ - θ_k), |l| ≤ K/2.
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
 fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
-    let k_count = rim as f64;
-    let circle = &points[..rim];
-    circle
+    points[..rim]
         .iter()
         .map(|&[cos_k, sin_k]| {
             let weight = |&[x, y]: &Point| {
@@ -195,7 +179,7 @@ fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
                 if rim.is_multiple_of(2) {
                     sum += power[0];
                 }
-                sum / k_count
+                sum / rim as f64
             };
             points[rim..].iter().map(weight).collect()
         })
@@ -255,13 +239,10 @@ mod tests {
     #[test]
     fn patches_are_small_and_hold_every_pair_once() {
         let disc = Disc::new(2000).unwrap();
-        let (mut edges, bends) = pairs(&disc.triangles);
+        let (mut edges, bends) = pairs(&disc.triangles, 2000);
         for (found, all) in [(&disc.edges, &edges), (&disc.bends, &bends)] {
-            let mut found = found.clone();
-            found.sort_unstable();
-            let mut all = all.clone();
-            all.sort_unstable();
-            assert_eq!(found, all);
+            let sorted = |pairs: &[Pair]| BTreeSet::from_iter(pairs.to_vec());
+            assert_eq!((found.len(), sorted(found)), (all.len(), sorted(all)));
         }
         edges.reverse();
         for patch in patches(&edges, &disc.points) {

@@ -39,7 +39,6 @@ impl Outline {
     }
 
     /// The point that stands `offset` in 0..1 of the way round, and `count - 1` more at equal arcs.
-    #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
     pub(crate) fn resampled(&self, count: usize, offset: f64) -> Vec<Point> {
         let sides = || sides(&self.points);
         let perimeter: f64 = sides().map(|(a, b)| distance(a, b)).sum();
@@ -64,12 +63,7 @@ impl Outline {
 
     /// The outline's own corners in the order in which a walk from `offset` meets them: which of `count` equal arcs each lies in,
     /// how far along it, and where.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "arc numbers below count"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "arc numbers below count")]
     pub(crate) fn corners(&self, count: usize, offset: f64) -> Vec<(usize, f64, Point)> {
         let perimeter: f64 = sides(&self.points).map(|(a, b)| distance(a, b)).sum();
         let mut walked = 0.0;
@@ -124,12 +118,7 @@ pub(crate) struct Inside {
 }
 
 impl Inside {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "band numbers below count"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "band numbers below count")]
     pub(crate) fn new(points: &[Point]) -> Inside {
         let sides: Vec<(Point, Point)> = sides(points).collect();
         let boxes: Vec<[Point; 2]> = sides.chunks(GROUP).map(bounds).collect();
@@ -206,7 +195,7 @@ fn bounds(sides: &[(Point, Point)]) -> [Point; 2] {
 mod tests {
     use super::*;
     use crate::testing::{angular, rng, wavy};
-    use rand_core::Rng;
+    use portable_numerics::random::uniform;
 
     #[test]
     fn an_outline_is_centred_scaled_and_turned() {
@@ -248,7 +237,7 @@ mod tests {
         let points = Outline::new(&wavy(5.0, 0.3)).unwrap().points;
         let inside = Inside::new(&points);
         let mut rng = rng(2);
-        let mut value = || 3.6 * (f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5);
+        let mut value = || 3.6 * (uniform(&mut rng) - 0.5);
         let mut strays = 0;
         for _ in 0..2000 {
             let p = [value(), value()];

@@ -4,6 +4,7 @@ use crate::mesh::cross;
 use crate::sheet::{Edge, OUTSIDE};
 use crate::{Point, Sheet, Vertex};
 use multiversion::multiversion;
+use std::ops::Range;
 
 /// Where the picture lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,27 +42,15 @@ impl Sheet {
     /// If the image is not made of whole rows, or `view.pixel` is not above 0.
     pub fn thickness_into(&self, image: &mut [f32], width: usize, view: &View, thickness: impl Fn(f64) -> f64) {
         assert!(width > 0 && image.len().is_multiple_of(width), "{} pixels are no whole rows of {width}", image.len());
-        self.thickness_rows(width, image.len() / width, view, thickness, |first, values| {
-            add(&mut image[first..first + values.len()], values);
-        });
-    }
-
-    /// Gives the thickness of all pixels that the sheet may touch, row by row: the index of the first, and their values.
-    fn thickness_rows(
-        &self,
-        width: usize,
-        height: usize,
-        view: &View,
-        thickness: impl Fn(f64) -> f64,
-        mut put: impl FnMut(usize, &[f64]),
-    ) {
         assert!(view.pixel > 0.0, "pixel = {}: must be above 0", view.pixel);
         let scale = 1.0 / view.pixel;
-        let Some(canvas) = self.canvas(width, height, view) else {
+        let [columns, rows] = self.reach([width, image.len() / width], view);
+        if columns.is_empty() || rows.is_empty() {
             return;
-        };
-        // The canvas's first pixel covers 0..1 here, and lengths are in pixels.
-        let shift = [0, 1].map(|axis| view.origin[axis] + (canvas.first[axis] - 0.5) * view.pixel);
+        }
+        // The first pixel in reach covers 0..1 here, and lengths are in pixels.
+        let first = [columns.start as f64, rows.start as f64];
+        let shift = [0, 1].map(|axis| view.origin[axis] + (first[axis] - 0.5) * view.pixel);
         let place = |v: &Vertex| [(v[0] - shift[0]) * scale, (v[1] - shift[1]) * scale];
         let places: Vec<Point> = self.vertices.iter().map(place).collect();
         let profile: Vec<f64> = self.radius.iter().map(|&r| thickness(r)).collect();
@@ -81,18 +70,16 @@ impl Sheet {
         let greatest = density.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
         let planes: Vec<Plane> =
             self.triangles.iter().map(|t| plane(t.map(|v| (places[v as usize], density[v as usize])))).collect();
-        // One column more than the canvas takes what goes on beyond it.
-        let stride = canvas.width + 1;
-        let mut sums = vec![[0.0; 2]; stride * canvas.height.next_multiple_of(ABREAST)];
-        sweep(&mut sums[..stride * canvas.height], stride, &self.edges, &places, &planes);
-        let mut lines = vec![0.0; ABREAST * canvas.width];
-        for (rows, steps) in sums.chunks_exact(ABREAST * stride).enumerate() {
+        // One column more takes what goes on beyond.
+        let stride = columns.len() + 1;
+        let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ABREAST)];
+        sweep(&mut sums[..stride * rows.len()], stride, &self.edges, &places, &planes);
+        let mut lines = vec![0.0; ABREAST * columns.len()];
+        let mut image = image[rows.start * width..rows.end * width].chunks_exact_mut(width);
+        for steps in sums.chunks_exact(ABREAST * stride) {
             integrate(&mut lines, steps, NOTHING * greatest);
-            for (k, line) in lines.chunks_exact(canvas.width).enumerate() {
-                let row = rows * ABREAST + k;
-                if row < canvas.height {
-                    put(canvas.start + row * width, line);
-                }
+            for (line, row) in lines.chunks_exact(columns.len()).zip(&mut image) {
+                add(&mut row[columns.clone()], line);
             }
         }
     }
@@ -120,42 +107,19 @@ impl Sheet {
         }
     }
 
-    /// The part of the image that the sheet may touch.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the image"
-    )]
-    fn canvas(&self, width: usize, height: usize, view: &View) -> Option<Canvas> {
-        let size = [width, height];
-        let [(left, right), (top, bottom)] = [0, 1].map(|axis| {
-            let extent = self
-                .vertices
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v[axis]), h.max(v[axis])));
+    /// Columns and rows of the image that the sheet may touch.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the image")]
+    fn reach(&self, size: [usize; 2], view: &View) -> [Range<usize>; 2] {
+        [0, 1].map(|axis| {
+            let bounds = |(low, high): (f64, f64), v: &Vertex| (low.min(v[axis]), high.max(v[axis]));
+            let (low, high) = self.vertices.iter().fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
             // Half a pixel, as pixels reach that far from their centres.
             let pixel = |x: f64, end: f64| {
                 ((x - view.origin[axis]) / view.pixel + 0.5 + end).clamp(0.0, size[axis] as f64) as usize
             };
-            (pixel(extent.0, 0.0), pixel(extent.1, 1.0))
-        });
-        (left < right && top < bottom).then(|| Canvas {
-            first: [left as f64, top as f64],
-            start: top * width + left,
-            width: right - left,
-            height: bottom - top,
+            pixel(low, 0.0)..pixel(high, 1.0)
         })
     }
-}
-
-/// A part of an image.
-struct Canvas {
-    /// Column and row of its first pixel, and that pixel's index.
-    first: Point,
-    start: usize,
-    width: usize,
-    height: usize,
 }
 
 /// The linear thickness through three corners, negative where the triangle shows its back, so that the sweep adds it all the same.
@@ -209,7 +173,6 @@ fn add(pixels: &mut [f32], values: &[f64]) {
 /// Adds all edges. A triangle is what lies right of its edges that run up, less what lies right of those that run down; each edge
 /// stands for both its triangles by the difference of their planes.
 #[multiversion(targets = "simd")]
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
 fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], planes: &[Plane]) {
     let (width, height) = ((stride - 1) as f64, (sums.len() / stride) as f64);
     let within = |[x, y]: Point| x >= 0.0 && x < width && y >= 0.0 && y < height;
@@ -235,12 +198,7 @@ fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], pla
 /// Adds `plane` over all that lies right of the edge from `a` down to `b`, row by row. Unless the edge is `CLIPPED` it lies within
 /// the canvas.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
-    reason = "rows clipped to the image"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows clipped to the image")]
 fn add_edge<const CLIPPED: bool>(sums: &mut [Step], stride: usize, a: Point, b: Point, plane: Plane) {
     let slope = (b[0] - a[0]) / (b[1] - a[1]);
     // Unused where the edge is upright.
@@ -270,7 +228,7 @@ fn add_edge<const CLIPPED: bool>(sums: &mut [Step], stride: usize, a: Point, b: 
 
 /// The part of an edge within one row, pixel by pixel.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "columns clipped to the image")]
+#[expect(clippy::cast_possible_truncation, reason = "columns clipped to the image")]
 fn add_run<const CLIPPED: bool>(line: &mut [Step], from: Point, to: Point, per_column: f64, plane: Plane) {
     let columns = line.len() as f64;
     let column = |x: f64| if CLIPPED { (x.clamp(-1.0, columns) + 1.0) as i32 - 1 } else { x as i32 };
@@ -319,14 +277,12 @@ fn add_piece(line: &mut [Step], column: i32, a: Point, b: Point, [p0, p1, p2]: P
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::Parts;
     use crate::testing::{rng, wavy};
     use crate::{Cloth, ClothParams};
-    use rand_core::Rng;
-    use std::sync::Arc;
+    use portable_numerics::random::uniform;
 
     const VIEW: View = View { origin: [-90.0, -140.0], pixel: 1.3 };
-    const SIZE: (usize, usize) = (190, 185);
+    const PLAIN: View = View { origin: [0.0, 0.0], pixel: 1.0 };
 
     fn profile(r: f64) -> f64 {
         1.4 - r * r
@@ -336,52 +292,30 @@ mod tests {
         Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(3.0, 0.15), &mut rng(3)).unwrap()
     }
 
-    fn picture(sheet: &Sheet, thickness: impl Fn(f64) -> f64) -> Vec<f64> {
-        let mut image = vec![0.0; SIZE.0 * SIZE.1];
-        sheet.thickness_rows(SIZE.0, SIZE.1, &VIEW, thickness, |first, values| {
-            image[first..first + values.len()].copy_from_slice(values);
-        });
-        image
+    fn picture(sheet: &Sheet, [width, height]: [usize; 2], view: &View, thickness: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut image = vec![0.0_f32; width * height];
+        sheet.thickness_into(&mut image, width, view, thickness);
+        image.into_iter().map(f64::from).collect()
     }
 
     /// A square of two triangles, tilted about y, with its corner at (10, 10).
     fn square(side: f64, slope: f64) -> Sheet {
         let rest = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]];
         let cos = 1.0 / (1.0 + slope * slope).sqrt();
-        Sheet::new(
-            Parts {
-                vertices: rest.map(|[x, y]| [10.0 + x * cos, 10.0 + y, x * cos * slope]).to_vec(),
-                rest: rest.to_vec(),
-                radius: vec![0.5; 4].into(),
-                triangles: vec![[0, 1, 2], [0, 2, 3]].into(),
-            },
-            None,
-        )
+        let vertices = rest.map(|[x, y]| [10.0 + x * cos, 10.0 + y, x * cos * slope]).to_vec();
+        Sheet::new(vertices, rest.to_vec(), vec![0.5; 4], vec![[0, 1, 2], [0, 2, 3]])
     }
 
     #[test]
     fn law_25_the_picture_holds_the_sheets_volume() {
-        let sheet = crumpled();
-        let volume = sheet.volume(profile);
-        let sum: f64 = picture(&sheet, profile).iter().sum::<f64>() * VIEW.pixel * VIEW.pixel;
-        assert!((sum / volume - 1.0).abs() < 1e-9, "{sum} {volume}");
-        let mut image = vec![0.0_f32; SIZE.0 * SIZE.1];
-        sheet.thickness_into(&mut image, SIZE.0, &VIEW, profile);
-        let sum: f64 = image.iter().map(|&v| f64::from(v)).sum::<f64>() * VIEW.pixel * VIEW.pixel;
-        assert!((sum / volume - 1.0).abs() < 1e-7, "{sum} {volume}");
-        assert!(image.iter().all(|&v| v >= 0.0));
-    }
-
-    #[test]
-    fn law_25_holds_where_triangles_of_the_hem_have_no_area() {
+        // Triangles of the hem have no area where the outline has corners.
         let outline = [[10.0, 5.0], [90.0, 12.0], [70.0, 40.0], [95.0, 80.0], [30.0, 90.0], [4.0, 50.0]];
         let cloth = Cloth::new(&ClothParams { vertices: 400, ..ClothParams::default() }).unwrap();
-        for seed in 0..6 {
-            let sheet = cloth.crumple(&outline, &mut rng(seed)).unwrap();
-            let mut image = vec![0.0_f32; 100 * 100];
-            sheet.thickness_into(&mut image, 100, &View { origin: [0.0, 0.0], pixel: 1.0 }, profile);
-            let sum: f64 = image.iter().map(|&v| f64::from(v)).sum();
-            assert!((sum / sheet.volume(profile) - 1.0).abs() < 1e-6, "{seed}: {sum}");
+        let cornered = (0..6).map(|seed| (cloth.crumple(&outline, &mut rng(seed)).unwrap(), [100; 2], PLAIN));
+        for (sheet, size, view) in cornered.chain([(crumpled(), [190, 185], VIEW)]) {
+            let image = picture(&sheet, size, &view, profile);
+            let sum = image.iter().sum::<f64>() * view.pixel * view.pixel;
+            assert!((sum / sheet.volume(profile) - 1.0).abs() < 1e-7, "{sum}");
             assert!(image.iter().all(|&v| v >= 0.0));
         }
     }
@@ -392,103 +326,62 @@ mod tests {
         for (v, r) in sheet.vertices.iter_mut().zip(&sheet.rest) {
             *v = [30.0 + r[0], -20.0 + r[1], 0.0];
         }
-        let image = picture(&sheet, |_| 0.7);
+        let image = picture(&sheet, [190, 185], &VIEW, |_| 0.7);
         let (inside, rim): (Vec<f64>, Vec<f64>) = image.iter().filter(|&&v| v > 0.0).partition(|&&v| v > 0.7 - 1e-6);
         assert!(inside.len() > 15_000 && rim.len() < 1000, "{} {}", inside.len(), rim.len());
         assert!(inside.iter().all(|v| (v - 0.7).abs() < 1e-6));
     }
 
     #[test]
-    fn law_25_a_tilted_plane_is_thicker_by_its_normal() {
-        for slope in [0.0, 0.5, 3.0] {
-            let sheet = square(40.0, slope);
-            let mut image = vec![0.0_f32; 60 * 60];
-            sheet.thickness_into(&mut image, 60, &View { origin: [0.0, 0.0], pixel: 1.0 }, |_| 0.3);
+    fn law_25_a_tilted_plane_is_thicker_by_its_normal_and_pixels_hold_their_exact_share() {
+        for (slope, side) in [(0.0, 1.5), (0.5, 1.5), (3.0, 7.0)] {
+            // A square whose corner lies a quarter into a pixel.
+            let view = View { origin: [10.25, 10.25], pixel: 1.0 };
             // |n_z| = 1 / √(1 + slope²)
-            let wanted = 0.3 * libm::sqrt(1.0 + slope * slope);
-            assert!((f64::from(image[30 * 60 + 15]) - wanted).abs() < 1e-6 * wanted);
+            let steep = libm::sqrt(1.0 + slope * slope);
+            let part = |k: usize, side: f64| (side + 0.25 - k as f64).clamp(0.0, if k == 0 { 0.75 } else { 1.0 });
+            for (k, value) in picture(&square(side, slope), [9; 2], &view, |_| 0.3).iter().enumerate() {
+                let wanted = 0.3 * steep * part(k % 9, side / steep) * part(k / 9, side);
+                assert!((value - wanted).abs() < 1e-6, "{k}: {value} {wanted}");
+            }
         }
     }
 
-    #[test]
-    fn law_25_the_order_of_triangles_does_not_matter() {
-        let sheet = crumpled();
-        let mut triangles = sheet.triangles.to_vec();
-        triangles.reverse();
-        for t in triangles.iter_mut().step_by(2) {
-            t.rotate_left(1);
-        }
-        let other = Sheet::new(
-            Parts {
-                vertices: sheet.vertices.clone(),
-                rest: sheet.rest.clone(),
-                radius: sheet.radius.clone(),
-                triangles: triangles.into(),
-            },
-            None,
-        );
-        for (a, b) in picture(&sheet, profile).iter().zip(picture(&other, profile)) {
-            assert!((a - b).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn pixels_hold_their_exact_share() {
-        // A square of side 1.5 pixels whose corner lies a quarter into a pixel.
-        let sheet = square(1.5, 0.0);
-        let mut image = vec![0.0_f32; 9];
-        sheet.thickness_into(&mut image, 3, &View { origin: [10.25, 10.25], pixel: 1.0 }, |_| 1.0);
-        let part = [0.75, 0.75, 0.0];
-        for (k, value) in image.iter().enumerate() {
-            assert!((f64::from(*value) - part[k % 3] * part[k / 3]).abs() < 1e-6, "{k}: {value}");
-        }
-    }
-
-    /// The picture by brute force: many points in each triangle.
+    /// The picture by brute force: many points in each triangle, some of which show their backs.
     #[test]
     fn the_sweep_agrees_with_sampling() {
         let mut rng = rng(4);
-        let mut value = |scale: f64| scale * f64::from(rng.next_u32()) / f64::from(u32::MAX);
-        let parts = Parts {
-            vertices: (0..9).map(|_| [value(14.0) - 2.0, value(14.0) - 2.0, 0.0]).collect(),
-            rest: (0..9).map(|k| [f64::from(k % 3), f64::from(k / 3)]).collect(),
-            radius: Arc::new((0..9).map(|_| value(1.0)).collect()),
-            triangles: vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7], [3, 7, 6], [4, 5, 8], [4, 8, 7]]
-                .into(),
-        };
-        let sheet = Sheet::new(parts, None);
-        let mut image = vec![0.0; 100];
-        sheet.thickness_rows(
-            10,
-            10,
-            &View { origin: [0.0, 0.0], pixel: 1.0 },
-            |r| 1.0 + r,
-            |first, values| image[first..first + values.len()].copy_from_slice(values),
+        let mut value = |scale: f64| scale * uniform(&mut rng);
+        let sheet = Sheet::new(
+            (0..9).map(|_| [value(14.0) - 2.0, value(14.0) - 2.0, 0.0]).collect(),
+            (0..9).map(|k| [f64::from(k % 3), f64::from(k / 3)]).collect(),
+            (0..9).map(|_| value(1.0)).collect(),
+            vec![[0, 1, 4], [4, 3, 0], [1, 2, 5], [5, 4, 1], [3, 4, 7], [6, 3, 7], [4, 5, 8], [7, 4, 8]],
         );
+        let image = picture(&sheet, [10; 2], &PLAIN, |r| 1.0 + r);
+        let places: Vec<Point> = sheet.vertices.iter().map(|v| [v[0], v[1]]).collect();
         let mut gathered = [[0.0; 2]; 9];
         for (t, corners) in sheet.triangles.iter().enumerate() {
-            let places = corners.map(|v| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]]);
+            let [a, b, c] = corners.map(|v| places[v as usize]);
+            let mean = corners.iter().map(|&v| 1.0 + sheet.radius[v as usize]).sum::<f64>() / 3.0;
             for &v in corners {
-                gathered[v as usize][0] +=
-                    sheet.rest_area_of(t) * corners.iter().map(|&v| 1.0 + sheet.radius[v as usize]).sum::<f64>() / 9.0;
-                gathered[v as usize][1] += cross(places[0], places[1], places[2]).abs() / 6.0;
+                gathered[v as usize][0] += sheet.rest_area_of(t) * mean / 3.0;
+                gathered[v as usize][1] += cross(a, b, c).abs() / 6.0;
             }
         }
         let mut sampled = vec![0.0; 100];
         for corners in sheet.triangles.iter() {
-            let [a, b, c] =
-                corners.map(|v| (sheet.vertices[v as usize], gathered[v as usize][0] / gathered[v as usize][1]));
-            let area = 0.5 * cross([a.0[0], a.0[1]], [b.0[0], b.0[1]], [c.0[0], c.0[1]]).abs();
+            let [a, b, c] = corners.map(|v| places[v as usize]);
+            let [da, db, dc] = corners.map(|v| gathered[v as usize][0] / gathered[v as usize][1]);
             let steps = 600;
             for (i, j) in (0..steps).flat_map(|i| (0..steps - i).map(move |j| (i, j))) {
-                let (u, v) =
-                    ((f64::from(i) + 1.0 / 3.0) / f64::from(steps), (f64::from(j) + 1.0 / 3.0) / f64::from(steps));
+                let [u, v] = [i, j].map(|k| (f64::from(k) + 1.0 / 3.0) / f64::from(steps));
                 let mix = |p: f64, q: f64, r: f64| p + u * (q - p) + v * (r - p);
-                let (x, y) = ((mix(a.0[0], b.0[0], c.0[0]) + 0.5).floor(), (mix(a.0[1], b.0[1], c.0[1]) + 0.5).floor());
+                let [x, y] = [0, 1].map(|axis| (mix(a[axis], b[axis], c[axis]) + 0.5).floor());
                 if (0.0..10.0).contains(&x) && (0.0..10.0).contains(&y) {
                     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 99")]
                     let pixel = (y * 10.0 + x) as usize;
-                    sampled[pixel] += mix(a.1, b.1, c.1) * area * 2.0 / f64::from(steps * (steps + 1));
+                    sampled[pixel] += mix(da, db, dc) * cross(a, b, c).abs() / f64::from(steps * (steps + 1));
                 }
             }
         }
@@ -501,35 +394,27 @@ mod tests {
     #[test]
     fn a_part_of_the_picture_is_the_part_of_the_picture() {
         let sheet = crumpled();
-        let whole = picture(&sheet, profile);
-        let mut part = vec![0.0_f32; 50 * 40];
+        let whole = picture(&sheet, [190, 185], &VIEW, profile);
         let view = View { origin: [VIEW.origin[0] + 70.0 * VIEW.pixel, VIEW.origin[1] + 60.0 * VIEW.pixel], ..VIEW };
-        sheet.thickness_into(&mut part, 50, &view, profile);
-        for (k, value) in part.iter().enumerate() {
-            let wanted = whole[(60 + k / 50) * SIZE.0 + 70 + k % 50];
-            assert!((f64::from(*value) - wanted).abs() < 1e-5, "{k}: {value} {wanted}");
+        for (k, value) in picture(&sheet, [50, 40], &view, profile).iter().enumerate() {
+            let wanted = whole[(60 + k / 50) * 190 + 70 + k % 50];
+            assert!((value - wanted).abs() < 1e-5, "{k}: {value} {wanted}");
         }
-        let mut away = vec![0.0_f32; 100];
-        sheet.thickness_into(&mut away, 10, &View { origin: [1e4, 0.0], pixel: 1.0 }, profile);
-        assert!(away.iter().all(|&v| v == 0.0));
+        let away = picture(&sheet, [10; 2], &View { origin: [1e4, 0.0], pixel: 1.0 }, profile);
+        assert_eq!(away, [0.0; 100]);
     }
 
     #[test]
     fn a_corner_on_edge_leaves_its_volume_to_its_neighbours() {
-        let mut sheet = square(10.0, 0.0);
+        let Sheet { vertices, rest, triangles, .. } = square(10.0, 0.0);
         // A triangle that stands on the square's corner like a flag on its pole.
-        sheet = Sheet::new(
-            Parts {
-                vertices: [&sheet.vertices[..], &[[10.0, 10.0, 7.0], [10.0, 10.0, 9.0]]].concat(),
-                rest: [&sheet.rest[..], &[[-1.0, 0.0], [0.0, -1.0]]].concat(),
-                radius: vec![0.5; 6].into(),
-                triangles: [&sheet.triangles[..], &[[0, 4, 5]]].concat().into(),
-            },
-            None,
+        let sheet = Sheet::new(
+            [&vertices[..], &[[10.0, 10.0, 7.0], [10.0, 10.0, 9.0]]].concat(),
+            [&rest[..], &[[-1.0, 0.0], [0.0, -1.0]]].concat(),
+            vec![0.5; 6],
+            [&triangles[..], &[[0, 4, 5]]].concat(),
         );
-        let mut image = vec![0.0_f32; 30 * 30];
-        sheet.thickness_into(&mut image, 30, &View { origin: [0.0, 0.0], pixel: 1.0 }, |_| 1.0);
-        let sum: f64 = image.iter().map(|&v| f64::from(v)).sum();
+        let sum: f64 = picture(&sheet, [30; 2], &PLAIN, |_| 1.0).iter().sum();
         assert!((sum - 100.5).abs() < 1e-4, "{sum}");
     }
 

@@ -78,7 +78,6 @@ fn round(
 
 /// Points at equal angles on the unit circle.
 fn circle(count: usize) -> Vec<Point> {
-    #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
     (0..count).map(|k| TAU * k as f64 / count as f64).map(|angle| [libm::cos(angle), libm::sin(angle)]).collect()
 }
 
@@ -94,12 +93,7 @@ fn turn(curve: &[Point]) -> Point {
 }
 
 /// The curve smoothed by a Gaussian of `width` parts of the way round.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "counts far below 2^31"
-)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts far below 2^31")]
 fn smoothed(curve: &[Point], width: f64) -> Vec<Point> {
     let count = curve.len();
     let sigma = width * count as f64;
@@ -139,7 +133,6 @@ fn grown<R: Rng + ?Sized>(target: &[Point], excess: f64, rng: &mut R) -> Vec<Poi
         let notch = (soft[k][0] - target[k][0]) * n[0] + (soft[k][1] - target[k][1]) * n[1];
         let mut depth = PUSH_EVERYWHERE + PUSH_INTO_NOTCH * notch.max(0.0);
         for [at, width, most] in pushes {
-            #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
             let apart = (k as f64 / count as f64 - at).abs();
             let bell = libm::cos(0.5 * PI * (apart.min(1.0 - apart) / width).min(1.0));
             depth += most * bell * bell;
@@ -162,7 +155,6 @@ fn grown<R: Rng + ?Sized>(target: &[Point], excess: f64, rng: &mut R) -> Vec<Poi
 /// The disc's mesh laid out within the curve. A curve too crooked for that is smoothed until it fits; in the end it is convex,
 /// where harmonic coordinates never fold (Radó, Kneser and Choquet).
 fn flattened(disc: &Disc, curve: &[Point], excess: f64) -> Vec<Point> {
-    #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
     let narrowest = 1.0 / disc.rim as f64;
     let area = PI * excess;
     let rim = |curve: &[Point]| -> Vec<Point> {
@@ -183,7 +175,6 @@ fn flattened(disc: &Disc, curve: &[Point], excess: f64) -> Vec<Point> {
 }
 
 /// The point `k / count` of the way round, counted in the curve's points.
-#[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
 fn between(curve: &[Point], k: usize, count: usize) -> Point {
     let whole = k * curve.len() / count;
     let part = (k * curve.len() % count) as f64 / count as f64;

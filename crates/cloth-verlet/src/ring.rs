@@ -1,8 +1,7 @@
 //! The outline in motion, and how it pushes the vertices that it touches.
 
 use crate::Point;
-use crate::kernel::Real;
-use crate::lanes::{Curve, Lane, Node};
+use crate::lanes::{Curve, Lane, Node, TINY, at_least, at_most};
 use std::f64::consts::TAU;
 
 /// Half of the part of the outline that a vertex on the rim looks at for its nearest side: an eighth of the way round.
@@ -13,12 +12,12 @@ const WIDEST: f64 = 0.25;
 const LONGEST: u32 = 4;
 /// Distance by which a vertex and the outline are expected to near each other in a step: this many times the way of the outline's
 /// fastest point, and this much more, in equivalent radii.
-const HASTE: (f64, f64) = (2.0, 1e-3);
+const HASTE: (f32, f32) = (2.0, 1e-3);
 
 /// Sides that follow each other and are passed over together where all lanes have met a nearer one.
 const GROUP: usize = 4;
 /// What the circle round a group is wider by than its corners lie apart, in equivalent radii: a hundred times the rounding of f32.
-const SPARE: f64 = 1e-5;
+const SPARE: f32 = 1e-5;
 
 /// The sides of the outline that a vertex may meet: `count` groups, from the group `own` on by turns to both sides.
 #[derive(Debug, Clone, Copy)]
@@ -28,12 +27,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "side numbers, reduced to 0..sides"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "side numbers, reduced to 0..sides")]
     pub(crate) fn from([x, y]: Point, sides: usize) -> View {
         let count = sides as f64;
         let half = (count * HALF_VIEW / (x * x + y * y).sqrt().max(WIDEST)).ceil() as usize;
@@ -57,49 +51,48 @@ impl View {
 
 /// A corner of the outline and the side that starts there.
 #[derive(Debug, Clone, Copy)]
-struct Corner<T, const L: usize> {
-    at: [Lane<T, L>; 2],
+struct Corner<const L: usize> {
+    at: [Lane<L>; 2],
     /// Outward normal, of any length. Interpolated along a side, it tells outside from inside even where a corner is nearest.
-    normal: [Lane<T, L>; 2],
+    normal: [Lane<L>; 2],
     /// 1 / length² of the side.
-    inverse: Lane<T, L>,
+    inverse: Lane<L>,
 }
 
 /// A circle that holds a group of sides.
 #[derive(Debug, Clone, Copy)]
-struct Circle<T, const L: usize> {
-    middle: [Lane<T, L>; 2],
-    radius: Lane<T, L>,
+struct Circle<const L: usize> {
+    middle: [Lane<L>; 2],
+    radius: Lane<L>,
 }
 
-impl<T: Real, const L: usize> Circle<T, L> {
+impl<const L: usize> Circle<L> {
     /// Round corners that follow each other.
     #[inline(always)]
-    fn round(corners: &[Corner<T, L>]) -> Circle<T, L> {
+    fn round(corners: &[Corner<L>]) -> Circle<L> {
         let (first, last) = (&corners[0].at, &corners[corners.len() - 1].at);
-        let zero = Lane([T::ZERO; L]);
-        let (mut middle, mut radius) = ([zero; 2], zero);
+        let (mut middle, mut radius) = ([Lane::ZERO; 2], Lane::ZERO);
         for axis in 0..2 {
             for l in 0..L {
-                middle[axis][l] = T::of(0.5) * (first[axis][l] + last[axis][l]);
+                middle[axis][l] = 0.5 * (first[axis][l] + last[axis][l]);
             }
         }
         for corner in corners {
             for l in 0..L {
                 let (x, y) = (corner.at[0][l] - middle[0][l], corner.at[1][l] - middle[1][l]);
-                radius[l] = radius[l].at_least(x * x + y * y);
+                radius[l] = at_least(radius[l], x * x + y * y);
             }
         }
-        Circle { middle, radius: Lane(radius.0.map(|square| square.sqrt() + T::of(SPARE))) }
+        Circle { middle, radius: Lane(radius.0.map(|square| square.sqrt() + SPARE)) }
     }
 
     /// Whether, in any lane, something in the circle may be as near to `p` as `limit`.
     #[inline(always)]
-    fn reaches(&self, [px, py]: &[Lane<T, L>; 2], limit: &Lane<T, L>) -> bool {
+    fn reaches(&self, [px, py]: &[Lane<L>; 2], limit: &Lane<L>) -> bool {
         let mut near = false;
         for l in 0..L {
             let (x, y) = (px[l] - self.middle[0][l], py[l] - self.middle[1][l]);
-            let reach = (limit[l] + self.radius[l]).at_least(T::ZERO);
+            let reach = at_least(limit[l] + self.radius[l], 0.0);
             near |= x * x + y * y <= reach * reach;
         }
         near
@@ -108,40 +101,39 @@ impl<T: Real, const L: usize> Circle<T, L> {
 
 /// The outline of every lane.
 #[derive(Debug)]
-pub(crate) struct Ring<T, const L: usize> {
-    pub(crate) points: Curve<T, L>,
+pub(crate) struct Ring<const L: usize> {
+    pub(crate) points: Curve<L>,
     /// Points of the step before, for Eq. 4.
-    pub(crate) before: Curve<T, L>,
+    pub(crate) before: Curve<L>,
     /// One more than there are points: the last is the first.
-    corners: Vec<Corner<T, L>>,
+    corners: Vec<Corner<L>>,
     /// One round each [`GROUP`] of sides.
-    circles: Vec<Circle<T, L>>,
+    circles: Vec<Circle<L>>,
     /// How far each vertex may still go before it could be outside.
-    slack: Vec<Lane<T, L>>,
+    slack: Vec<Lane<L>>,
 }
 
-impl<T: Real, const L: usize> Ring<T, L> {
-    pub(crate) fn new(points: Curve<T, L>, vertices: usize) -> Ring<T, L> {
-        let corner =
-            |&at: &[Lane<T, L>; 2]| Corner { at, normal: [Lane([T::ZERO; L]); 2], inverse: Lane([T::ZERO; L]) };
+impl<const L: usize> Ring<L> {
+    pub(crate) fn new(points: Curve<L>, vertices: usize) -> Ring<L> {
+        let corner = |&at: &[Lane<L>; 2]| Corner { at, normal: [Lane::ZERO; 2], inverse: Lane::ZERO };
         let corners = points.iter().chain(points.first()).map(corner).collect();
-        let nowhere = Circle { middle: [Lane([T::ZERO; L]); 2], radius: Lane([T::ZERO; L]) };
+        let nowhere = Circle { middle: [Lane::ZERO; 2], radius: Lane::ZERO };
         Ring {
             corners,
             circles: vec![nowhere; points.len().div_ceil(GROUP)],
             before: points.clone(),
             points,
-            slack: vec![Lane([T::ZERO; L]); vertices],
+            slack: vec![Lane::ZERO; vertices],
         }
     }
 
     /// Moves every vertex from `first` on that is outside to the nearest of the sides in its view, after step `step`.
     #[inline(always)]
-    pub(crate) fn press(&mut self, now: &mut [Node<T, L>], views: &[View], first: usize, step: usize) {
+    pub(crate) fn press(&mut self, now: &mut [Node<L>], views: &[View], first: usize, step: usize) {
         let pace = self.measure();
         // A vertex is looked at before its slack is used up, in a step that is a multiple of as great a power of two as may be: so
         // the lanes, which all wait for one, are looked at together.
-        let stride = T::of(f64::from(1_u32 << step.trailing_zeros().min(LONGEST)));
+        let stride = (1_u32 << step.trailing_zeros().min(LONGEST)) as f32;
         for ((node, view), slack) in now.iter_mut().zip(views).zip(&mut self.slack).skip(first) {
             let mut any = false;
             for l in 0..L {
@@ -153,11 +145,11 @@ impl<T: Real, const L: usize> Ring<T, L> {
                 let due: [bool; L] = std::array::from_fn(|l| slack[l] < pace[l] * stride);
                 let nearest = Nearest::to(&[node[0], node[1]], &due, &self.corners, &self.circles, view);
                 for l in 0..L {
-                    let outside = nearest.outwards[l] > T::ZERO;
+                    let outside = nearest.outwards[l] > 0.0;
                     for (value, off) in node.iter_mut().zip(&nearest.off) {
                         value[l] = if due[l] & outside { value[l] - off[l] } else { value[l] };
                     }
-                    let gap = if outside { T::ZERO } else { nearest.away[l].sqrt() };
+                    let gap = if outside { 0.0 } else { nearest.away[l].sqrt() };
                     slack[l] = if due[l] { gap } else { slack[l] };
                 }
             }
@@ -166,17 +158,17 @@ impl<T: Real, const L: usize> Ring<T, L> {
 
     /// Brings the corners up to date with the points; returns how far a vertex may have come towards a side meanwhile.
     #[inline(always)]
-    fn measure(&mut self) -> Lane<T, L> {
+    fn measure(&mut self) -> Lane<L> {
         let count = self.points.len();
-        let mut fastest = Lane([T::ZERO; L]);
+        let mut fastest = Lane::ZERO;
         for k in 0..count {
             let (a, b) = (self.points[k], self.points[if k + 1 < count { k + 1 } else { 0 }]);
             let corner = &mut self.corners[k];
             for l in 0..L {
                 let (mx, my) = (a[0][l] - corner.at[0][l], a[1][l] - corner.at[1][l]);
-                fastest[l] = fastest[l].at_least(mx * mx + my * my);
+                fastest[l] = at_least(fastest[l], mx * mx + my * my);
                 let (ux, uy) = (b[0][l] - a[0][l], b[1][l] - a[1][l]);
-                let inverse = T::ONE / (ux * ux + uy * uy + T::TINY);
+                let inverse = 1.0 / (ux * ux + uy * uy + TINY);
                 let unit = inverse.sqrt();
                 corner.inverse[l] = inverse;
                 // For now the normal of the side alone.
@@ -199,7 +191,7 @@ impl<T: Real, const L: usize> Ring<T, L> {
         for (group, circle) in self.circles.iter_mut().enumerate() {
             *circle = Circle::round(group_of(&self.corners, group));
         }
-        Lane(fastest.0.map(|square| square.sqrt() * T::of(HASTE.0) + T::of(HASTE.1)))
+        Lane(fastest.0.map(|square| square.sqrt() * HASTE.0 + HASTE.1))
     }
 }
 
@@ -212,26 +204,20 @@ fn group_of<C>(corners: &[C], group: usize) -> &[C] {
 
 /// The nearest point of the outline found so far.
 #[derive(Debug)]
-struct Nearest<T, const L: usize> {
+struct Nearest<const L: usize> {
     /// Square of its distance.
-    away: Lane<T, L>,
+    away: Lane<L>,
     /// From there to the vertex.
-    off: [Lane<T, L>; 2],
+    off: [Lane<L>; 2],
     /// How far outwards that is.
-    outwards: Lane<T, L>,
+    outwards: Lane<L>,
 }
 
-impl<T: Real, const L: usize> Nearest<T, L> {
+impl<const L: usize> Nearest<L> {
     /// Looks at the sides in view of a vertex at `p`, in the lanes where that is `due`; the others hold anything.
     #[inline(always)]
-    fn to(
-        p: &[Lane<T, L>; 2],
-        due: &[bool; L],
-        corners: &[Corner<T, L>],
-        circles: &[Circle<T, L>],
-        view: &View,
-    ) -> Nearest<T, L> {
-        let (zero, far) = (Lane([T::ZERO; L]), T::of(f64::from(f32::MAX)));
+    fn to(p: &[Lane<L>; 2], due: &[bool; L], corners: &[Corner<L>], circles: &[Circle<L>], view: &View) -> Nearest<L> {
+        let (zero, far) = (Lane::ZERO, f32::MAX);
         let mut nearest = Nearest { away: Lane([far; L]), off: [zero; 2], outwards: zero };
         let mut limit = Lane(due.map(|due| if due { far } else { -far }));
         for group in view.groups(circles.len()) {
@@ -249,18 +235,18 @@ impl<T: Real, const L: usize> Nearest<T, L> {
 
     /// Looks at the side from `a` to `b`.
     #[inline(always)]
-    fn meet(&mut self, [px, py]: &[Lane<T, L>; 2], a: &Corner<T, L>, b: &Corner<T, L>) {
+    fn meet(&mut self, [px, py]: &[Lane<L>; 2], a: &Corner<L>, b: &Corner<L>) {
         for l in 0..L {
             let (rx, ry) = (px[l] - a.at[0][l], py[l] - a.at[1][l]);
             let (ux, uy) = (b.at[0][l] - a.at[0][l], b.at[1][l] - a.at[1][l]);
-            let t = ((rx * ux + ry * uy) * a.inverse[l]).at_least(T::ZERO).at_most(T::ONE);
+            let t = at_most(at_least((rx * ux + ry * uy) * a.inverse[l], 0.0), 1.0);
             let (ex, ey) = (rx - t * ux, ry - t * uy);
             let away = ex * ex + ey * ey;
             let nx = a.normal[0][l] + t * (b.normal[0][l] - a.normal[0][l]);
             let ny = a.normal[1][l] + t * (b.normal[1][l] - a.normal[1][l]);
             // Weights of 1 and 0 instead of a choice: a masked store could not be read back without waiting for it.
-            let (new, old) = if away < self.away[l] { (T::ONE, T::ZERO) } else { (T::ZERO, T::ONE) };
-            self.away[l] = self.away[l].at_most(away);
+            let (new, old) = if away < self.away[l] { (1.0, 0.0) } else { (0.0, 1.0) };
+            self.away[l] = at_most(self.away[l], away);
             self.off[0][l] = new * ex + old * self.off[0][l];
             self.off[1][l] = new * ey + old * self.off[1][l];
             self.outwards[l] = new * (ex * nx + ey * ny) + old * self.outwards[l];
@@ -271,11 +257,12 @@ impl<T: Real, const L: usize> Nearest<T, L> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::single;
     use crate::testing::rng;
-    use rand_core::Rng;
+    use portable_numerics::random::uniform;
 
     /// Every side of the groups in view, in the view's order.
-    fn slow<const L: usize>(p: &[Lane<f32, L>; 2], ring: &Ring<f32, L>, view: &View) -> Nearest<f32, L> {
+    fn slow<const L: usize>(p: &[Lane<L>; 2], ring: &Ring<L>, view: &View) -> Nearest<L> {
         let zero = Lane([0.0; L]);
         let mut nearest = Nearest { away: Lane([f32::MAX; L]), off: [zero; 2], outwards: zero };
         for group in view.groups(ring.circles.len()) {
@@ -289,13 +276,12 @@ mod tests {
     /// Rings with notches, and points in and around them and on their corners; lanes that are due or not.
     fn agree<const L: usize>(sides: usize, seed: u64) {
         let mut rng = rng(seed);
-        let mut value = || f64::from(rng.next_u32()) / f64::from(u32::MAX);
-        let curve: Curve<f32, L> = (0..sides)
+        let mut value = || uniform(&mut rng);
+        let curve: Curve<L> = (0..sides)
             .map(|k| {
-                #[expect(clippy::cast_precision_loss, reason = "a small count")]
                 let angle = TAU * k as f64 / sides as f64;
                 let radii: [f64; L] = std::array::from_fn(|_| 0.8 + 0.2 * libm::cos(3.0 * angle) + 0.1 * value());
-                [libm::cos(angle), libm::sin(angle)].map(|c| Lane(radii.map(|r| f32::of(r * c))))
+                [libm::cos(angle), libm::sin(angle)].map(|c| Lane(radii.map(|r| single(r * c))))
             })
             .collect();
         let mut ring = Ring::new(curve, 0);
@@ -305,7 +291,7 @@ mod tests {
             let p = if k % 4 == 0 {
                 ring.corners[k % sides].at
             } else {
-                place.map(|c| Lane(std::array::from_fn(|_| f32::of(c + 0.1 * value()))))
+                place.map(|c| Lane(std::array::from_fn(|_| single(c + 0.1 * value()))))
             };
             let due: [bool; L] = std::array::from_fn(|_| value() < 0.7);
             let view = View::from(place, sides);
@@ -313,7 +299,7 @@ mod tests {
             let wanted = slow(&p, &ring, &view);
             for l in (0..L).filter(|&l| due[l]) {
                 // All but the sign of zero, which nothing depends on.
-                let found = |n: &Nearest<f32, L>| [n.away[l], n.off[0][l], n.off[1][l], n.outwards[l]];
+                let found = |n: &Nearest<L>| [n.away[l], n.off[0][l], n.off[1][l], n.outwards[l]];
                 assert_eq!(found(&quick), found(&wanted), "{sides} sides, point {k}, lane {l}");
             }
         }
@@ -340,7 +326,6 @@ mod tests {
                 groups.dedup();
                 assert_eq!(groups.len(), view.count as usize);
                 assert!(groups.iter().all(|&g| g < all));
-                #[expect(clippy::cast_precision_loss, reason = "small counts")]
                 let part = seen as f64 / sides as f64;
                 assert!(part >= (2.0 * HALF_VIEW / radius.max(WIDEST)).min(1.0), "{sides} {k}: {part}");
             }

@@ -1,6 +1,7 @@
 use crate::mesh::cross;
 use crate::outline::distance;
 use crate::{Point, Vertex};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Stands for the outside where an edge has a triangle on one side only.
@@ -17,15 +18,6 @@ pub struct Sheet {
     pub(crate) edges: Arc<Vec<Edge>>,
 }
 
-/// A sheet as plain lists, in units of the outline's equivalent radius.
-#[derive(Debug)]
-pub(crate) struct Parts {
-    pub(crate) vertices: Vec<Vertex>,
-    pub(crate) rest: Vec<Point>,
-    pub(crate) radius: Arc<Vec<f64>>,
-    pub(crate) triangles: Arc<Vec<[u32; 3]>>,
-}
-
 /// An edge from `ends[0]` to `ends[1]` with the triangles on its left and right, or [`OUTSIDE`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Edge {
@@ -33,12 +25,25 @@ pub(crate) struct Edge {
     pub(crate) sides: [u32; 2],
 }
 
+impl Edge {
+    /// The third corners of its one or two triangles, in the order of these.
+    pub(crate) fn opposite(&self, triangles: &[[u32; 3]]) -> Vec<u32> {
+        let mut sides = self.sides;
+        sides.sort_unstable();
+        let third = |&t: &u32| triangles.get(t as usize)?.iter().copied().find(|v| !self.ends.contains(v));
+        sides.iter().filter_map(third).collect()
+    }
+}
+
 impl Sheet {
-    /// Pairs up the sides of the triangles unless their `edges` are known.
-    pub(crate) fn new(parts: Parts, known: Option<Arc<Vec<Edge>>>) -> Sheet {
-        let Parts { vertices, rest, radius, triangles } = parts;
-        let edges = known.unwrap_or_else(|| Arc::new(edges(&triangles, vertices.len())));
-        Sheet { vertices, rest, radius, triangles, edges }
+    pub(crate) fn new(vertices: Vec<Vertex>, rest: Vec<Point>, radius: Vec<f64>, triangles: Vec<[u32; 3]>) -> Sheet {
+        let edges = Arc::new(edges(&triangles, vertices.len()));
+        Sheet { vertices, rest, radius: Arc::new(radius), triangles: Arc::new(triangles), edges }
+    }
+
+    /// Finds the edges anew, after triangles have been divided.
+    pub(crate) fn pair_up(&mut self) {
+        self.edges = Arc::new(edges(&self.triangles, self.vertices.len()));
     }
 
     /// Where the sheet is. z ≥ 0 is the height above the ground.
@@ -116,10 +121,21 @@ impl Sheet {
             let strain = (flat * flat + (p[2] - q[2]) * (p[2] - q[2])).sqrt() / rest - 1.0;
             sum += strain * strain;
         }
-        #[expect(clippy::cast_precision_loss, reason = "counts far below 2^52")]
-        let count = self.edges.len() as f64;
-        (sum / count).sqrt()
+        (sum / self.edges.len() as f64).sqrt()
     }
+}
+
+/// The rim from vertex 0 on: each vertex with the triangle inside the side that starts there.
+pub(crate) fn rim(edges: &[Edge]) -> Vec<(u32, u32)> {
+    let outer = edges.iter().filter_map(|e| match e.sides {
+        [t, OUTSIDE] => Some((e.ends[0], (e.ends[1], t))),
+        [OUTSIDE, t] => Some((e.ends[1], (e.ends[0], t))),
+        _ => None,
+    });
+    let next: BTreeMap<u32, (u32, u32)> = outer.collect();
+    let mut at = 0;
+    let step = |_| next.get(&at).map(|&(to, t)| (std::mem::replace(&mut at, to), t));
+    (0..next.len()).map_while(step).collect()
 }
 
 /// Pairs up the sides of all triangles.
@@ -166,8 +182,7 @@ mod tests {
         let folded = |height: f64| {
             let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, height], [1.0, 1.0, height], [2.0, 0.5, height]];
             let rest = vertices.iter().map(|v| [v[0], v[1]]).collect();
-            let triangles = Arc::new(vec![[0, 1, 2], [1, 3, 2]]);
-            Sheet::new(Parts { vertices, rest, radius: Arc::default(), triangles }, None).normals()
+            Sheet::new(vertices, rest, vec![0.0; 4], vec![[0, 1, 2], [1, 3, 2]]).normals()
         };
         assert_eq!(folded(0.0), [up; 4]);
         let normals = folded(1.0);
