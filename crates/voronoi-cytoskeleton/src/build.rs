@@ -47,11 +47,10 @@ pub(crate) fn build(sites: Vec<Point>, window: Window) -> Result<Diagram, Error>
     if sites.is_empty() || delaunay.num_vertices() != sites.len() {
         return Err(refused(delaunay.num_vertices()));
     }
-    let mut builder = Builder::new(&window, &delaunay);
+    let mut builder = Builder::new(sites, window, &delaunay);
     builder.clip_edges();
     builder.walk_cells();
-    let Builder { vertices, inner, edges, cell_ends, cell_vertices, .. } = builder;
-    Ok(Diagram { window, sites, vertices, inner, edges, cell_ends, cell_vertices })
+    Ok(builder.diagram)
 }
 
 impl Diagram {
@@ -91,29 +90,24 @@ impl Diagram {
 }
 
 struct Builder<'a> {
-    window: &'a Window,
     delaunay: &'a Delaunay,
+    /// What has been built so far. Cells come in the order of their sites.
+    diagram: Diagram,
     /// Vertex of each Delaunay triangle whose circumcentre lies inside.
     centres: Vec<Option<usize>>,
-    vertices: Vec<Point>,
-    /// Number of vertices inside; those on the border follow.
-    inner: usize,
     /// How far along the border each vertex on it lies.
     reaches: Vec<f64>,
     /// Vertices of the window's corners that are in use.
     corners: Vec<Option<usize>>,
-    edges: Vec<Edge>,
     /// Number of the Voronoi edge dual to each Delaunay edge, where any of it lies inside.
     duals: Vec<Option<usize>>,
-    /// Sites of the cells, in the order of the walk, are those of the triangulation; their ends are by site.
-    cell_ends: Vec<usize>,
-    cell_vertices: Vec<usize>,
 }
 
 impl<'a> Builder<'a> {
-    fn new(window: &'a Window, delaunay: &'a Delaunay) -> Self {
+    fn new(sites: Vec<Point>, window: Window, delaunay: &'a Delaunay) -> Self {
+        let (count, edges) = (sites.len(), delaunay.num_undirected_edges());
         let mut centres = vec![None; delaunay.num_all_faces()];
-        let mut vertices = Vec::with_capacity(delaunay.num_all_faces() + delaunay.num_vertices());
+        let mut vertices = Vec::with_capacity(centres.len() + count);
         for face in delaunay.inner_faces() {
             let Point2 { x, y } = face.circumcenter();
             if window.contains([x, y]) {
@@ -121,19 +115,17 @@ impl<'a> Builder<'a> {
                 vertices.push([x, y]);
             }
         }
-        Self {
+        let corners = vec![None; window.corners().len()];
+        let diagram = Diagram {
             window,
-            delaunay,
-            centres,
+            sites,
             inner: vertices.len(),
             vertices,
-            reaches: Vec::new(),
-            corners: vec![None; window.corners().len()],
-            edges: Vec::with_capacity(delaunay.num_undirected_edges() + delaunay.num_vertices()),
-            duals: Vec::with_capacity(delaunay.num_undirected_edges()),
-            cell_ends: Vec::with_capacity(delaunay.num_vertices()),
-            cell_vertices: Vec::with_capacity(7 * delaunay.num_vertices()),
-        }
+            edges: Vec::with_capacity(edges + count),
+            cell_ends: Vec::with_capacity(count),
+            cell_vertices: Vec::with_capacity(7 * count),
+        };
+        Self { delaunay, diagram, centres, reaches: Vec::new(), corners, duals: Vec::with_capacity(edges) }
     }
 
     /// The Voronoi edges, each from its triangle on the right to its triangle on the left of the Delaunay edge.
@@ -141,8 +133,12 @@ impl<'a> Builder<'a> {
         for edge in self.delaunay.undirected_edges() {
             let edge = edge.as_directed();
             let dual = self.clip_edge(edge).map(|ends| {
-                self.edges.push(Edge { ends, cell: edge.from().data().site, neighbour: Some(edge.to().data().site) });
-                self.edges.len() - 1
+                self.diagram.edges.push(Edge {
+                    ends,
+                    cell: edge.from().data().site,
+                    neighbour: Some(edge.to().data().site),
+                });
+                self.diagram.edges.len() - 1
             });
             self.duals.push(dual);
         }
@@ -169,7 +165,7 @@ impl<'a> Builder<'a> {
                     })
                 };
                 let range = [place(edge.rev(), f64::NEG_INFINITY), place(edge, f64::INFINITY)];
-                let cuts = self.window.clip(middle, direction, range)?;
+                let cuts = self.diagram.window.clip(middle, direction, range)?;
                 Some(cuts.map(|t| self.border_at(along(middle, direction, t))))
             }
         }
@@ -177,16 +173,16 @@ impl<'a> Builder<'a> {
 
     /// Where the way from a vertex inside leaves the window.
     fn exit(&mut self, from: usize, direction: Point) -> usize {
-        let origin = self.vertices[from];
-        let point = along(origin, direction, self.window.exit(origin, direction));
-        self.border_at(point)
+        let origin = self.diagram.vertices[from];
+        let t = self.diagram.window.clip(origin, direction, [0.0, f64::INFINITY]).map_or(0.0, |[_, exit]| exit);
+        self.border_at(along(origin, direction, t))
     }
 
     /// A new vertex on the border.
     fn border_at(&mut self, point: Point) -> usize {
-        self.reaches.push(self.window.reach_of(point));
-        self.vertices.push(point);
-        self.vertices.len() - 1
+        self.reaches.push(self.diagram.window.reach_of(point));
+        self.diagram.vertices.push(point);
+        self.diagram.vertices.len() - 1
     }
 
     /// The vertex of a corner of the window.
@@ -194,11 +190,10 @@ impl<'a> Builder<'a> {
         if let Some(vertex) = self.corners[corner] {
             return vertex;
         }
-        self.reaches.push(self.window.reach_of_corner(corner));
-        self.vertices.push(self.window.corners()[corner]);
-        let vertex = self.vertices.len() - 1;
-        self.corners[corner] = Some(vertex);
-        vertex
+        self.reaches.push(self.diagram.window.reach[corner]);
+        self.diagram.vertices.push(self.diagram.window.corners()[corner]);
+        self.corners[corner] = Some(self.diagram.vertices.len() - 1);
+        self.diagram.vertices.len() - 1
     }
 
     fn walk_cells(&mut self) {
@@ -209,44 +204,41 @@ impl<'a> Builder<'a> {
         }
         for (site, vertex) in by_site.into_iter().enumerate() {
             let Some(vertex) = vertex else { continue };
-            let start = self.cell_vertices.len();
+            let start = self.diagram.cell_vertices.len();
             let delaunay = self.delaunay;
             for edge in delaunay.vertex(vertex).out_edges() {
-                let Some(dual) = self.duals[edge.as_undirected().fix().index()] else {
-                    continue;
-                };
-                let [mut from, mut to] = self.edges[dual].ends;
-                if self.edges[dual].cell != site {
+                let Some(dual) = self.duals[edge.as_undirected().fix().index()] else { continue };
+                let [mut from, mut to] = self.diagram.edges[dual].ends;
+                if self.diagram.edges[dual].cell != site {
                     (from, to) = (to, from);
                 }
-                match self.cell_vertices[start..].last() {
-                    Some(&last) if last == from => {}
-                    Some(&last) => {
+                let last = self.diagram.cell_vertices[start..].last().copied();
+                if last != Some(from) {
+                    if let Some(last) = last {
                         self.walk_border(site, last, from);
-                        self.cell_vertices.push(from);
                     }
-                    None => self.cell_vertices.push(from),
+                    self.diagram.cell_vertices.push(from);
                 }
-                self.cell_vertices.push(to);
+                self.diagram.cell_vertices.push(to);
             }
             self.close(site, start);
-            self.cell_ends.push(self.cell_vertices.len());
+            self.diagram.cell_ends.push(self.diagram.cell_vertices.len());
         }
     }
 
     /// Joins the end of a walk to its start.
     fn close(&mut self, site: usize, start: usize) {
-        match self.cell_vertices[start..] {
+        match self.diagram.cell_vertices[start..] {
             [] => {
                 // A single site: the cell is the window.
                 let corners: Vec<usize> = (0..self.corners.len()).map(|c| self.corner(c)).collect();
-                self.cell_vertices.extend_from_slice(&corners);
+                self.diagram.cell_vertices.extend_from_slice(&corners);
                 for i in 0..corners.len() {
                     self.add_border_edge(site, corners[i], corners[(i + 1) % corners.len()]);
                 }
             }
             [first, .., last] if first == last => {
-                self.cell_vertices.pop();
+                self.diagram.cell_vertices.pop();
             }
             [first, .., last] => self.walk_border(site, last, first),
             [_] => {}
@@ -255,8 +247,8 @@ impl<'a> Builder<'a> {
 
     /// Adds the corners between two vertices on the border to the cell, and the pieces of the border to the edges.
     fn walk_border(&mut self, site: usize, from: usize, to: usize) {
-        let perimeter = self.window.perimeter();
-        let [start, end] = [from, to].map(|vertex| self.reaches[vertex - self.inner]);
+        let perimeter = self.diagram.window.reach[self.corners.len()];
+        let [start, end] = [from, to].map(|vertex| self.reaches[vertex - self.diagram.inner]);
         let ahead = |reach: f64| {
             let way = reach - start;
             if way < 0.0 { way + perimeter } else { way }
@@ -265,15 +257,15 @@ impl<'a> Builder<'a> {
         let mut last = from;
         if way < perimeter * (1.0 - ROUNDING) {
             let count = self.corners.len();
-            let next = (0..count).find(|&corner| self.window.reach_of_corner(corner) > start).unwrap_or(0);
+            let next = (0..count).find(|&corner| self.diagram.window.reach[corner] > start).unwrap_or(0);
             for corner in (next..count).chain(0..next) {
-                let distance = ahead(self.window.reach_of_corner(corner));
+                let distance = ahead(self.diagram.window.reach[corner]);
                 if distance >= way {
                     break;
                 }
                 if distance > 0.0 {
                     let vertex = self.corner(corner);
-                    self.cell_vertices.push(vertex);
+                    self.diagram.cell_vertices.push(vertex);
                     self.add_border_edge(site, last, vertex);
                     last = vertex;
                 }
@@ -283,6 +275,6 @@ impl<'a> Builder<'a> {
     }
 
     fn add_border_edge(&mut self, site: usize, from: usize, to: usize) {
-        self.edges.push(Edge { ends: [from, to], cell: site, neighbour: None });
+        self.diagram.edges.push(Edge { ends: [from, to], cell: site, neighbour: None });
     }
 }

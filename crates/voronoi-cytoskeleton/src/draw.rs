@@ -1,5 +1,5 @@
 use crate::error::{Error, require};
-use crate::geometry::Point;
+use crate::geometry::{Point, single};
 use crate::river::River;
 
 /// Brightness across a line.
@@ -146,11 +146,6 @@ fn pixels(from: f64, to: f64, count: usize) -> core::ops::Range<usize> {
     let start = (from.ceil() as usize).min(count);
     let end = ((to.floor() + 1.0) as usize).min(count);
     start..end.max(start)
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
-fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

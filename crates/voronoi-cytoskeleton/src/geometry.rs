@@ -27,6 +27,19 @@ pub(crate) fn length(a: Point) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The lowest and the highest coordinates.
+pub(crate) fn bounds(points: &[Point]) -> [Point; 2] {
+    [(f64::min as fn(f64, f64) -> f64, f64::INFINITY), (f64::max, f64::NEG_INFINITY)].map(|(of, from)| {
+        points.iter().fold([from; 2], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])])
+    })
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
+pub(crate) fn single(value: f64) -> f32 {
+    value as f32
+}
+
 /// Moments of a polygon about a point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Moments {

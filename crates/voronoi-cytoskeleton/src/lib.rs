@@ -12,6 +12,8 @@ mod lloyd;
 mod outline;
 mod river;
 mod skeleton;
+#[cfg(test)]
+mod testing;
 mod torus;
 mod window;
 

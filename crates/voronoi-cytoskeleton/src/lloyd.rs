@@ -4,7 +4,10 @@
 //! side of the window. Polarity turns these lines into the points 2 q / |q|², and the cell's corners into the sides of
 //! their convex hull. The hull is found by gift wrapping, of many cells side by side.
 
-use crate::geometry::{Point, dot, length, sub};
+use crate::build::build;
+use crate::diagram::Diagram;
+use crate::error::Error;
+use crate::geometry::{Point, bounds, dot, length, sub};
 use crate::window::Window;
 use multiversion::multiversion;
 
@@ -28,8 +31,18 @@ const BORDER: f64 = 1e-9;
 /// Sides that a cell may have; one with more is left to the triangulation.
 const SIDES: usize = 64;
 
+/// The diagram of some sites after some passes: without diagrams in between, where that goes.
+pub(crate) fn relaxed_diagram(sites: Vec<Point>, window: &Window, passes: usize) -> Result<Diagram, Error> {
+    if let Some(Ok(diagram)) = relaxed(&sites, window, passes).map(|sites| build(sites, window.clone())) {
+        return Ok(diagram);
+    }
+    let mut diagram = build(sites, window.clone())?;
+    (0..passes).for_each(|_| diagram.relax());
+    Ok(diagram)
+}
+
 /// The sites after some passes. None if there is a cell that this way cannot settle: one with very many sides.
-pub(crate) fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option<Vec<Point>> {
+fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option<Vec<Point>> {
     let mut sites = sites.to_vec();
     for _ in 0..passes {
         Grid::new(&sites, window).centroids(&mut sites)?;
@@ -54,7 +67,7 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn new(sites: &[Point], window: &'a Window) -> Self {
-        let [low, high] = window.bounds();
+        let [low, high] = bounds(window.corners());
         let extent = sub(high, low);
         // In a narrow window that lies askew most squares are empty; there shall not be too many.
         let area = window.area().max(extent[0] * extent[1] / 8.0);

@@ -1,5 +1,5 @@
 use crate::error::{Error, require_coordinates};
-use crate::geometry::{Moments, Point, dot, length, sub};
+use crate::geometry::{Moments, Point, bounds, dot, length, single, sub};
 
 /// A closed polygon, ready for distances: the paper's "radial distance transform … from the edge".
 ///
@@ -74,8 +74,7 @@ impl Outline {
                 core::array::from_fn(|i| points[(first + i).min(last) % points.len()])
             })
             .collect();
-        let [low, high] = [f64::min, f64::max]
-            .map(|of| points.iter().fold(points[0], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])]));
+        let [low, high] = bounds(points);
         let centre = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
         let size = length(sub(high, low));
         Ok(Self {
@@ -129,24 +128,14 @@ fn measure(outline: &Outline, points: &[Point], heights: &mut [f64]) {
                 inside ^= blocks[i].crosses(point);
             }
         }
-        let distance = smallest(nearest).sqrt();
+        let distance = nearest.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a }).sqrt();
         *height = if inside { distance } else { -distance };
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "rounding is the purpose")]
-fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[inline(always)]
 fn smaller(a: Lanes, b: Lanes) -> Lanes {
     core::array::from_fn(|i| if b[i] < a[i] { b[i] } else { a[i] })
-}
-
-#[inline(always)]
-fn smallest(lanes: Lanes) -> f64 {
-    lanes.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
 /// Flags as the bits of a number.

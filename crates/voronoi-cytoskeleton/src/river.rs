@@ -1,6 +1,5 @@
 use crate::diagram::Diagram;
 use crate::geometry::{Point, length, sub};
-use std::borrow::Cow;
 
 /// Where a river ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,54 +32,46 @@ impl River {
 pub(crate) const DEGREE: usize = 3;
 
 /// The landscape in which rivers run: heights at vertices, ways between them, and which tree holds which vertex.
-pub(crate) struct Landscape<'a, H> {
-    net: Net<'a>,
+pub(crate) struct Landscape<H> {
+    net: Net,
     height: H,
     heights: Vec<f64>,
     highest: f64,
-    trees: Trees,
+    /// Which vertices hang together (union-find), and which are part of a river.
+    parents: Vec<usize>,
+    taken: Vec<bool>,
 }
 
 /// The vertices of a diagram in a window, and which of them an edge joins.
-pub(crate) struct Net<'a> {
-    pub(crate) vertices: Cow<'a, [Point]>,
+pub(crate) struct Net {
+    pub(crate) vertices: Vec<Point>,
     /// Number of vertices inside the window; those on its border, or beyond, follow.
     pub(crate) inner: usize,
     /// Neighbours of each vertex along the edges inside the window; filled from the front.
     pub(crate) ways: Vec<[Option<u32>; DEGREE]>,
 }
 
-impl<'a> Net<'a> {
-    pub(crate) fn of(diagram: &'a Diagram) -> Self {
-        let vertices = diagram.vertices();
+impl Net {
+    pub(crate) fn of(diagram: &Diagram) -> Self {
+        let vertices = diagram.vertices.clone();
         let mut ways = vec![[None; DEGREE]; vertices.len()];
-        for edge in diagram.edges() {
-            if edge.neighbour.is_none() {
-                continue;
-            }
-            let [a, b] = edge.ends;
+        for [a, b] in diagram.edges.iter().filter(|edge| edge.neighbour.is_some()).map(|edge| edge.ends) {
             for (from, to) in [(a, b), (b, a)] {
                 if let Some(free) = ways[from].iter_mut().find(|way| way.is_none()) {
                     *free = u32::try_from(to).ok();
                 }
             }
         }
-        Self { vertices: Cow::Borrowed(vertices), inner: diagram.inner, ways }
+        Self { vertices, inner: diagram.inner, ways }
     }
 }
 
-/// A way down that is not yet a river.
-struct Course {
-    vertices: Vec<usize>,
-    mouth: Mouth,
-}
-
-impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
+impl<H: Fn(Point) -> f64> Landscape<H> {
     /// A landscape on a net of the given height, which `heights` are at its vertices.
-    pub(crate) fn new(net: Net<'a>, height: H, heights: Vec<f64>) -> Self {
+    pub(crate) fn new(net: Net, height: H, heights: Vec<f64>) -> Self {
         let highest = heights.iter().copied().fold(0.0, f64::max);
-        let trees = Trees::new(heights.len());
-        Self { net, height, heights, highest, trees }
+        let (parents, taken) = ((0..heights.len()).collect(), vec![false; heights.len()]);
+        Self { net, height, heights, highest, parents, taken }
     }
 
     /// The vertices inside the window that lie above zero, and at least at a share of the largest height.
@@ -91,24 +82,22 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
 
     /// Runs a river from a spring, and its branches. `branches` is asked once for every vertex of a river but its last.
     pub(crate) fn run(&mut self, spring: usize, branches: &mut impl FnMut() -> bool, rivers: &mut Vec<River>) {
-        if self.trees.is_taken(spring) {
+        if self.taken[spring] {
             return;
         }
         let mut starts = vec![(spring, None)];
         while let Some((start, first)) = starts.pop() {
-            let Some(course) = self.descend(start, first) else {
-                continue;
-            };
-            for pair in course.vertices.windows(2) {
-                self.trees.join(pair[0], pair[1]);
+            let Some((course, mouth)) = self.descend(start, first) else { continue };
+            for pair in course.windows(2) {
+                self.join(pair[0], pair[1]);
             }
-            for pair in course.vertices.windows(2) {
+            for pair in course.windows(2) {
                 if branches() {
                     let others = self.below(pair[0]).filter(|&way| way != pair[1]);
                     starts.extend(others.map(|way| (pair[0], Some(way))));
                 }
             }
-            rivers.push(self.river(&course));
+            rivers.push(self.river(&course, mouth));
         }
     }
 
@@ -123,9 +112,9 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
 
     /// The way of steepest descent from `start`, by way of `first` if there is one. None if it ends in a pit or cannot
     /// but run back into its own tree.
-    fn descend(&self, start: usize, first: Option<usize>) -> Option<Course> {
-        let tree = self.trees.root(start);
-        let open = |way: usize| self.trees.root(way) != tree;
+    fn descend(&self, start: usize, first: Option<usize>) -> Option<(Vec<usize>, Mouth)> {
+        let tree = self.root(start);
+        let open = |way: usize| self.root(way) != tree;
         let mut vertices = vec![start];
         let mut vertex = start;
         let mut next = first.filter(|&way| open(way));
@@ -140,12 +129,10 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
             };
             vertices.push(way);
             if self.heights[way] <= 0.0 || way >= self.net.inner {
-                let mouth = Mouth::Border;
-                return Some(Course { vertices, mouth });
+                return Some((vertices, Mouth::Border));
             }
-            if self.trees.is_taken(way) {
-                let mouth = Mouth::Confluence;
-                return Some(Course { vertices, mouth });
+            if self.taken[way] {
+                return Some((vertices, Mouth::Confluence));
             }
             vertex = way;
         }
@@ -156,13 +143,9 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
         (self.heights[from] - self.heights[to]) / length(sub(b, a))
     }
 
-    fn river(&self, course: &Course) -> River {
-        let mut points: Vec<Point> = Vec::with_capacity(course.vertices.len());
-        let mut heights: Vec<f64> = Vec::with_capacity(course.vertices.len());
-        for &vertex in &course.vertices {
-            points.push(self.net.vertices[vertex]);
-            heights.push(self.heights[vertex] / self.highest);
-        }
+    fn river(&self, course: &[usize], mouth: Mouth) -> River {
+        let mut points: Vec<Point> = course.iter().map(|&vertex| self.net.vertices[vertex]).collect();
+        let mut heights: Vec<f64> = course.iter().map(|&vertex| self.heights[vertex] / self.highest).collect();
         // The last edge ends where the height does.
         if let ([.., above, below], [.., from, to]) = (&mut points[..], &mut heights[..])
             && *to < 0.0
@@ -170,7 +153,7 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
             *below = self.shore(*above, *below, *from * self.highest, *to * self.highest);
             *to = 0.0;
         }
-        River { points, heights, mouth: course.mouth }
+        River { points, heights, mouth }
     }
 
     /// The point of height zero between one above and one below it: false position with the Illinois rule.
@@ -201,22 +184,6 @@ impl<'a, H: Fn(Point) -> f64> Landscape<'a, H> {
             last = height;
         }
         at(low)
-    }
-}
-
-/// Which vertices hang together: union-find.
-struct Trees {
-    parents: Vec<usize>,
-    taken: Vec<bool>,
-}
-
-impl Trees {
-    fn new(count: usize) -> Self {
-        Self { parents: (0..count).collect(), taken: vec![false; count] }
-    }
-
-    fn is_taken(&self, vertex: usize) -> bool {
-        self.taken[vertex]
     }
 
     fn root(&self, mut vertex: usize) -> usize {

@@ -1,8 +1,7 @@
-use crate::build::build;
 use crate::diagram::Diagram;
 use crate::error::{Error, require};
 use crate::geometry::Point;
-use crate::lloyd::relaxed;
+use crate::lloyd::relaxed_diagram;
 use crate::outline::Outline;
 use crate::river::{Landscape, Net, River};
 use crate::torus::Torus;
@@ -109,18 +108,8 @@ impl Skeleton {
     /// # Errors
     /// As [`Skeleton::grow_on`].
     pub fn diagram<R: Rng + ?Sized>(&self, window: &Window, rng: &mut R) -> Result<Diagram, Error> {
-        let passes = self.params.lloyd_passes;
-        let drawn: Vec<Point> = (0..self.params.sites).map(|_| window.draw(rng)).collect();
-        if let Some(sites) = relaxed(&drawn, window, passes)
-            && let Ok(diagram) = build(sites, window.clone())
-        {
-            return Ok(diagram);
-        }
-        let mut diagram = build(drawn, window.clone())?;
-        for _ in 0..passes {
-            diagram.relax();
-        }
-        Ok(diagram)
+        let drawn = (0..self.params.sites).map(|_| window.draw(rng)).collect();
+        relaxed_diagram(drawn, window, self.params.lloyd_passes)
     }
 
     /// The second step alone: rivers on a diagram.
@@ -134,7 +123,7 @@ impl Skeleton {
         self.run(Landscape::new(Net::of(diagram), height, heights), rng)
     }
 
-    fn run<R: Rng + ?Sized>(&self, mut landscape: Landscape<'_, impl Fn(Point) -> f64>, rng: &mut R) -> Vec<River> {
+    fn run<R: Rng + ?Sized>(&self, mut landscape: Landscape<impl Fn(Point) -> f64>, rng: &mut R) -> Vec<River> {
         let mut springs = landscape.springs(self.params.start_above);
         let mut rivers = Vec::new();
         for _ in 0..self.params.rivers.min(springs.len()) {

@@ -1,12 +1,11 @@
 use crate::build::build;
 use crate::error::{Error, require};
-use crate::geometry::{Point, dot, length, sub};
-use crate::lloyd::relaxed;
+use crate::geometry::{Point, bounds, dot, length, sub};
+use crate::lloyd::relaxed_diagram;
 use crate::river::{DEGREE, Net};
 use crate::window::Window;
 use portable_numerics::random::uniform;
 use rand_core::Rng;
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// A relaxed Voronoi diagram without a border: of the unit square whose opposite sides are one (a flat torus).
@@ -40,15 +39,7 @@ impl Torus {
         let margin = MARGIN / (sites as f64).sqrt();
         let window = Window::rectangle([-margin; 2], [1.0 + margin; 2])?;
         for _ in 0..lloyd_passes {
-            let (mut copies, _) = repeated(&places, margin);
-            copies = match relaxed(&copies, &window, 1) {
-                Some(relaxed) => relaxed,
-                None => {
-                    let mut diagram = build(copies, window.clone())?;
-                    diagram.relax();
-                    diagram.sites
-                }
-            };
+            let copies = relaxed_diagram(repeated(&places, margin).0, &window, 1)?.sites;
             places = copies[..sites].iter().map(|place| place.map(|c| c - c.floor())).collect();
         }
         let (copies, originals) = repeated(&places, margin);
@@ -105,9 +96,9 @@ impl Torus {
     }
 
     /// A piece under a window, in which lie `sites` sites on average. None if it would overlap itself.
-    pub(crate) fn place<R: Rng + ?Sized>(&self, window: &Window, sites: usize, rng: &mut R) -> Option<Net<'static>> {
+    pub(crate) fn place<R: Rng + ?Sized>(&self, window: &Window, sites: usize, rng: &mut R) -> Option<Net> {
         let period = (window.area() * self.sites as f64 / sites as f64).sqrt();
-        let [low, high] = window.bounds();
+        let [low, high] = bounds(window.corners());
         let half = [0, 1].map(|axis| (high[axis] - low[axis]) / 2.0);
         if length(half) + self.longest * period > period / 2.0 {
             return None;
@@ -151,7 +142,7 @@ impl Torus {
         ways.resize(chosen.len(), [None; DEGREE]);
         let middle = [low[0] + half[0], low[1] + half[1]];
         let vertices = chosen.iter().map(|&vertex| [middle[0] + places[vertex][0], middle[1] + places[vertex][1]]);
-        Some(Net { vertices: Cow::Owned(vertices.collect()), inner, ways })
+        Some(Net { vertices: vertices.collect(), inner, ways })
     }
 }
 

@@ -1,5 +1,5 @@
 use crate::error::{Error, require_coordinates};
-use crate::geometry::{Moments, Point, along, cross, dot, length, sub};
+use crate::geometry::{Moments, Point, along, bounds, cross, dot, length, sub};
 use portable_numerics::random::uniform;
 use rand_core::Rng;
 
@@ -11,7 +11,7 @@ pub struct Window {
     /// From each corner to the next.
     sides: Vec<Point>,
     /// Length of the border up to each corner, and all of it.
-    reach: Vec<f64>,
+    pub(crate) reach: Vec<f64>,
     area: f64,
 }
 
@@ -30,13 +30,11 @@ impl Window {
     /// [`Error::Coordinate`], or [`Error::Flat`] if all points lie on one upright or level line.
     pub fn around(points: &[Point]) -> Result<Self, Error> {
         require_coordinates("outline point", points)?;
-        let bound = |of: fn(f64, f64) -> f64, from: f64| {
-            points.iter().fold([from; 2], |bound, point| [of(bound[0], point[0]), of(bound[1], point[1])])
-        };
         if points.is_empty() {
             return Err(Error::Flat { what: "outline", count: 0, area: 0.0 });
         }
-        Self::rectangle(bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY))
+        let [low, high] = bounds(points);
+        Self::rectangle(low, high)
     }
 
     /// A convex polygon, its corners in either order.
@@ -130,15 +128,6 @@ impl Window {
         (from < to).then_some([from, to])
     }
 
-    /// The t at which `origin + t · direction` leaves the window; `origin` lies inside.
-    pub(crate) fn exit(&self, origin: Point, direction: Point) -> f64 {
-        let leaves = |(corner, side): (Point, Point)| {
-            let growth = cross(side, direction);
-            (growth < 0.0).then(|| -cross(side, sub(origin, corner)) / growth)
-        };
-        self.sides().filter_map(leaves).fold(f64::INFINITY, f64::min).max(0.0)
-    }
-
     /// How far along the border a point on it lies.
     pub(crate) fn reach_of(&self, point: Point) -> f64 {
         let distance = |&(_, (corner, side)): &(usize, (Point, Point))| {
@@ -152,25 +141,6 @@ impl Window {
             .enumerate()
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .map_or(0.0, |(number, (corner, side))| self.reach[number] + dot(sub(point, corner), side) / length(side))
-    }
-
-    /// How far along the border a corner lies.
-    pub(crate) fn reach_of_corner(&self, corner: usize) -> f64 {
-        self.reach[corner]
-    }
-
-    /// The length of the border.
-    pub(crate) fn perimeter(&self) -> f64 {
-        self.reach[self.corners.len()]
-    }
-
-    /// The lowest and the highest coordinates.
-    pub(crate) fn bounds(&self) -> [Point; 2] {
-        let bound = |of: fn(f64, f64) -> f64| {
-            let first = self.corners[0];
-            self.corners.iter().fold(first, |bound, corner| [of(bound[0], corner[0]), of(bound[1], corner[1])])
-        };
-        [bound(f64::min), bound(f64::max)]
     }
 
     /// Each side's first corner and its direction.

@@ -1,31 +1,10 @@
 use super::*;
-use crate::geometry::{cross, dot, length, sub};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
+use crate::geometry::{bounds, cross, dot, length, sub};
+use crate::testing::{draws, lattice, rim, windows};
 use std::collections::BTreeMap;
 
-const SEED: u64 = 0x0064_6961_6772_616d;
-
-fn windows() -> Vec<Window> {
-    vec![
-        Window::rectangle([0.0, 0.0], [200.0, 120.0]).unwrap(),
-        Window::rectangle([-1000.5, 3000.0], [-900.0, 3000.25]).unwrap(),
-        Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap(),
-        Window::convex(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap(),
-    ]
-}
-
 fn random(window: &Window, count: usize, seed: u64) -> Diagram {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED ^ seed);
-    let sites: Vec<Point> = (0..count).map(|_| window.draw(&mut rng)).collect();
-    Diagram::new(&sites, window).unwrap()
-}
-
-/// Sites on a lattice: every circumcircle passes through four of them, and many edges end in the border at right angles.
-fn lattice() -> Diagram {
-    let window = Window::rectangle([0.0, 0.0], [9.0, 7.0]).unwrap();
-    let sites: Vec<Point> = (0..63).map(|i| [f64::from(i % 9) + 0.5, f64::from(i / 9) + 0.5]).collect();
-    Diagram::new(&sites, &window).unwrap()
+    Diagram::new(&draws(window, count, seed), window).unwrap()
 }
 
 fn diagrams() -> Vec<Diagram> {
@@ -33,40 +12,14 @@ fn diagrams() -> Vec<Diagram> {
         .iter()
         .flat_map(|window| [1, 2, 3, 4, 7, 50, 300].map(|count| random(window, count, count as u64)))
         .collect();
-    diagrams.push(lattice());
+    // Every circumcircle passes through four sites, and many edges end in the border at right angles.
+    let (sites, window) = lattice(9, 7);
+    diagrams.push(Diagram::new(&sites, &window).unwrap());
     // Sites on one line, and close to the border.
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
     let line: Vec<Point> = (0..10).map(|i| [f64::from(i) + 0.25, 5.0]).collect();
-    diagrams.push(Diagram::new(&line, &window).unwrap());
-    let rim: Vec<Point> = (0..40).map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0]).collect();
-    diagrams.push(Diagram::new(&rim, &window).unwrap());
+    diagrams.extend([line, rim()].map(|sites| Diagram::new(&sites, &window).unwrap()));
     diagrams
-}
-
-#[test]
-fn areas_sum_to_the_window() {
-    for diagram in diagrams() {
-        let sum: f64 = (0..diagram.sites().len()).map(|cell| diagram.area(cell)).sum();
-        assert!((sum / diagram.window().area() - 1.0).abs() < 1e-9);
-    }
-}
-
-#[test]
-fn cells_are_convex_and_hold_their_sites() {
-    for diagram in diagrams() {
-        for (cell, &site) in diagram.sites().iter().enumerate() {
-            let corners: Vec<Point> = diagram.corners(cell).collect();
-            assert!(corners.len() >= 3);
-            for (i, &corner) in corners.iter().enumerate() {
-                let side = sub(corners[(i + 1) % corners.len()], corner);
-                let scale = diagram.window().area();
-                assert!(cross(side, sub(site, corner)) >= -1e-9 * scale);
-                for &other in &corners {
-                    assert!(cross(side, sub(other, corner)) >= -1e-9 * scale);
-                }
-            }
-        }
-    }
 }
 
 #[test]
@@ -81,35 +34,6 @@ fn vertices_are_nearest_to_the_sites_of_their_cells() {
                 assert!(distance(vertex, site) - nearest < 1e-8 * scale);
             }
         }
-    }
-}
-
-#[test]
-fn points_lie_in_the_cells_of_their_nearest_sites() {
-    for (seed, window) in windows().iter().enumerate() {
-        let diagram = random(window, 80, seed as u64);
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        for _ in 0..500 {
-            let point = window.draw(&mut rng);
-            let square = |&cell: &usize| {
-                let way = sub(diagram.sites()[cell], point);
-                dot(way, way)
-            };
-            let nearest = (0..80).min_by(|a, b| square(a).total_cmp(&square(b))).unwrap();
-            let corners: Vec<Point> = diagram.corners(nearest).collect();
-            for (i, &corner) in corners.iter().enumerate() {
-                let side = sub(corners[(i + 1) % corners.len()], corner);
-                assert!(cross(side, sub(point, corner)) >= -1e-9 * window.area());
-            }
-        }
-    }
-}
-
-#[test]
-fn euler() {
-    for diagram in diagrams() {
-        let (v, e, f) = (diagram.vertices().len(), diagram.edges().len(), diagram.sites().len());
-        assert_eq!(v + f, e + 1, "{v} vertices, {e} edges, {f} cells");
     }
 }
 
@@ -131,16 +55,18 @@ fn edges_and_cells_tell_the_same() {
             uses += 1 + usize::from(edge.neighbour.is_some());
         }
         assert_eq!(uses, sides.len());
+        // Euler.
+        let (v, e, f) = (diagram.vertices().len(), diagram.edges().len(), diagram.sites().len());
+        assert_eq!(v + f, e + 1, "{v} vertices, {e} edges, {f} cells");
     }
 }
 
 #[test]
 fn agrees_with_the_clipping_of_every_bisector() {
     // The ten-line oracle: the window, cut by the bisector against every other site.
-    for (seed, window) in windows().iter().enumerate() {
-        let diagram = random(window, 60, seed as u64);
+    for diagram in diagrams() {
         for (cell, &site) in diagram.sites().iter().enumerate() {
-            let mut polygon = window.corners().to_vec();
+            let mut polygon = diagram.window().corners().to_vec();
             for &other in diagram.sites().iter().filter(|&&other| other != site) {
                 let middle = [(site[0] + other[0]) / 2.0, (site[1] + other[1]) / 2.0];
                 let side = |p: Point| dot(sub(p, middle), sub(other, site));
@@ -160,9 +86,11 @@ fn agrees_with_the_clipping_of_every_bisector() {
             }
             let expected = Moments::of(polygon.iter().copied(), site);
             let found = diagram.moments(cell);
-            let scale = window.area();
-            assert!((found.area - expected.area).abs() < 1e-9 * scale);
-            assert!((found.second - expected.second).abs() < 1e-9 * scale * scale);
+            let [low, high] = bounds(diagram.window().corners());
+            let size = length(sub(high, low));
+            assert!((found.area - expected.area).abs() < 1e-9 * size * size);
+            assert!((0..2).all(|axis| (found.first[axis] - expected.first[axis]).abs() < 1e-9 * size * size * size));
+            assert!((found.second - expected.second).abs() < 1e-9 * size * size * size * size);
         }
     }
 }
@@ -190,12 +118,10 @@ fn relaxing_never_raises_the_energy_and_evens_the_cells() {
 
 #[test]
 fn a_centroidal_diagram_stays() {
-    let mut diagram = lattice();
-    let sites = diagram.sites().to_vec();
+    let (sites, window) = lattice(9, 7);
+    let mut diagram = Diagram::new(&sites, &window).unwrap();
     diagram.relax();
-    for (before, after) in sites.iter().zip(diagram.sites()) {
-        assert!(length(sub(*after, *before)) < 1e-12);
-    }
+    assert!(sites.iter().zip(diagram.sites()).all(|(&before, &after)| length(sub(after, before)) < 1e-12));
 }
 
 #[test]

@@ -10,8 +10,9 @@ fn river(points: &[Point]) -> River {
     }
 }
 
-fn drawn(rivers: &[River], params: &LineParams) -> Vec<f32> {
-    let mut image = vec![0.0; 60 * 50];
+/// Drawn upon what is there.
+fn drawn(rivers: &[River], params: &LineParams, base: f32) -> Vec<f32> {
+    let mut image = vec![base; 60 * 50];
     draw_into(&mut image, 60, rivers, params).unwrap();
     image
 }
@@ -56,12 +57,14 @@ fn agrees_with_every_pixel_against_every_segment() {
         river(&[[40.25, 2.0], [40.25, 30.0]]),
         river(&[[50.0, 20.0], [90.0, -60.0]]),
         river(&[[-50.0, -20.0], [-9.0, -60.0]]),
+        // Over another line.
+        river(&[[10.0, 44.0], [20.0, 9.0]]),
     ];
     for profile in [Profile::Flat, Profile::Smooth] {
         for (width_px, taper, peak) in [(1.7, 0.5, 1.0), (0.4, 0.0, 1.0), (6.0, 1.0, 0.3), (30.0, 0.2, 2.0)] {
             let params = LineParams { width_px, profile, taper, peak };
-            for (found, expected) in drawn(&rivers, &params).iter().zip(oracle(&rivers, &params)) {
-                assert!((found - expected).abs() < 2e-4 * peak, "{params:?}: {found} {expected}");
+            for (found, expected) in drawn(&rivers, &params, 0.2).iter().zip(oracle(&rivers, &params)) {
+                assert!((found - expected.max(0.2)).abs() < 2e-4 * peak, "{params:?}: {found} {expected}");
             }
         }
     }
@@ -70,7 +73,7 @@ fn agrees_with_every_pixel_against_every_segment() {
 #[test]
 fn smooth_lines_are_half_as_bright_at_half_their_width() {
     let params = LineParams { width_px: 10.0, taper: 0.0, ..LineParams::default() };
-    let image = drawn(&[river(&[[-10.0, 20.0], [70.0, 20.0]])], &params);
+    let image = drawn(&[river(&[[-10.0, 20.0], [70.0, 20.0]])], &params, 0.0);
     assert_eq!(image[20 * 60 + 30], 1.0);
     assert!((image[25 * 60 + 30] - 0.5).abs() < 1e-6);
     assert_eq!(image[30 * 60 + 30], 0.0);
@@ -80,34 +83,10 @@ fn smooth_lines_are_half_as_bright_at_half_their_width() {
 fn flat_lines_cover_their_width() {
     for (width_px, y) in [(3.0, 20.0), (2.6, 20.4), (0.3, 19.8)] {
         let params = LineParams { width_px, profile: Profile::Flat, taper: 0.0, peak: 1.0 };
-        let image = drawn(&[river(&[[-10.0, y], [70.0, y]])], &params);
+        let image = drawn(&[river(&[[-10.0, y], [70.0, y]])], &params, 0.0);
         let sum: f64 = (0..50).map(|row| f64::from(image[row * 60 + 30])).sum();
         assert!((sum - width_px).abs() < 1e-5, "{sum}");
     }
-}
-
-#[test]
-fn the_largest_stays() {
-    let mut image = vec![0.6f32; 60 * 50];
-    let line = river(&[[10.0, 25.0], [50.0, 25.0]]);
-    let params = LineParams { taper: 0.0, ..LineParams::default() };
-    draw_into(&mut image, 60, std::slice::from_ref(&line), &params).unwrap();
-    assert_eq!((image[0], image[25 * 60 + 30]), (0.6, 1.0));
-    let once = image.clone();
-    draw_into(&mut image, 60, &[line.clone(), line], &params).unwrap();
-    assert_eq!(image, once);
-}
-
-#[test]
-fn taper_thins_a_line_downhill() {
-    let line = [river(&[[5.0, 25.0], [55.0, 25.0]])];
-    let at = |taper: f64, x: usize| {
-        let params = LineParams { width_px: 8.0, taper, ..LineParams::default() };
-        let image = drawn(&line, &params);
-        (0..50).map(|row| image[row * 60 + x]).sum::<f32>()
-    };
-    assert!((at(0.0, 10) - at(0.0, 50)).abs() < 1e-4);
-    assert!(at(1.0, 50) < 0.3 * at(1.0, 10));
 }
 
 #[test]

@@ -1,19 +1,5 @@
 use super::*;
-use crate::Diagram;
-use crate::geometry::length;
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
-
-fn windows() -> [Window; 5] {
-    [
-        Window::rectangle([0.0, 0.0], [150.0, 150.0]).unwrap(),
-        Window::rectangle([-1000.5, 3000.0], [-900.0, 3000.25]).unwrap(),
-        Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap(),
-        Window::convex(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap(),
-        // Narrow and askew.
-        Window::convex(&[[0.0, 0.0], [100.0, 100.0], [99.0, 101.0], [-1.0, 1.0]]).unwrap(),
-    ]
-}
+use crate::testing::{draws, lattice, rim, windows};
 
 /// The fast pass is the slow one, within a share of the size of a cell.
 fn agree(sites: &[Point], window: &Window, tolerance: f64) {
@@ -30,12 +16,10 @@ fn agree(sites: &[Point], window: &Window, tolerance: f64) {
 
 #[test]
 fn agrees_with_the_diagram() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0000_006c_6c6f_7964);
     for window in windows() {
         for count in [1, 2, 3, 7, 40, 300, 1000] {
-            for _ in 0..20 {
-                let sites: Vec<Point> = (0..count).map(|_| window.draw(&mut rng)).collect();
-                agree(&sites, &window, 1e-7);
+            for seed in 0..20 {
+                agree(&draws(&window, count, seed), &window, 1e-7);
             }
         }
     }
@@ -43,8 +27,7 @@ fn agrees_with_the_diagram() {
 
 #[test]
 fn a_lattice_stays() {
-    let window = Window::rectangle([0.0, 0.0], [20.0, 15.0]).unwrap();
-    let sites: Vec<Point> = (0..300).map(|i| [f64::from(i % 20) + 0.5, f64::from(i / 20) + 0.5]).collect();
+    let (sites, window) = lattice(20, 15);
     for (before, after) in sites.iter().zip(relaxed(&sites, &window, 3).unwrap()) {
         assert!(length(sub(after, *before)) < 1e-12);
     }
@@ -52,18 +35,16 @@ fn a_lattice_stays() {
 
 #[test]
 fn sites_on_the_border_and_nearly_in_one_place() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0072_696d);
     let window = Window::rectangle([0.0, 0.0], [10.0, 10.0]).unwrap();
-    let rim: Vec<Point> = (0..40).map(|i| [f64::from(i % 20) * 0.5, f64::from(i / 20) * 10.0]).collect();
-    agree(&rim, &window, 1e-7);
-    for apart in [1e-3, 1e-6, 1e-9] {
-        let mut sites: Vec<Point> = (0..60).map(|_| window.draw(&mut rng)).collect();
+    agree(&rim(), &window, 1e-7);
+    for (seed, apart) in [1e-3, 1e-6, 1e-9].into_iter().enumerate() {
+        let mut sites = draws(&window, 60, seed as u64);
         sites.extend((0..30).map(|i| [sites[i][0], (sites[i][1] - apart).abs()]).collect::<Vec<_>>());
         agree(&sites, &window, 1e-5);
     }
-    for apart in [0.0, 1e-15, 1e-13, 1e-11] {
+    for (seed, apart) in [0.0, 1e-15, 1e-13, 1e-11].into_iter().enumerate() {
         for window in windows() {
-            let mut sites: Vec<Point> = (0..60).map(|_| window.draw(&mut rng)).collect();
+            let mut sites = draws(&window, 60, seed as u64);
             sites.extend(sites.clone().iter().map(|site| [site[0] + apart, site[1]]));
             sites.extend(window.corners());
             sites.retain(|&site| window.contains(site));

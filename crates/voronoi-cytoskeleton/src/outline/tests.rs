@@ -1,7 +1,6 @@
 use super::*;
 use crate::Window;
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
+use crate::testing::draws;
 
 /// A star with notches: concave, and with level and upright sides.
 fn star(count: u32) -> Vec<Point> {
@@ -30,29 +29,19 @@ fn oracle(points: &[Point], p: Point) -> f64 {
 
 #[test]
 fn agrees_with_a_look_at_every_segment() {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x006f_7574_6c69_6e65);
     let square = vec![[40.0, 40.0], [140.0, 40.0], [140.0, 40.0], [140.0, 120.0], [40.0, 120.0]];
     let outlines = [star(3), star(7), star(8), star(9), star(64), star(65), star(421), square];
     let around = Window::rectangle([0.0, 0.0], [200.0, 160.0]).unwrap();
     for points in outlines {
         let outline = Outline::new(&points).unwrap();
-        let random = (0..500).map(|_| around.draw(&mut rng));
+        let random = draws(&around, 500, points.len() as u64);
         // Random points, and points level with corners.
         let level: Vec<Point> = points.iter().map(|p| [p[0] - 7.25, p[1]]).collect();
-        for point in random.chain(level) {
+        for point in random.into_iter().chain(level) {
             let (found, expected) = (outline.height(point), oracle(&points, point));
             assert!((found - expected).abs() < 1e-9, "{point:?}: {found} {expected}");
         }
     }
-}
-
-#[test]
-fn height_in_a_square() {
-    let outline = Outline::new(&[[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]]).unwrap();
-    assert_eq!(outline.height([5.0, 5.0]), 5.0);
-    assert_eq!(outline.height([1.0, 4.0]), 1.0);
-    assert_eq!(outline.height([-3.0, 14.0]), -5.0);
-    assert_eq!(outline.height([10.0, 3.0]), 0.0);
 }
 
 #[test]

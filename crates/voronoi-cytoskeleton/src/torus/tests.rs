@@ -1,12 +1,7 @@
 use super::*;
-use crate::outline::Outline;
-use crate::{Mouth, River, Skeleton, SkeletonParams};
-use rand_xoshiro::Xoshiro256PlusPlus;
-use rand_xoshiro::rand_core::SeedableRng;
-
-fn rng(seed: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(0x0074_6f72_7573 ^ seed)
-}
+use crate::testing::{assert_rivers, cell, rng};
+use crate::{River, Skeleton, SkeletonParams};
+use portable_numerics::statistics::{deviation, mean};
 
 /// The shortest way between two points of the torus.
 fn way(a: Point, b: Point) -> Point {
@@ -25,31 +20,26 @@ fn three_edges_meet_in_each_of_twice_as_many_vertices_as_sites() {
                     assert_ne!(other as usize, vertex);
                     assert!(torus.ways[other as usize].contains(&u32::try_from(vertex).unwrap()));
                     let edge = way(torus.vertices[vertex], torus.vertices[other as usize]);
-                    assert!(
-                        length(edge) <= torus.longest * (1.0 + 1e-12) && torus.longest < 8.0 / (sites as f64).sqrt()
-                    );
+                    assert!(length(edge) <= torus.longest * (1.0 + 1e-12));
+                    assert!(torus.longest < 8.0 / (sites as f64).sqrt());
                 }
             }
         }
     }
 }
 
-/// Mean and standard deviation of the lengths of edges between inner vertices, and vertices to a unit of area.
-fn statistics(nets: &[Net<'_>], area: f64) -> [f64; 3] {
-    let (mut count, mut sum, mut squares, mut vertices) = (0.0, 0.0, 0.0, 0.0);
+/// Mean and standard deviation of the lengths of edges within a window, and vertices in it.
+fn statistics(nets: &[Net], core: &Window) -> [f64; 3] {
+    let (mut lengths, mut count) = (Vec::new(), 0.0);
     for net in nets {
-        vertices += net.inner as f64;
-        for (from, ways) in net.ways[..net.inner].iter().enumerate() {
-            for to in ways.iter().flatten().map(|&to| to as usize).filter(|&to| to < net.inner) {
-                let length = length(sub(net.vertices[from], net.vertices[to]));
-                count += 1.0;
-                sum += length;
-                squares += length * length;
-            }
+        let within = |vertex: &usize| core.contains(net.vertices[*vertex]);
+        for from in (0..net.inner).filter(within) {
+            count += 1.0;
+            let ends = net.ways[from].iter().flatten().map(|&to| to as usize).filter(within);
+            lengths.extend(ends.map(|to| length(sub(net.vertices[from], net.vertices[to]))));
         }
     }
-    let mean = sum / count;
-    [mean, (squares / count - mean * mean).sqrt(), vertices / (nets.len() as f64 * area)]
+    [mean(&lengths), deviation(&lengths), count]
 }
 
 #[test]
@@ -59,29 +49,11 @@ fn a_piece_is_as_dense_as_a_diagram_of_its_own_and_its_edges_as_long() {
     let skeleton = Skeleton::new(&params).unwrap();
     let torus = Torus::new(1200, params.lloyd_passes, &mut rng(1)).unwrap();
     let mut rng = rng(2);
-    let pieces: Vec<Net<'_>> = (0..60).map(|_| torus.place(&window, params.sites, &mut rng).unwrap()).collect();
-    let diagrams: Vec<_> = (0..60).map(|_| skeleton.diagram(&window, &mut rng).unwrap()).collect();
+    let pieces: Vec<Net> = (0..60).map(|_| torus.place(&window, params.sites, &mut rng).unwrap()).collect();
+    let own: Vec<Net> = (0..60).map(|_| Net::of(&skeleton.diagram(&window, &mut rng).unwrap())).collect();
     // Away from the border, where the torus has none and the window's own diagram lines up along it.
     let core = Window::rectangle([30.0, -20.0], [190.0, 90.0]).unwrap();
-    let within = |net: Net<'static>| {
-        let mut net = net;
-        let inside: Vec<bool> = net.vertices.iter().map(|&vertex| core.contains(vertex)).collect();
-        let numbers: Vec<usize> = (0..inside.len()).filter(|&vertex| inside[vertex]).collect();
-        let place =
-            |vertex: u32| numbers.binary_search(&(vertex as usize)).ok().and_then(|number| u32::try_from(number).ok());
-        let ways = numbers.iter().map(|&vertex| net.ways[vertex].map(|way| way.and_then(place))).collect();
-        net = Net {
-            vertices: numbers.iter().map(|&vertex| net.vertices[vertex]).collect::<Vec<_>>().into(),
-            inner: numbers.len(),
-            ways,
-        };
-        net
-    };
-    let owned = |net: Net<'_>| Net { vertices: net.vertices.into_owned().into(), inner: net.inner, ways: net.ways };
-    let own: Vec<_> = diagrams.iter().map(|diagram| within(owned(Net::of(diagram)))).collect();
-    let pieces: Vec<_> = pieces.into_iter().map(within).collect();
-    let (found, expected) = (statistics(&pieces, core.area()), statistics(&own, core.area()));
-    for (found, expected) in found.iter().zip(expected) {
+    for (found, expected) in statistics(&pieces, &core).iter().zip(statistics(&own, &core)) {
         assert!((found / expected - 1.0).abs() < 0.025, "{found} {expected}");
     }
 }
@@ -105,45 +77,22 @@ fn every_vertex_inside_has_all_its_neighbours_in_their_places() {
     }
 }
 
-/// A wavy outline about as large as a cell.
-fn outline() -> Vec<Point> {
-    (0..420)
-        .map(|k| {
-            let angle = core::f64::consts::TAU * f64::from(k) / 420.0;
-            let radius = 70.0 * (1.0 + 0.15 * libm::cos(5.0 * angle));
-            [100.0 + 1.2 * radius * libm::cos(angle), 110.0 + radius * libm::sin(angle)]
-        })
-        .collect()
-}
-
 #[test]
-fn rivers_descend_to_the_outline_or_into_another() {
-    let outline = outline();
-    let edge = Outline::new(&outline).unwrap();
+fn rivers_on_a_torus_keep_the_laws_of_rivers() {
+    let outline = cell(0.15);
     let skeleton = Skeleton::new(&SkeletonParams::default()).unwrap();
     let torus = Torus::new(1200, 2, &mut rng(8)).unwrap();
     let mut rng = rng(9);
     for _ in 0..40 {
         let rivers = skeleton.grow_from(&torus, &outline, &mut rng).unwrap();
         assert!(rivers.len() >= 5);
-        for (number, river) in rivers.iter().enumerate() {
-            assert!(river.heights.windows(2).all(|pair| pair[1] < pair[0]));
-            let scale = edge.height(river.points[0]) / river.heights[0];
-            for (&point, height) in river.points.iter().zip(&river.heights) {
-                assert!((edge.height(point) - height * scale).abs() < 1e-6);
-            }
-            let last = river.points[river.points.len() - 1];
-            match river.mouth {
-                Mouth::Border => assert!(edge.height(last).abs() < 1e-6),
-                Mouth::Confluence => assert!(rivers[..number].iter().any(|other| other.points.contains(&last))),
-            }
-        }
+        assert_rivers(&rivers, &outline);
     }
 }
 
 #[test]
 fn rivers_are_as_many_and_as_long_as_on_diagrams_of_their_own() {
-    let outline = outline();
+    let outline = cell(0.15);
     let skeleton = Skeleton::new(&SkeletonParams::default()).unwrap();
     let tori = [10, 11, 12, 13].map(|seed| Torus::new(1200, 2, &mut rng(seed)).unwrap());
     let mut rng = rng(14);
