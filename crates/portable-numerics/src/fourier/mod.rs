@@ -16,11 +16,58 @@
 //! assert!((values[2][0][4] + 0.5).abs() < 1e-6);
 //! ```
 
-mod lanes;
 mod plane;
 mod transform;
 
-pub use lanes::{Lanes, Real, Square, ZERO, transposed};
+use core::fmt::Debug;
+use core::ops::{Add, AddAssign, Mul, Sub};
+
 pub use num_complex::Complex;
 pub use plane::{ComplexPlane, PlaneScratch};
 pub use transform::{LaneFft, Plans};
+
+/// A real number in single or double precision.
+pub trait Real:
+    Copy + Debug + Default + Send + Sync + Add<Output = Self> + AddAssign + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// The nearest one.
+    fn nearest(value: f64) -> Self;
+}
+
+impl Real for f32 {
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the nearest one is meant")]
+    fn nearest(value: f64) -> Self {
+        value as Self
+    }
+}
+
+impl Real for f64 {
+    #[inline(always)]
+    fn nearest(value: f64) -> Self {
+        value
+    }
+}
+
+/// A complex number of each of `N` sequences: real parts, imaginary parts. A cache line each is best: 16 in single precision,
+/// 8 in double.
+pub type Lanes<T, const N: usize> = [[T; N]; 2];
+
+/// Zeros in single precision, sixteen lanes.
+pub const ZERO: Lanes<f32, 16> = [[0.0; 16]; 2];
+
+/// As many sequences as numbers of each.
+pub type Square<T, const N: usize> = [[T; N]; N];
+
+/// Rows become columns. Inlined, so that it is compiled for the instruction set of its caller.
+#[inline(always)]
+#[must_use]
+pub fn transposed<T: Real, const N: usize>(from: &Square<T, N>) -> Square<T, N> {
+    let mut to = [[T::default(); N]; N];
+    for (i, to) in to.iter_mut().enumerate() {
+        for (to, from) in to.iter_mut().zip(from) {
+            *to = from[i];
+        }
+    }
+    to
+}

@@ -1,8 +1,7 @@
 use multiversion::multiversion;
 use num_complex::Complex;
 
-use super::lanes::{Lanes, Real};
-use super::transform::LaneFft;
+use super::{LaneFft, Lanes, Real};
 
 /// Transforms of complex images of one size, `N` rows or columns side by side.
 ///

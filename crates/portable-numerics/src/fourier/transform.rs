@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use multiversion::multiversion;
 
-use super::lanes::{Lanes, Real};
+use super::{Lanes, Real};
 
 /// A forward transform of sequences of one length (Stockham's, with decimation in frequency). The inverse is the forward
 /// transform of the reversed sequence.
@@ -153,75 +153,90 @@ fn times<T: Real>([re, im]: [T; 2], w: [T; 2]) -> [T; 2] {
     [re * w[0] - im * w[1], re * w[1] + im * w[0]]
 }
 
-/// The `j`-th run of the stride of numbers that a butterfly takes.
-#[inline(always)]
-fn run_of<'a, T, const N: usize>(
-    pass: &Pass<T>,
-    from: &'a [Lanes<T, N>],
-    butterfly: usize,
-    j: usize,
-) -> &'a [Lanes<T, N>] {
-    &from[pass.stride * (butterfly + pass.butterflies * j)..][..pass.stride]
+/// The pass of one radix. Its butterfly is a function of its own, whose arguments the compiler knows to lie apart, so that lanes
+/// become vectors: the twiddles, and a number and the place of a result of each run.
+macro_rules! radix {
+    ($radix:literal, $pass:ident($w:ident, $($j:literal $from:ident $to:ident),*) $body:block) => {
+        #[inline(always)]
+        fn $pass<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
+            #[inline(always)]
+            #[allow(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
+            fn butterfly<T: Real, const N: usize>(
+                $w: &[[T; 2]; $radix - 1],
+                $($from: &Lanes<T, N>,)*
+                $($to: &mut Lanes<T, N>),*
+            ) $body
+
+            let s = pass.stride;
+            for (p, (to, w)) in to.chunks_exact_mut($radix * s).zip(pass.twiddles.as_chunks().0).enumerate() {
+                $(let $from = &from[s * (p + pass.butterflies * $j)..][..s];)*
+                $(let ($to, to) = to.split_at_mut(s);)*
+                let _: &[_] = to;
+                for q in 0..s {
+                    butterfly(w, $(&$from[q],)* $(&mut $to[q]),*);
+                }
+            }
+        }
+    };
 }
 
-#[inline(always)]
-fn by_2<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
-    let s = pass.stride;
-    for (p, (to, w)) in to.chunks_exact_mut(2 * s).zip(&pass.twiddles).enumerate() {
-        let run = |j| run_of(pass, from, p, j);
-        let (a, b) = (run(0), run(1));
-        let (to_0, to_1) = to.split_at_mut(s);
-        for q in 0..s {
-            two(&a[q], &b[q], w, &mut to_0[q], &mut to_1[q]);
-        }
+radix!(2, by_2(w, 0 a to_0, 1 b to_1) {
+    for l in 0..N {
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + b[0][l], a[1][l] + b[1][l]);
+        [to_1[0][l], to_1[1][l]] = times([a[0][l] - b[0][l], a[1][l] - b[1][l]], w[0]);
     }
-}
+});
 
-#[inline(always)]
-fn by_3<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
-    let s = pass.stride;
-    for (p, (to, w)) in to.chunks_exact_mut(3 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
-        let run = |j| run_of(pass, from, p, j);
-        let (a, b, c) = (run(0), run(1), run(2));
-        let (to_0, to) = to.split_at_mut(s);
-        let (to_1, to_2) = to.split_at_mut(s);
-        for q in 0..s {
-            three(&a[q], &b[q], &c[q], w, &mut to_0[q], &mut to_1[q], &mut to_2[q]);
-        }
+radix!(3, by_3(w, 0 a to_0, 1 b to_1, 2 c to_2) {
+    /// sin 2π/3.
+    const SIN: f64 = 0.866_025_403_784_438_6;
+    let (sine, half) = (T::nearest(SIN), T::nearest(0.5));
+    for l in 0..N {
+        let sum = [b[0][l] + c[0][l], b[1][l] + c[1][l]];
+        let apart = [sine * (b[0][l] - c[0][l]), sine * (b[1][l] - c[1][l])];
+        let rest = [a[0][l] - half * sum[0], a[1][l] - half * sum[1]];
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + sum[0], a[1][l] + sum[1]);
+        [to_1[0][l], to_1[1][l]] = times([rest[0] + apart[1], rest[1] - apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([rest[0] - apart[1], rest[1] + apart[0]], w[1]);
     }
-}
+});
 
-#[inline(always)]
-fn by_4<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
-    let s = pass.stride;
-    for (p, (to, w)) in to.chunks_exact_mut(4 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
-        let run = |j| run_of(pass, from, p, j);
-        let (a, b, c, d) = (run(0), run(1), run(2), run(3));
-        let (to_0, to) = to.split_at_mut(s);
-        let (to_1, to) = to.split_at_mut(s);
-        let (to_2, to_3) = to.split_at_mut(s);
-        for q in 0..s {
-            four(&a[q], &b[q], &c[q], &d[q], w, &mut to_0[q], &mut to_1[q], &mut to_2[q], &mut to_3[q]);
-        }
+radix!(4, by_4(w, 0 a to_0, 1 b to_1, 2 c to_2, 3 d to_3) {
+    for l in 0..N {
+        let even = [a[0][l] + c[0][l], a[1][l] + c[1][l]];
+        let even_apart = [a[0][l] - c[0][l], a[1][l] - c[1][l]];
+        let odd = [b[0][l] + d[0][l], b[1][l] + d[1][l]];
+        let odd_apart = [b[0][l] - d[0][l], b[1][l] - d[1][l]];
+        (to_0[0][l], to_0[1][l]) = (even[0] + odd[0], even[1] + odd[1]);
+        [to_1[0][l], to_1[1][l]] = times([even_apart[0] + odd_apart[1], even_apart[1] - odd_apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([even[0] - odd[0], even[1] - odd[1]], w[1]);
+        [to_3[0][l], to_3[1][l]] = times([even_apart[0] - odd_apart[1], even_apart[1] + odd_apart[0]], w[2]);
     }
-}
+});
 
-#[inline(always)]
-fn by_5<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
-    let s = pass.stride;
-    for (p, (to, w)) in to.chunks_exact_mut(5 * s).zip(pass.twiddles.as_chunks().0).enumerate() {
-        let run = |j| run_of(pass, from, p, j);
-        let (a, b, c, d, e) = (run(0), run(1), run(2), run(3), run(4));
-        let (to_0, to) = to.split_at_mut(s);
-        let (to_1, to) = to.split_at_mut(s);
-        let (to_2, to) = to.split_at_mut(s);
-        let (to_3, to_4) = to.split_at_mut(s);
-        for q in 0..s {
-            let to = (&mut to_0[q], &mut to_1[q], &mut to_2[q], &mut to_3[q], &mut to_4[q]);
-            five(&a[q], &b[q], &c[q], &d[q], &e[q], w, to.0, to.1, to.2, to.3, to.4);
-        }
+radix!(5, by_5(w, 0 a to_0, 1 b to_1, 2 c to_2, 3 d to_3, 4 e to_4) {
+    /// Cosines and sines of 2π/5 and 4π/5.
+    const COS: [f64; 2] = [0.309_016_994_374_947_4, -0.809_016_994_374_947_4];
+    const SIN: [f64; 2] = [0.951_056_516_295_153_6, 0.587_785_252_292_473_1];
+    let (cos, sin) = (COS.map(T::nearest), SIN.map(T::nearest));
+    for l in 0..N {
+        let outer = [b[0][l] + e[0][l], b[1][l] + e[1][l]];
+        let outer_apart = [b[0][l] - e[0][l], b[1][l] - e[1][l]];
+        let inner = [c[0][l] + d[0][l], c[1][l] + d[1][l]];
+        let inner_apart = [c[0][l] - d[0][l], c[1][l] - d[1][l]];
+        (to_0[0][l], to_0[1][l]) = (a[0][l] + outer[0] + inner[0], a[1][l] + outer[1] + inner[1]);
+        let near = [a[0][l] + cos[0] * outer[0] + cos[1] * inner[0], a[1][l] + cos[0] * outer[1] + cos[1] * inner[1]];
+        let far = [a[0][l] + cos[1] * outer[0] + cos[0] * inner[0], a[1][l] + cos[1] * outer[1] + cos[0] * inner[1]];
+        let near_apart =
+            [sin[0] * outer_apart[0] + sin[1] * inner_apart[0], sin[0] * outer_apart[1] + sin[1] * inner_apart[1]];
+        let far_apart =
+            [sin[1] * outer_apart[0] - sin[0] * inner_apart[0], sin[1] * outer_apart[1] - sin[0] * inner_apart[1]];
+        [to_1[0][l], to_1[1][l]] = times([near[0] + near_apart[1], near[1] - near_apart[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([far[0] + far_apart[1], far[1] - far_apart[0]], w[1]);
+        [to_3[0][l], to_3[1][l]] = times([far[0] - far_apart[1], far[1] + far_apart[0]], w[2]);
+        [to_4[0][l], to_4[1][l]] = times([near[0] - near_apart[1], near[1] + near_apart[0]], w[3]);
     }
-}
+});
 
 /// The sum itself, for other primes.
 #[inline(always)]
@@ -250,111 +265,9 @@ fn by_any<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mu
     }
 }
 
-// Butterflies: functions of their own, whose arguments the compiler knows to lie apart, so that lanes become vectors.
-
-#[inline(always)]
-fn two<T: Real, const N: usize>(
-    a: &Lanes<T, N>,
-    b: &Lanes<T, N>,
-    w: &[T; 2],
-    to_0: &mut Lanes<T, N>,
-    to_1: &mut Lanes<T, N>,
-) {
-    for l in 0..N {
-        (to_0[0][l], to_0[1][l]) = (a[0][l] + b[0][l], a[1][l] + b[1][l]);
-        [to_1[0][l], to_1[1][l]] = times([a[0][l] - b[0][l], a[1][l] - b[1][l]], *w);
-    }
-}
-
-#[inline(always)]
-fn three<T: Real, const N: usize>(
-    a: &Lanes<T, N>,
-    b: &Lanes<T, N>,
-    c: &Lanes<T, N>,
-    w: &[[T; 2]; 2],
-    to_0: &mut Lanes<T, N>,
-    to_1: &mut Lanes<T, N>,
-    to_2: &mut Lanes<T, N>,
-) {
-    /// sin 2π/3.
-    const SIN: f64 = 0.866_025_403_784_438_6;
-    let (sine, half) = (T::nearest(SIN), T::nearest(0.5));
-    for l in 0..N {
-        let sum = [b[0][l] + c[0][l], b[1][l] + c[1][l]];
-        let apart = [sine * (b[0][l] - c[0][l]), sine * (b[1][l] - c[1][l])];
-        let rest = [a[0][l] - half * sum[0], a[1][l] - half * sum[1]];
-        (to_0[0][l], to_0[1][l]) = (a[0][l] + sum[0], a[1][l] + sum[1]);
-        [to_1[0][l], to_1[1][l]] = times([rest[0] + apart[1], rest[1] - apart[0]], w[0]);
-        [to_2[0][l], to_2[1][l]] = times([rest[0] - apart[1], rest[1] + apart[0]], w[1]);
-    }
-}
-
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
-fn four<T: Real, const N: usize>(
-    a: &Lanes<T, N>,
-    b: &Lanes<T, N>,
-    c: &Lanes<T, N>,
-    d: &Lanes<T, N>,
-    w: &[[T; 2]; 3],
-    to_0: &mut Lanes<T, N>,
-    to_1: &mut Lanes<T, N>,
-    to_2: &mut Lanes<T, N>,
-    to_3: &mut Lanes<T, N>,
-) {
-    for l in 0..N {
-        let even = [a[0][l] + c[0][l], a[1][l] + c[1][l]];
-        let even_apart = [a[0][l] - c[0][l], a[1][l] - c[1][l]];
-        let odd = [b[0][l] + d[0][l], b[1][l] + d[1][l]];
-        let odd_apart = [b[0][l] - d[0][l], b[1][l] - d[1][l]];
-        (to_0[0][l], to_0[1][l]) = (even[0] + odd[0], even[1] + odd[1]);
-        [to_1[0][l], to_1[1][l]] = times([even_apart[0] + odd_apart[1], even_apart[1] - odd_apart[0]], w[0]);
-        [to_2[0][l], to_2[1][l]] = times([even[0] - odd[0], even[1] - odd[1]], w[1]);
-        [to_3[0][l], to_3[1][l]] = times([even_apart[0] - odd_apart[1], even_apart[1] + odd_apart[0]], w[2]);
-    }
-}
-
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
-fn five<T: Real, const N: usize>(
-    a: &Lanes<T, N>,
-    b: &Lanes<T, N>,
-    c: &Lanes<T, N>,
-    d: &Lanes<T, N>,
-    e: &Lanes<T, N>,
-    w: &[[T; 2]; 4],
-    to_0: &mut Lanes<T, N>,
-    to_1: &mut Lanes<T, N>,
-    to_2: &mut Lanes<T, N>,
-    to_3: &mut Lanes<T, N>,
-    to_4: &mut Lanes<T, N>,
-) {
-    /// Cosines and sines of 2π/5 and 4π/5.
-    const COS: [f64; 2] = [0.309_016_994_374_947_4, -0.809_016_994_374_947_4];
-    const SIN: [f64; 2] = [0.951_056_516_295_153_6, 0.587_785_252_292_473_1];
-    let (cos, sin) = (COS.map(T::nearest), SIN.map(T::nearest));
-    for l in 0..N {
-        let outer = [b[0][l] + e[0][l], b[1][l] + e[1][l]];
-        let outer_apart = [b[0][l] - e[0][l], b[1][l] - e[1][l]];
-        let inner = [c[0][l] + d[0][l], c[1][l] + d[1][l]];
-        let inner_apart = [c[0][l] - d[0][l], c[1][l] - d[1][l]];
-        (to_0[0][l], to_0[1][l]) = (a[0][l] + outer[0] + inner[0], a[1][l] + outer[1] + inner[1]);
-        let near = [a[0][l] + cos[0] * outer[0] + cos[1] * inner[0], a[1][l] + cos[0] * outer[1] + cos[1] * inner[1]];
-        let far = [a[0][l] + cos[1] * outer[0] + cos[0] * inner[0], a[1][l] + cos[1] * outer[1] + cos[0] * inner[1]];
-        let near_apart =
-            [sin[0] * outer_apart[0] + sin[1] * inner_apart[0], sin[0] * outer_apart[1] + sin[1] * inner_apart[1]];
-        let far_apart =
-            [sin[1] * outer_apart[0] - sin[0] * inner_apart[0], sin[1] * outer_apart[1] - sin[0] * inner_apart[1]];
-        [to_1[0][l], to_1[1][l]] = times([near[0] + near_apart[1], near[1] - near_apart[0]], w[0]);
-        [to_2[0][l], to_2[1][l]] = times([far[0] + far_apart[1], far[1] - far_apart[0]], w[1]);
-        [to_3[0][l], to_3[1][l]] = times([far[0] - far_apart[1], far[1] + far_apart[0]], w[2]);
-        [to_4[0][l], to_4[1][l]] = times([near[0] - near_apart[1], near[1] + near_apart[0]], w[3]);
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::ZERO;
+    use super::super::ZERO;
     use super::*;
     use rand_xoshiro::Xoshiro256PlusPlus;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};

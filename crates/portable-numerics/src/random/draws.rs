@@ -100,34 +100,18 @@ impl<'a, R: Rng + ?Sized> Normals<'a, R> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::assert_normal;
     use super::*;
+    use crate::statistics::{deviation, mean};
     use rand_xoshiro::Xoshiro256PlusPlus;
     use rand_xoshiro::rand_core::SeedableRng;
-
-    /// Mean, variance, skewness and excess kurtosis.
-    fn moments(values: &[f64]) -> [f64; 4] {
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let central = |k: usize| values.iter().map(|v| [v - mean; 4][..k].iter().product::<f64>()).sum::<f64>() / n;
-        let var = central(2);
-        [mean, var, central(3) / (var * var.sqrt()), central(4) / (var * var) - 3.0]
-    }
 
     #[test]
     fn normals_have_normal_moments() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x40A1);
-        let single: Vec<f64> = (0..200_000).map(|_| normal(&mut rng)).collect();
+        assert_normal(&(0..200_000).map(|_| normal(&mut rng)).collect::<Vec<_>>());
         let mut normals = Normals::new(&mut rng);
-        let both: Vec<f64> = (0..200_000).map(|_| normals.draw()).collect();
-        for values in [single, both] {
-            let n = values.len() as f64;
-            // Standard errors of the four moments of a normal sample; bound 4.
-            for (moment, (wanted, variance)) in
-                moments(&values).into_iter().zip([(0.0, 1.0), (1.0, 2.0), (0.0, 6.0), (0.0, 24.0)])
-            {
-                assert!((moment - wanted).abs() < 4.0 * (variance / n).sqrt(), "{moment} for {wanted}");
-            }
-        }
+        assert_normal(&(0..200_000).map(|_| normals.draw()).collect::<Vec<_>>());
     }
 
     #[test]
@@ -141,9 +125,8 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x0F0);
         let values: Vec<f64> = (0..100_000).map(|_| uniform(&mut rng)).collect();
         assert!(values.iter().all(|v| (0.0..1.0).contains(v)));
-        let [mean, var, ..] = moments(&values);
-        assert!((mean - 0.5).abs() < 4.0 * (1.0 / 12.0 / 1e5_f64).sqrt());
-        assert!((var - 1.0 / 12.0).abs() < 4.0 * (1.0 / 180.0 / 1e5_f64).sqrt());
+        assert!((mean(&values) - 0.5).abs() < 4.0 * (1.0 / 12.0 / 1e5_f64).sqrt());
+        assert!((deviation(&values) - (1.0_f64 / 12.0).sqrt()).abs() < 4.0 * (1.0 / 60.0 / 1e5_f64).sqrt());
         assert_eq!([unit(0), unit(u64::MAX)], [0.0, 1.0 - STEP]);
         assert!((0..1000).map(|_| open_uniform(&mut rng)).all(|u| 0.0 < u && u <= 1.0));
     }

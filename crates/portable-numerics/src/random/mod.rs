@@ -18,3 +18,15 @@ pub use rand_core::Rng;
 pub use splitmix::SplitMix64;
 pub use words::{normals_of_words, open_unit};
 pub use ziggurat::Ziggurat;
+
+/// Raw moments of a sample within four standard errors of those of standard normal numbers.
+#[cfg(test)]
+fn assert_normal(values: &[f64]) {
+    let n = values.len() as f64;
+    // Mean and variance of x^p of a standard normal.
+    for (p, mean, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
+        let moment = values.iter().map(|&x| (0..p).fold(1.0, |m, _| m * x)).sum::<f64>() / n;
+        let z = (moment - mean) / (variance / n).sqrt();
+        assert!(z.abs() < 4.0, "moment {p}: {z} standard errors");
+    }
+}

@@ -34,17 +34,9 @@ impl Ziggurat {
         let mut end = [0.0; LAYERS + 1];
         let mut density = [1.0; LAYERS + 1];
         let mut x = TAIL;
-        let store = |array: &mut [f32; LAYERS + 1], layer: usize, value: f64| {
-            #[expect(clippy::cast_possible_truncation, reason = "tables are single precision")]
-            {
-                array[layer] = value as f32;
-            }
-        };
-        store(&mut end, 0, AREA / density_at(TAIL));
-        store(&mut density, 0, density_at(TAIL));
+        (end[0], density[0]) = (single(AREA / density_at(TAIL)), single(density_at(TAIL)));
         for layer in 1..LAYERS {
-            store(&mut end, layer, x);
-            store(&mut density, layer, density_at(x));
+            (end[layer], density[layer]) = (single(x), single(density_at(x)));
             let top = (AREA / x + density_at(x)).min(1.0);
             x = (-2.0 * libm::log(top)).sqrt();
         }
@@ -72,29 +64,24 @@ impl Ziggurat {
     /// The 1.5 % of cases that fall outside the part of a layer wholly under the curve.
     #[cold]
     #[inline(never)]
-    fn edge<R: Rng + ?Sized>(&self, mut bits: u32, rng: &mut R) -> f32 {
-        loop {
-            let layer = (bits & 0xff) as usize;
-            let x = position(bits) * self.end[layer];
-            if x < self.end[layer + 1] {
-                return with_sign(x, bits);
-            }
-            if layer == 0 {
-                return with_sign(tail(rng), bits);
-            }
-            let (low, high) = (self.density[layer], self.density[layer + 1]);
-            let y = low + (high - low) * position(rng.next_u32());
-            if y < libm::expf(-0.5 * x * x) {
-                return with_sign(x, bits);
-            }
-            bits = rng.next_u32();
+    fn edge<R: Rng + ?Sized>(&self, bits: u32, rng: &mut R) -> f32 {
+        let layer = (bits & 0xff) as usize;
+        if layer == 0 {
+            return with_sign(tail(rng), bits);
         }
+        let x = position(bits) * self.end[layer];
+        let (low, high) = (self.density[layer], self.density[layer + 1]);
+        let y = low + (high - low) * position(rng.next_u32());
+        if y < libm::expf(-0.5 * x * x) {
+            return with_sign(x, bits);
+        }
+        let bits = rng.next_u32();
+        self.deviate(bits, rng)
     }
 }
 
 /// A uniform deviate strictly between 0 and 1 from the upper 23 bits.
 #[inline]
-#[expect(clippy::cast_precision_loss, reason = "23 bits and a half are exact")]
 fn position(bits: u32) -> f32 {
     const STEP: f32 = 1.0 / (1 << 23) as f32;
     ((bits >> 9) as f32 + 0.5) * STEP
@@ -106,20 +93,25 @@ fn with_sign(x: f32, bits: u32) -> f32 {
     f32::from_bits(x.to_bits() | ((bits & 0x100) << 23))
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "tables and deviates are single precision")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
 /// A deviate beyond `TAIL` (Marsaglia 1964).
-#[expect(clippy::cast_possible_truncation, reason = "a deviate is single precision")]
 fn tail<R: Rng + ?Sized>(rng: &mut R) -> f32 {
     loop {
         let x = -libm::log(f64::from(position(rng.next_u32()))) / TAIL;
         let y = -libm::log(f64::from(position(rng.next_u32())));
         if 2.0 * y > x * x {
-            return (TAIL + x) as f32;
+            return single(TAIL + x);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::assert_normal;
     use super::*;
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
@@ -142,14 +134,7 @@ mod tests {
 
     #[test]
     fn moments_are_normal() {
-        let n = 4_000_000;
-        let deviates = sample(n);
-        let moment = |p: i32| deviates.iter().map(|&x| (0..p).fold(1.0, |m, _| m * x)).sum::<f64>();
-        // Mean and variance of x^p of a standard normal; bounds of four standard errors.
-        for (p, mean, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
-            let z = (moment(p) / n as f64 - mean) / (variance / n as f64).sqrt();
-            assert!(z.abs() < 4.0, "moment {p}: {z} standard errors");
-        }
+        assert_normal(&sample(4_000_000));
     }
 
     #[test]
