@@ -129,7 +129,7 @@ fn stack(c: &mut Criterion) {
 
 fn abbe(c: &mut Criterion) {
     let abbe = Abbe::new(&microscope(), &AbbeParams::default()).expect("the defaults are in order");
-    let layers = [Layer::absorbing(2.0, &slab(0)).expect("a finite depth")];
+    let layers = [Layer::refracting(2.0, &slab(0), &[]).expect("a finite depth")];
     let mut group = c.benchmark_group("abbe");
     group.sample_size(10);
     group.bench_function("one layer, 64 points", |b| b.iter(|| abbe.image(&layers, 0.0)));

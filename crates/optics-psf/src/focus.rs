@@ -38,10 +38,7 @@ impl FocusParams {
 
 /// The depth of focus: the paper's "Impulse response", Fig. 10.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DepthOfFocus {
-    sigma_xy_px: f64,
-    sigma_per_um: f64,
-}
+pub struct DepthOfFocus(FocusParams);
 
 impl DepthOfFocus {
     /// Checks the parameters.
@@ -50,25 +47,23 @@ impl DepthOfFocus {
     ///
     /// If a field is negative or not a finite number.
     pub fn new(params: &FocusParams) -> Result<Self, Error> {
-        let accepted = "0 or more";
-        let (xy, per_um) = (params.sigma_xy_px, params.sigma_per_um);
-        Ok(Self {
-            sigma_xy_px: require("sigma_xy_px", xy, xy >= 0.0, accepted)?,
-            sigma_per_um: require("sigma_per_um", per_um, per_um >= 0.0, accepted)?,
-        })
+        for (field, value) in [("sigma_xy_px", params.sigma_xy_px), ("sigma_per_um", params.sigma_per_um)] {
+            require(field, value, value >= 0.0, "0 or more")?;
+        }
+        Ok(Self(params.clone()))
     }
 
     /// σ_z in pixels of an object `depth_um` from the focal plane, on either side (Eq. 14).
     #[must_use]
     pub fn sigma_px(&self, depth_um: f64) -> f64 {
         // "Impulse response": σ = k·|dz|
-        self.sigma_per_um * depth_um.abs()
+        self.0.sigma_per_um * depth_um.abs()
     }
 
     /// σ_x,y in pixels, the same for every depth (Eq. 13).
     #[must_use]
     pub fn sigma_xy_px(&self) -> f64 {
-        self.sigma_xy_px
+        self.0.sigma_xy_px
     }
 }
 
@@ -77,21 +72,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn defaults_are_the_papers() {
-        let paper = FocusParams::paper();
-        assert_eq!((paper.sigma_xy_px, paper.sigma_per_um), (0.9, 1.0));
-        assert_eq!(paper, FocusParams::default());
-        let other = FocusParams::paper_in_micrometres();
-        assert_eq!((other.sigma_xy_px, other.sigma_per_um), (0.9, 4.0));
-    }
-
-    #[test]
     fn blur_is_linear_in_depth_and_even() {
-        let focus = DepthOfFocus::new(&FocusParams::paper_in_micrometres()).unwrap();
-        assert_eq!(focus.sigma_px(0.0), 0.0);
-        assert_eq!(focus.sigma_px(1.5), 6.0);
-        assert_eq!(focus.sigma_px(-1.5), 6.0);
-        assert_eq!(focus.sigma_xy_px(), 0.9);
+        for (params, per_um) in [(FocusParams::paper(), 1.0), (FocusParams::paper_in_micrometres(), 4.0)] {
+            let focus = DepthOfFocus::new(&params).unwrap();
+            assert_eq!([0.0, 1.5, -1.5].map(|z| focus.sigma_px(z)), [0.0, 1.5 * per_um, 1.5 * per_um]);
+            assert_eq!(focus.sigma_xy_px(), 0.9);
+        }
     }
 
     #[test]

@@ -1,14 +1,8 @@
-use crate::error::{Error, require};
+use crate::Border;
+use crate::error::{Error, within};
 use crate::fir::{self, Source};
 use crate::kernel::{Kernel, LOST_TAIL};
 use crate::pyramid::{self, Pyramid};
-use crate::{Border, Scratch};
-
-/// Wider than any field of view; it bounds the memory of the taps.
-const WIDEST_PX: f64 = 4096.0;
-
-/// With more of its tail lost a kernel is a Gaussian no longer.
-const MOST_LOST: f64 = 1e-2;
 
 /// How a blur is computed. The kernel that is meant is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,20 +48,11 @@ impl Gaussian {
     ///
     /// If `sigma_px` is outside that range or not a number.
     pub fn new(sigma_px: f64) -> Result<Self, Error> {
-        Self::with_method(sigma_px, Method::Auto)
+        Self::truncated(sigma_px, Method::Auto, LOST_TAIL)
     }
 
-    /// A blur of standard deviation `sigma_px`, 0 to 4096 pixels.
-    ///
-    /// # Errors
-    ///
-    /// If `sigma_px` is outside that range or not a number.
-    pub fn with_method(sigma_px: f64, method: Method) -> Result<Self, Error> {
-        Self::truncated(sigma_px, method, LOST_TAIL)
-    }
-
-    /// A blur whose taps reach out to where less than `lost_tail` of the sum is lost, 1e-7 to 1e-2:
-    /// a quarter fewer taps at 1e-4. The sum is still one and the variance still exact. No pixel
+    /// A blur whose taps reach out to where less than `lost_tail` of the sum is lost, 1e-7, as of [`new`](Self::new), to
+    /// 1e-2: a quarter fewer taps at 1e-4. The sum is still one and the variance still exact. No pixel
     /// errs by more than ten times `lost_tail` of the range of the image; corners, discs and noise
     /// err by less than half of that.
     ///
@@ -75,10 +60,10 @@ impl Gaussian {
     ///
     /// If `sigma_px` is not a number from 0 to 4096 or `lost_tail` outside its range.
     pub fn truncated(sigma_px: f64, method: Method, lost_tail: f64) -> Result<Self, Error> {
-        let accepted = (0.0..=WIDEST_PX).contains(&sigma_px);
-        require("sigma_px", sigma_px, accepted, "a number from 0 to 4096")?;
-        let accepted = (LOST_TAIL..=MOST_LOST).contains(&lost_tail);
-        require("lost_tail", lost_tail, accepted, "a number from 1e-7 to 1e-2")?;
+        // Wider than any field of view; it bounds the memory of the taps.
+        within("sigma_px", sigma_px, 0.0..=4096.0, "a number from 0 to 4096")?;
+        // With more of its tail lost a kernel is a Gaussian no longer.
+        within("lost_tail", lost_tail, LOST_TAIL..=1e-2, "a number from 1e-7 to 1e-2")?;
         let kernel = Kernel::new(sigma_px, lost_tail);
         let narrowest = match method {
             Method::Direct => None,
@@ -105,7 +90,7 @@ impl Gaussian {
     /// Half of the kernel along one axis: the weight at 0, at ±1 … at ±[`radius`](Self::radius).
     #[must_use]
     pub fn taps(&self) -> &[f64] {
-        self.kernel.taps()
+        &self.kernel.taps
     }
 
     /// Blurs `image`, any values in rows of `width` pixels.
@@ -151,7 +136,7 @@ impl Gaussian {
         let within = dst.len().is_multiple_of(width) && first + dst.len() / width <= rows;
         assert!(within, "{} pixels from row {first} on are no rows of the {rows} there are", dst.len());
         let source = Source { pixels: src, width, border };
-        fir::blur_rows(source, self.kernel.half(), 0, first.cast_signed(), dst, scratch);
+        fir::blur_rows(source, &self.kernel.half, 0, first.cast_signed(), dst, scratch);
     }
 
     /// Blurs an object that is alone in its `tile` and returns the larger tile it then fills, and
@@ -162,7 +147,8 @@ impl Gaussian {
     /// If `tile` is empty or not whole rows of `width`.
     #[must_use]
     pub fn spread(&self, tile: &[f32], width: usize) -> (Vec<f32>, usize) {
-        let mut wide = vec![0.0; self.spread_len(tile, width)];
+        let around = 2 * self.radius();
+        let mut wide = vec![0.0; (width + around) * (tile.len() / width.max(1) + around)];
         self.spread_into(tile, width, &mut wide, &mut Scratch::new());
         (wide, self.radius())
     }
@@ -175,12 +161,6 @@ impl Gaussian {
     /// If `tile` is empty or not whole rows of `width`, or `dst` has another length.
     pub fn spread_into(&self, tile: &[f32], width: usize, dst: &mut [f32], scratch: &mut Scratch) {
         self.apply(tile, width, Border::Zero, self.radius(), dst, scratch);
-    }
-
-    /// The length of the tile that [`spread_into`](Self::spread_into) fills.
-    fn spread_len(&self, tile: &[f32], width: usize) -> usize {
-        let around = 2 * self.radius();
-        (width + around) * (tile.len() / width.max(1) + around)
     }
 
     fn apply(
@@ -198,8 +178,28 @@ impl Gaussian {
         let source = Source { pixels, width, border };
         match &self.pyramid {
             Some(pyramid) => pyramid.blur(source, margin, dst, scratch),
-            None => fir::blur(source, self.kernel.half(), margin, dst, scratch),
+            None => fir::blur(source, &self.kernel.half, margin, dst, scratch),
         }
+    }
+}
+
+/// Working memory of the blurs: give the same one to every call and nothing is allocated once it
+/// has grown to the largest image.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    /// The columns that are being blurred, with the rows above and below them.
+    pub(crate) strip: Vec<f32>,
+    /// One row, with what lies left and right of it.
+    pub(crate) line: Vec<f32>,
+    /// The image halved 1, 2 … times; the first is the coarsest one, blurred.
+    pub(crate) levels: Vec<Vec<f32>>,
+}
+
+impl Scratch {
+    /// Empty memory.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
     }
 }
 

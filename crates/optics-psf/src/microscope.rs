@@ -1,4 +1,4 @@
-use crate::error::{Error, require};
+use crate::error::{Error, require, within};
 use crate::pupil::Pupil;
 use crate::quadrature::Rules;
 use crate::transfer::Transfer;
@@ -61,9 +61,6 @@ impl Default for MicroscopeParams {
     }
 }
 
-/// Samples along a pixel's side, at most.
-const MOST_OVERSAMPLING: usize = 16;
-
 /// A bright-field microscope whose parameters are in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Microscope {
@@ -78,9 +75,6 @@ impl Microscope {
     /// If a number is not finite or outside the range its field states.
     pub fn new(params: &MicroscopeParams) -> Result<Self, Error> {
         let p = params;
-        let within = |field, value: f64, range: core::ops::RangeInclusive<f64>, accepted| {
-            require(field, value, range.contains(&value), accepted)
-        };
         within("mount_index", p.mount_index, 1.0..=3.0, "a number from 1 to 3")?;
         within("immersion_index", p.immersion_index, 1.0..=3.0, "a number from 1 to 3")?;
         let below = p.na > 0.0 && p.na <= p.immersion_index && p.na < p.mount_index;
@@ -95,10 +89,7 @@ impl Microscope {
             within(field, value, -5.0..=5.0, "a number from -5 to 5")?;
         }
         within("pixel_um", p.pixel_um, 0.001..=100.0, "a number from 0.001 to 100")?;
-        if !(1..=MOST_OVERSAMPLING).contains(&p.oversampling) {
-            let accepted = "a whole number from 1 to 16";
-            return Err(Error::Count { field: "oversampling", value: p.oversampling, accepted });
-        }
+        within("oversampling", p.oversampling as f64, 1.0..=16.0, "a whole number from 1 to 16")?;
         let glare = (0.0..1.0).contains(&p.stray_light);
         require("stray_light", p.stray_light, glare, "0 or more and below 1")?;
         Ok(Self { params: params.clone() })
@@ -114,14 +105,6 @@ impl Microscope {
     #[must_use]
     pub fn pitch_um(&self) -> f64 {
         self.params.pixel_um / self.params.oversampling as f64
-    }
-
-    /// The share of the condenser's light that passes outside the objective's aperture and is
-    /// lost: 1 − (NA/NAc)², or 0.
-    #[must_use]
-    pub fn lost_light(&self) -> f64 {
-        let ratio = (self.params.na / self.params.condenser_na).min(1.0);
-        1.0 - ratio * ratio
     }
 
     /// The finest detail that reaches the image to first order, cycles per µm: (NA + NAc)/λ at the
@@ -195,9 +178,7 @@ impl Microscope {
 /// objective's rim. Transfer functions are then within 0.002 up to 10 µm from focus.
 const BAND_NODES: [f64; 2] = [0.7, 4.0];
 
-/// Farthest from the focal plane, µm: beyond it nothing of an object is left.
-const FARTHEST_UM: f64 = 1000.0;
-
+/// A distance from the focal plane, µm: farther away nothing of an object is left.
 pub(crate) fn distance(field: &'static str, value: f64) -> Result<f64, Error> {
-    require(field, value, value.abs() <= FARTHEST_UM, "a number from -1000 to 1000")
+    within(field, value, -1000.0..=1000.0, "a number from -1000 to 1000")
 }

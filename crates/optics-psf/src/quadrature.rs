@@ -3,30 +3,22 @@ use core::f64::consts::PI;
 /// Longest rule. A lens with more fringes than that resolves transfers nothing.
 const LONGEST: usize = 1024;
 
-/// Gauss–Legendre rules on 0..1, made when first asked for.
+/// Gauss–Legendre rules on 0..1 of 2, 4, … nodes, made when first asked for.
 #[derive(Debug, Default)]
 pub(crate) struct Rules {
     made: Vec<Vec<[f64; 2]>>,
 }
 
-/// A rule exists for every multiple of this many nodes.
-const STEP: usize = 2;
-
 impl Rules {
-    /// Makes what is missing of the rules with up to `nodes` nodes' place.
-    fn slot(nodes: usize) -> usize {
-        nodes.clamp(STEP, LONGEST).div_ceil(STEP)
-    }
-
     /// Nodes and weights of a rule with at least `nodes` nodes, an even number, ascending.
     pub(crate) fn get(&mut self, nodes: usize) -> &[[f64; 2]] {
-        let slot = Self::slot(nodes);
-        if self.made.len() <= slot {
-            self.made.resize(slot + 1, Vec::new());
+        let half = nodes.clamp(2, LONGEST).div_ceil(2);
+        if self.made.len() <= half {
+            self.made.resize(half + 1, Vec::new());
         }
-        let rule = &mut self.made[slot];
+        let rule = &mut self.made[half];
         if rule.is_empty() {
-            *rule = gauss_legendre(slot * STEP);
+            *rule = gauss_legendre(2 * half);
         }
         rule
     }

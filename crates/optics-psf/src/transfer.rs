@@ -1,7 +1,10 @@
+use core::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use multiversion::multiversion;
+
 use crate::Microscope;
-use crate::curve::Curve;
+use crate::filter::fade;
 use crate::lens::Lens;
 use crate::pupil::Pupil;
 
@@ -25,8 +28,9 @@ const DIRECTIONS: usize = 64;
 /// with coma they are complex; they are averaged over the band of wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transfer {
-    step: f64,
-    shape: Shape,
+    /// Distance between the entries of the table, cycles/µm.
+    pub(crate) step: f64,
+    pub(crate) shape: Shape,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +42,7 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    fn numbers(&self) -> &[f64] {
+    pub(crate) fn numbers(&self) -> &[f64] {
         match self {
             Self::Round(table) => table.as_flattened(),
             Self::Sided(table) => table.as_flattened().as_flattened(),
@@ -95,11 +99,6 @@ impl Transfer {
             }
         }
         Self { step: parts[0].0.step, shape }
-    }
-
-    /// How many numbers it holds.
-    pub(crate) fn numbers(&self) -> usize {
-        self.shape.numbers().len()
     }
 
     /// The distance of a microscope's tables between their entries, cycles/µm.
@@ -161,15 +160,6 @@ impl Transfer {
         };
         last.map_or(0.0, |i| self.step * (i + 1) as f64)
     }
-
-    /// Distance between the entries of the table, cycles/µm.
-    pub(crate) fn step(&self) -> f64 {
-        self.step
-    }
-
-    pub(crate) fn shape(&self) -> &Shape {
-        &self.shape
-    }
 }
 
 /// Nodes of a polynomial for a part of a profile: so many, and so many more for each fringe.
@@ -186,7 +176,7 @@ const FADES_FROM: f64 = 0.8;
 
 /// The frequency from which on nothing is transferred for being faint, cycles/µm.
 fn faint(pupil: &Pupil, is_far: bool) -> f64 {
-    if is_far { FAINT / (core::f64::consts::TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
+    if is_far { FAINT / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
 }
 
 /// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `faint`.
@@ -205,9 +195,8 @@ fn profile(
     let bend = pupil.objective - pupil.condenser;
     let steepest = pupil.steepest(pupil.objective);
     let cutoff = pupil.cutoff();
-    let fade = |f: f64| {
-        let t = ((f / faint - FADES_FROM) / (1.0 - FADES_FROM)).clamp(0.0, 1.0);
-        if faint < cutoff { weight * (1.0 - t * t * (3.0 - 2.0 * t)) } else { weight }
+    let faded = |f: f64| {
+        if faint < cutoff { weight * fade((f / faint - FADES_FROM) / (1.0 - FADES_FROM)) } else { weight }
     };
     let (mut next, mut values) = (0, Vec::new());
     for [from, to] in [[0.0, bend.min(faint)], [bend, cutoff.min(faint)]] {
@@ -223,19 +212,69 @@ fn profile(
         if end <= next + nodes {
             for (i, sum) in entries {
                 let f = step * i as f64;
-                let ([re, im], weight) = (lens.integral(pupil, f, direction), fade(f));
+                let ([re, im], weight) = (lens.integral(pupil, f, direction), faded(f));
                 *sum = [sum[0] + weight * re, sum[1] + weight * im];
             }
         } else {
-            let curve = Curve::new([from, to], nodes, |f| lens.integral(pupil, f, direction));
+            let known = chebyshev([from, to], nodes, |f| lens.integral(pupil, f, direction));
             values.resize(end - next, [0.0; 2]);
-            curve.values_into(step, next, &mut values);
+            interpolate(&known, step, next, &mut values);
             for ((i, sum), &[re, im]) in entries.zip(&values) {
-                let weight = fade(step * i as f64);
+                let weight = faded(step * i as f64);
                 *sum = [sum[0] + weight * re, sum[1] + weight * im];
             }
         }
         next = end.max(next);
+    }
+}
+
+/// A pair of smooth functions on an interval at Chebyshev's points, the ends among them: place, weight of the barycentric
+/// formula, values.
+fn chebyshev([from, to]: [f64; 2], nodes: usize, mut function: impl FnMut(f64) -> [f64; 2]) -> Vec<[f64; 4]> {
+    let last = nodes - 1;
+    let node = |i: usize| {
+        let x = from + (to - from) * 0.5 * (1.0 - libm::cos(PI * i as f64 / last as f64));
+        let end = if i == 0 || i == last { 0.5 } else { 1.0 };
+        let [a, b] = function(x);
+        [x, if i.is_multiple_of(2) { end } else { -end }, a, b]
+    };
+    (0..=last).map(node).collect()
+}
+
+/// Places that are looked up side by side.
+const LANES: usize = 8;
+
+/// The polynomials through such points at `step` times `first`, `first` + 1, …: Berrut and Trefethen, DOI
+/// 10.1137/S0036144502417715, Eq. 4.2.
+#[multiversion(targets = "simd")]
+fn interpolate(nodes: &[[f64; 4]], step: f64, first: usize, out: &mut [[f64; 2]]) {
+    for (block, out) in out.chunks_mut(LANES).enumerate() {
+        let mut x = [0.0; LANES];
+        for (lane, x) in x.iter_mut().enumerate() {
+            *x = step * (first + LANES * block + lane) as f64;
+        }
+        let mut sums = [[0.0; LANES]; 3];
+        // The formula has no value at a node.
+        let mut met = [[0.0; LANES]; 3];
+        for &[node, weight, a, b] in nodes {
+            for l in 0..LANES {
+                let away = x[l] - node;
+                let (is_node, share) = (away == 0.0, weight / away);
+                sums[0][l] += share;
+                sums[1][l] += share * a;
+                sums[2][l] += share * b;
+                met[0][l] = if is_node { 1.0 } else { met[0][l] };
+                met[1][l] = if is_node { a } else { met[1][l] };
+                met[2][l] = if is_node { b } else { met[2][l] };
+            }
+        }
+        for (l, out) in out.iter_mut().enumerate() {
+            *out = if met[0][l] > 0.0 {
+                [met[1][l], met[2][l]]
+            } else {
+                [sums[1][l] / sums[0][l], sums[2][l] / sums[0][l]]
+            };
+        }
     }
 }
 
@@ -287,6 +326,7 @@ mod tests {
     #[test]
     fn profiles_are_the_integrals() {
         let mut lens = Lens::default();
+        // NA of the condenser, depth, stage, cover glass.
         let cases = [
             (0.95, 0.0, 0.0, 0.0),
             (0.9, 10.0, 0.0, 0.0),
@@ -309,7 +349,7 @@ mod tests {
                 for (i, [a, b]) in list.into_iter().enumerate() {
                     let [c, d] = lens.integral(&pupil, step * i as f64, [0.6, 0.8]);
                     let error = (a - c).abs().max((b - d).abs());
-                    let q = core::f64::consts::TAU * step * i as f64 * pupil.cone_radius();
+                    let q = TAU * step * i as f64 * pupil.cone_radius();
                     if q < FADES_FROM * FAINT {
                         worst = worst.max(error);
                     } else {

@@ -1,8 +1,7 @@
-use super::{Window, lowest, mean_difference, sharpest, stack_height};
+use super::{Seen, Window, lowest};
 use crate::error::require;
 use crate::grid::fast_length;
-use crate::lane_plane::{LanePlane, LaneScratch, LaneSupport};
-use crate::lanes::{LANES, LanePlans, Lanes};
+use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
 use crate::{Border, Error, Microscope, MicroscopeParams};
 
 /// Pixels around the window that the transfer functions see.
@@ -49,15 +48,10 @@ pub fn condenser(
     step_um: f64,
     microscope: &MicroscopeParams,
 ) -> Result<CondenserFit, Error> {
-    let height = stack_height(stack, width)?;
-    window.check(width, height)?;
     require("step_um", step_um, step_um > 0.0 && step_um <= 100.0, "above 0 and at most 100")?;
     Microscope::new(microscope)?;
-    let focused = sharpest(stack, width, window)?;
-    let outer = window.grown(MARGIN_PX, width, height);
-    let inner = window.inside(outer);
-    let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width)).collect();
-    let source = outer.crop(stack[focused], width);
+    let seen = Seen::new(stack, width, window, MARGIN_PX)?;
+    let Seen { focused, outer, source, .. } = &seen;
 
     // Reflected, so that the seam of the periodic grid has no step.
     let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
@@ -84,8 +78,8 @@ pub fn condenser(
         let candidate = Microscope::new(&MicroscopeParams { condenser_na, ..microscope.clone() })?;
         let rest = candidate.transfer(0.0, 0.0)?;
         let mut sum = 0.0;
-        for (k, target) in targets.iter().enumerate().filter(|(k, _)| *k != focused) {
-            let transfer = candidate.transfer(0.0, step_um * (k as f64 - focused as f64))?;
+        for k in (0..stack.len()).filter(|k| k != focused) {
+            let transfer = candidate.transfer(0.0, step_um * (k as f64 - *focused as f64))?;
             let mut filtered = spectrum.clone();
             for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
                 for (l, &f) in frequencies.iter().enumerate() {
@@ -97,24 +91,11 @@ pub fn condenser(
                 }
             }
             let mut image = vec![0.0; outer.width * outer.height];
-            let fill = |block: usize, line: &mut [Lanes]| {
-                let (from, reach) = (support.block(&filtered, block), support.reach(block));
-                line[..=reach].copy_from_slice(&from[..=reach]);
-                let below = line.len() - reach;
-                line[below..].copy_from_slice(&from[reach + 1..]);
-            };
-            let keep = |left: usize, stripe: &[Lanes]| {
-                for (row, stripe) in image.chunks_exact_mut(outer.width).zip(stripe) {
-                    for (to, from) in row[left..].iter_mut().zip(stripe.as_flattened()) {
-                        *to = *from;
-                    }
-                }
-            };
-            plane.inverse(&support, fill, outer.width, keep, &mut scratch);
-            sum += mean_difference(&inner.crop(&image, outer.width), target);
+            plane.image_into(&support, &filtered, outer.width, &mut image, &mut scratch);
+            sum += seen.difference(&image, k);
         }
         tried.push([condenser_na, sum / (stack.len() - 1) as f64]);
     }
     let (steps, _) = lowest(&tried.iter().map(|t| t[1]).collect::<Vec<_>>());
-    Ok(CondenserFit { focused, condenser_na: microscope.na * (FIRST + STEP * steps), tried })
+    Ok(CondenserFit { focused: *focused, condenser_na: microscope.na * (FIRST + STEP * steps), tried })
 }

@@ -47,7 +47,7 @@ pub struct EdgeFit {
 pub fn edge(image: &[f32], width: usize, window: Window) -> Result<EdgeFit, Error> {
     assert!(width > 0 && image.len().is_multiple_of(width), "the image is not whole rows of its width");
     window.check(width, image.len() / width)?;
-    let pixels = window.crop(image, width);
+    let pixels: Vec<f32> = window.crop(image, width).collect();
     let nothing = Error::Nothing { thing: "edge" };
     let angle = lightward(&pixels, window.width).ok_or_else(|| nothing.clone())?;
     let [cx, cy] = [window.width, window.height].map(|side| (side as f64 - 1.0) / 2.0);

@@ -1,4 +1,4 @@
-use super::{Window, lowest, mean_difference, sharpest, stack_height};
+use super::{Seen, Window, lowest};
 use crate::{Border, Error, Gaussian, Scratch};
 
 /// Widest Gaussian that is tried, and the step between two, pixels.
@@ -70,21 +70,16 @@ impl Line {
 ///
 /// The paper selects the focused plane by eye.
 pub fn focus(stack: &[&[f32]], width: usize, window: Window) -> Result<FocusCurve, Error> {
-    let height = stack_height(stack, width)?;
-    window.check(width, height)?;
-    let focused = sharpest(stack, width, window)?;
-    let outer = window.grown(MARGIN_PX, width, height);
-    let inner = window.inside(outer);
-    let source = outer.crop(stack[focused], width);
-    let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width)).collect();
+    let seen = Seen::new(stack, width, window, MARGIN_PX)?;
+    let focused = seen.focused;
     let mut differences = vec![Vec::new(); stack.len()];
-    let (mut blurred, mut scratch) = (source.clone(), Scratch::new());
+    let (mut blurred, mut scratch) = (seen.source.clone(), Scratch::new());
     let mut sigma = 0.0;
     while sigma <= WIDEST_PX {
-        Gaussian::new(sigma)?.blur_into(&source, outer.width, Border::Replicate, &mut blurred, &mut scratch);
-        let seen = inner.crop(&blurred, outer.width);
-        for (list, target) in differences.iter_mut().zip(&targets) {
-            list.push(mean_difference(&seen, target));
+        let gaussian = Gaussian::new(sigma)?;
+        gaussian.blur_into(&seen.source, seen.outer.width, Border::Replicate, &mut blurred, &mut scratch);
+        for (plane, list) in differences.iter_mut().enumerate() {
+            list.push(seen.difference(&blurred, plane));
         }
         sigma += STEP_PX;
     }

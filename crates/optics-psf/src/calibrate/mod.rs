@@ -15,6 +15,7 @@ pub use edge::{EdgeFit, edge};
 pub use focus::{FocusCurve, Line, focus};
 
 use crate::Error;
+use crate::error::require;
 
 /// Part of an image, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,45 +53,53 @@ impl Window {
     }
 
     /// Its pixels, row after row.
-    fn crop(self, image: &[f32], width: usize) -> Vec<f32> {
-        self.rows().flat_map(|y| &image[y * width + self.left..y * width + self.left + self.width]).copied().collect()
-    }
-
-    fn rows(self) -> core::ops::Range<usize> {
-        self.top..self.top + self.height
-    }
-
-    /// The same pixels in a crop of `outer`.
-    fn inside(self, outer: Self) -> Self {
-        Self { left: self.left - outer.left, top: self.top - outer.top, ..self }
+    fn crop(self, image: &[f32], width: usize) -> impl Iterator<Item = f32> {
+        let rows = self.top..self.top + self.height;
+        rows.flat_map(move |y| &image[y * width + self.left..][..self.width]).copied()
     }
 }
 
-/// Height of the images of a stack, which has at least three of one size.
-///
-/// # Panics
-///
-/// As the public functions say.
-fn stack_height(stack: &[&[f32]], width: usize) -> Result<usize, Error> {
-    if stack.len() < 3 {
-        return Err(Error::Count { field: "stack", value: stack.len(), accepted: "three planes or more" });
-    }
-    assert!(width > 0 && stack[0].len().is_multiple_of(width), "an image is not whole rows of its width");
-    assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "planes differ in size");
-    Ok(stack[0].len() / width)
+/// What a window shows of a stack.
+struct Seen {
+    /// The plane with most detail, which is neither the first nor the last.
+    focused: usize,
+    /// The window with a margin, the window in that, and what the focused plane holds there.
+    outer: Window,
+    inner: Window,
+    source: Vec<f32>,
+    /// What each plane holds in the window.
+    targets: Vec<Vec<f32>>,
 }
 
-/// The plane with most detail, which is neither the first nor the last.
-fn sharpest(stack: &[&[f32]], width: usize, window: Window) -> Result<usize, Error> {
-    let detail: Vec<f64> = stack.iter().map(|plane| detail(&window.crop(plane, width), window.width)).collect();
-    if detail.iter().any(|d| !d.is_finite()) || detail.iter().all(|d| *d == 0.0) {
-        return Err(Error::Nothing { thing: "detail" });
+impl Seen {
+    /// # Panics
+    ///
+    /// As the public functions say.
+    fn new(stack: &[&[f32]], width: usize, window: Window, margin: usize) -> Result<Self, Error> {
+        require("stack", stack.len() as f64, stack.len() >= 3, "three planes or more")?;
+        assert!(width > 0 && stack[0].len().is_multiple_of(width), "an image is not whole rows of its width");
+        assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "planes differ in size");
+        let height = stack[0].len() / width;
+        window.check(width, height)?;
+        let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width).collect()).collect();
+        let detail: Vec<f64> = targets.iter().map(|target| detail(target, window.width)).collect();
+        if detail.iter().any(|d| !d.is_finite()) || detail.iter().all(|d| *d == 0.0) {
+            return Err(Error::Nothing { thing: "detail" });
+        }
+        let focused = (0..detail.len()).max_by(|&a, &b| detail[a].total_cmp(&detail[b])).unwrap_or(0);
+        if focused == 0 || focused + 1 == stack.len() {
+            return Err(Error::NoFocusInside { sharpest: focused, planes: stack.len() });
+        }
+        let outer = window.grown(margin, width, height);
+        let inner = Window { left: window.left - outer.left, top: window.top - outer.top, ..window };
+        Ok(Self { focused, outer, inner, source: outer.crop(stack[focused], width).collect(), targets })
     }
-    let best = (0..detail.len()).max_by(|&a, &b| detail[a].total_cmp(&detail[b])).unwrap_or(0);
-    if best == 0 || best + 1 == stack.len() {
-        return Err(Error::NoFocusInside { sharpest: best, planes: stack.len() });
+
+    /// The mean of |a − b| over the window, of an image of what is around it and a plane.
+    fn difference(&self, image: &[f32], plane: usize) -> f64 {
+        let (inner, target) = (self.inner.crop(image, self.outer.width), &self.targets[plane]);
+        inner.zip(target).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / target.len() as f64
     }
-    Ok(best)
 }
 
 /// Squared differences over two pixels, along x and y.
@@ -99,11 +108,6 @@ fn detail(image: &[f32], width: usize) -> f64 {
     let along: f64 = image.chunks_exact(width).flat_map(|row| row.windows(3)).map(|w| square(w[0], w[2])).sum();
     let across: f64 = image.iter().zip(&image[2 * width..]).map(|(a, b)| square(*a, *b)).sum();
     along + across
-}
-
-/// The mean of |a − b|.
-fn mean_difference(a: &[f32], b: &[f32]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / a.len() as f64
 }
 
 /// Where a curve sampled at equal steps is least, in steps, and its value there: a parabola through the lowest
