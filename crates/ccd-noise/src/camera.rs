@@ -1,7 +1,7 @@
 use rand_core::Rng;
 
-use crate::bloom::{Spill, spread};
-use crate::chain::{Chain, Marker, expose_row, expose_uneven_row, gather_row, mean_row, read_row};
+use crate::bloom::spread;
+use crate::chain::{Chain, Marker, expose_row, gather_row, mean_row, read_row};
 use crate::field::{NoiseField, rows, whole_rows};
 use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
@@ -23,7 +23,6 @@ use crate::{Blooming, CameraParams, Error, PhotonNoise};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     params: CameraParams,
-    max_dn: u16,
     chain: Chain,
 }
 
@@ -60,7 +59,7 @@ impl Camera {
     /// If a field lies outside its range.
     pub fn new(params: &CameraParams) -> Result<Self, Error> {
         params.check()?;
-        Ok(Self { params: params.clone(), max_dn: params.max_dn(), chain: Chain::new(params) })
+        Ok(Self { params: params.clone(), chain: Chain::new(params) })
     }
 
     /// The parameters it was made from.
@@ -78,7 +77,7 @@ impl Camera {
     /// The highest grey level, 2ᵇ - 1.
     #[must_use]
     pub fn max_dn(&self) -> u16 {
-        self.max_dn
+        self.params.max_dn()
     }
 
     /// Mean photo-electrons of this many photons on a pixel: η·µ_p.
@@ -90,7 +89,7 @@ impl Camera {
     /// Mean photo-electrons at which an average pixel saturates: it is full, or the converter at its highest level.
     #[must_use]
     pub fn saturation_e(&self) -> f64 {
-        let converter = (f64::from(self.max_dn) - self.params.offset_dn) / self.params.gain_dn_per_e;
+        let converter = (f64::from(self.max_dn()) - self.params.offset_dn) / self.params.gain_dn_per_e;
         converter.min(self.params.full_well_e) - self.params.dark_e()
     }
 
@@ -197,20 +196,6 @@ impl Camera {
         mean_row(&self.chain, electrons, out);
     }
 
-    /// Rounds grey levels, half up, and clips them to 0 … 2ᵇ - 1. Returns how many are at the
-    /// highest level.
-    ///
-    /// # Panics
-    ///
-    /// If `out` is not as long as `dn`.
-    pub fn quantise_into(&self, dn: &[f32], out: &mut [u16]) -> usize {
-        assert_eq!(out.len(), dn.len(), "out has the wrong number of pixels");
-        for (out, &dn) in out.iter_mut().zip(dn) {
-            *out = self.chain.code(dn);
-        }
-        out.iter().filter(|&&code| code == self.max_dn).count()
-    }
-
     fn window(
         &self,
         electrons: &[f32],
@@ -226,11 +211,9 @@ impl Camera {
         let mut saturated = 0;
         let both = electrons.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (y, (electrons, out)) in rows(origin).zip(both) {
+            let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
             let marker = &mut Marker { y, runs: runs.as_deref_mut() };
-            saturated += match &chain.pattern {
-                None => expose_row(chain, &field.row(y), x, electrons, out, marker),
-                Some(pattern) => expose_uneven_row(chain, &field.row(y), &pattern.row(y), x, electrons, out, marker),
-            };
+            saturated += expose_row(chain, &field.row(y), pattern.as_ref(), x, electrons, out, marker);
         }
         saturated
     }
@@ -259,13 +242,12 @@ impl Camera {
             let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
             gather_row(chain, &field.row(y), pattern.as_ref(), electrons, charge);
         }
-        let Spill { drained, escaped } = spread(&mut charge, width, full_well, vertical, anti_blooming);
-        let mut saturated = 0;
+        let mut exposure = spread(&mut charge, width, full_well, vertical, anti_blooming);
         for (y, (charge, out)) in (0..).zip(charge.chunks_exact(width).zip(out.chunks_exact_mut(width))) {
             let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
             let marker = &mut Marker { y, runs: runs.as_deref_mut() };
-            saturated += read_row(chain, &field.row(y), pattern.as_ref(), full_well, charge, out, marker);
+            exposure.saturated += read_row(chain, &field.row(y), pattern.as_ref(), full_well, charge, out, marker);
         }
-        Exposure { saturated, drained_e: drained, escaped_e: escaped }
+        exposure
     }
 }

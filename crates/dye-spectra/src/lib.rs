@@ -8,11 +8,9 @@ mod error;
 #[cfg(feature = "image")]
 mod interop;
 mod light;
-mod lobe;
 mod params;
 mod rows;
 mod srgb;
-mod sum;
 
 pub use colour::{Channel, Colour, Node};
 pub use curve::Curve;

@@ -1,9 +1,9 @@
 //! From the camera's channels to the colours of a screen.
 
 use crate::dye::{Amounts, DYES, Dye, amounts};
-use crate::lobe::{Lobe, lobe, sum};
+use crate::light::{Lobe, lobe, sum};
 use crate::params::ColourParams;
-use crate::sum::{Term, transmittance};
+use crate::rows::{Wavelength, exact};
 
 type Matrix = [[f64; 3]; 3];
 
@@ -42,10 +42,9 @@ const RIDGE: f64 = 1e-6;
 
 /// The matrix whose rows add up to 1, so that white stays white, and which best takes the camera's light of stained
 /// smears to what the observer sees.
-pub(crate) fn matrix(params: &ColourParams, spectral: &[Term]) -> Matrix {
-    let observer = Observer::new(params);
-    let smears = smears();
-    let pairs: Vec<[[f64; 3]; 2]> = smears.map(|c| [transmittance(spectral, &c), observer.see(&c)]).collect();
+pub(crate) fn matrix(params: &ColourParams, spectral: &[Wavelength]) -> Matrix {
+    let observer = observer(params);
+    let pairs: Vec<[[f64; 3]; 2]> = smears().map(|c| [exact(spectral, &c), exact(&observer, &c)]).collect();
     std::array::from_fn(|row| {
         // m·t with m = (p, q, 1 − p − q) is p·(t₀ − t₂) + q·(t₁ − t₂) + t₂: least squares in p and q, by Cramer's rule.
         let identity = |column: usize| if row == column { 1.0 } else { 0.0 };
@@ -84,39 +83,27 @@ fn smears() -> impl Iterator<Item = Amounts> {
     })
 }
 
-/// The standard observer, adapted to the lamp.
-struct Observer {
-    /// Absorbance of unit amounts, and weights that give linear sRGB; those of each colour add up to 1.
-    terms: Vec<Term>,
-}
-
-impl Observer {
-    fn new(params: &ColourParams) -> Self {
-        let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
-        let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
-        let mut white = [0.0; 3];
-        for w in visible.middles(OBSERVER_BANDS) {
-            for (white, seen) in white.iter_mut().zip(seen(w)) {
-                *white += seen;
-            }
+/// The standard observer, adapted to the lamp, with weights that give linear sRGB; those of each colour add up to 1.
+fn observer(params: &ColourParams) -> Vec<Wavelength> {
+    let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
+    let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
+    let mut white = [0.0; 3];
+    for w in visible.middles(OBSERVER_BANDS) {
+        for (white, seen) in white.iter_mut().zip(seen(w)) {
+            *white += seen;
         }
-        let (cones, cones_d65) = (times(&CONES, white), times(&CONES, D65));
-        let adapt = |xyz: [f64; 3]| {
-            let responses = times(&CONES, xyz);
-            times(&FROM_CONES, std::array::from_fn(|c| responses[c] * cones_d65[c] / cones[c]))
-        };
-        let srgb_white = times(&XYZ_TO_SRGB, adapt(white));
-        let term = |w: f64| {
-            let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
-            (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
-        };
-        Self { terms: visible.middles(OBSERVER_BANDS).map(term).collect() }
     }
-
-    /// Linear sRGB of stained glass; white is 1.
-    fn see(&self, amounts: &Amounts) -> [f64; 3] {
-        transmittance(&self.terms, amounts)
-    }
+    let (cones, cones_d65) = (times(&CONES, white), times(&CONES, D65));
+    let adapt = |xyz: [f64; 3]| {
+        let responses = times(&CONES, xyz);
+        times(&FROM_CONES, std::array::from_fn(|c| responses[c] * cones_d65[c] / cones[c]))
+    };
+    let srgb_white = times(&XYZ_TO_SRGB, adapt(white));
+    let term = |w: f64| {
+        let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
+        (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
+    };
+    visible.middles(OBSERVER_BANDS).map(term).collect()
 }
 
 fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {
