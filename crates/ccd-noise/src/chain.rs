@@ -85,29 +85,6 @@ impl Chain {
         means
     }
 
-    /// Charges before and after reading, of a block of pixels.
-    #[inline(always)]
-    fn charges(
-        &self,
-        electrons: &[f32; BLOCK],
-        block: &Block<'_>,
-        traits: Option<&Traits>,
-    ) -> ([f32; BLOCK], [f32; BLOCK]) {
-        let [shot, read] = block.normal_pairs();
-        let means = self.means(electrons, traits);
-        // g_po and the standard deviation of g_g of Eq. 13
-        let mut noise = traits.map_or([self.read_noise; BLOCK], |traits| traits.read_noise);
-        let mut charge = match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, block),
-            PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, traits, &mut noise, &shot, block),
-        };
-        for charge in &mut charge {
-            *charge = charge.min(self.full_well);
-        }
-        (charge, with_read_noise(&charge, &noise, &read, traits))
-    }
-
     /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
     #[inline(always)]
     fn one_normal(
@@ -131,25 +108,6 @@ impl Chain {
             charge[i] = if normal { means[i] } else { charge[i] };
         }
         charge
-    }
-
-    /// Whole electrons that a block of pixels gathers, as if they had room for them.
-    #[inline(always)]
-    fn gathered(&self, electrons: &[f32; BLOCK], block: &Block<'_>, traits: Option<&Traits>) -> [f32; BLOCK] {
-        let means = self.means(electrons, traits);
-        let [shot, _] = block.normal_pairs();
-        match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, block),
-            PhotonNoise::Off => means.map(f32::round),
-            PhotonNoise::NormalAbove { .. } => {
-                let mut charge = poisson(&means, &shot, block);
-                for i in 0..BLOCK {
-                    let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
-                    charge[i] = if means[i] >= self.normal_from { normal } else { charge[i] };
-                }
-                charge
-            }
-        }
     }
 
     /// Puts the grey levels of the block at `x` out, from the charges before and after reading, and returns the number of
@@ -246,14 +204,26 @@ fn expose(
     for (x, (electrons, out)) in blocks(x).zip(both) {
         // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
         let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
-        let traits = pattern.map(|pattern| pattern.block(x));
-        let (before, after) = chain.charges(&electrons, &row.block(x), traits.as_ref());
-        saturated += chain.convert(chain.full_well, [&before, &after], x, out, marker);
+        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let (traits, [shot, read]) = (traits.as_ref(), block.normal_pairs());
+        let means = chain.means(&electrons, traits);
+        // g_po and the standard deviation of g_g of Eq. 13
+        let mut noise = traits.map_or([chain.read_noise; BLOCK], |traits| traits.read_noise);
+        let mut charge = match chain.photon_noise {
+            PhotonNoise::Exact => poisson(&means, &shot, &block),
+            PhotonNoise::Off => means,
+            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, traits, &mut noise, &shot, &block),
+        };
+        for charge in &mut charge {
+            *charge = charge.min(chain.full_well);
+        }
+        let after = with_read_noise(&charge, &noise, &read, traits);
+        saturated += chain.convert(chain.full_well, [&charge, &after], x, out, marker);
     }
     saturated
 }
 
-/// The whole electrons that a row gathers.
+/// The whole electrons that a row gathers, as if pixels had room for them.
 #[multiversion::multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts from 0 to 2²⁵")]
 pub(crate) fn gather_row(
@@ -265,8 +235,17 @@ pub(crate) fn gather_row(
 ) {
     let both = electrons.chunks(BLOCK).zip(charge.chunks_mut(BLOCK));
     for (x, (electrons, charge)) in blocks(0).zip(both) {
-        let traits = pattern.map(|pattern| pattern.block(x));
-        let gathered = chain.gathered(&padded(electrons), &row.block(x), traits.as_ref());
+        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let means = chain.means(&padded(electrons), traits.as_ref());
+        let [shot, _] = block.normal_pairs();
+        let mut gathered =
+            if chain.photon_noise == PhotonNoise::Off { means.map(f32::round) } else { poisson(&means, &shot, &block) };
+        if let PhotonNoise::NormalAbove { .. } = chain.photon_noise {
+            for i in 0..BLOCK {
+                let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
+                gathered[i] = if means[i] >= chain.normal_from { normal } else { gathered[i] };
+            }
+        }
         for (charge, gathered) in charge.iter_mut().zip(gathered) {
             *charge = gathered as u32;
         }

@@ -1,7 +1,6 @@
 use crate::curve::Curve;
 use crate::dye::{Amounts, DYES, Dye};
-use crate::error::{Error, require};
-use crate::params::{ColourParams, Mixing};
+use crate::params::{ColourParams, Error, Mixing, require};
 use crate::rows::{self, Terms, Wavelength};
 use crate::srgb;
 

@@ -4,9 +4,6 @@
 mod colour;
 mod curve;
 mod dye;
-mod error;
-#[cfg(feature = "image")]
-mod interop;
 mod light;
 mod params;
 mod rows;
@@ -15,7 +12,6 @@ mod srgb;
 pub use colour::{Channel, Colour, Node};
 pub use curve::Curve;
 pub use dye::{Amounts, DYES, Dye, absorbance, amounts};
-pub use error::Error;
 pub use light::{Lamp, Sensor};
-pub use params::{ColourParams, Mixing};
+pub use params::{ColourParams, Error, Mixing};
 pub use srgb::encode_srgb;

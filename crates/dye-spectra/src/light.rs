@@ -1,4 +1,4 @@
-use crate::error::{Error, require};
+use crate::params::{Error, require};
 
 /// One peak of a spectrum: a Gaussian with a width of its own on either side.
 #[derive(Debug, Clone, Copy)]

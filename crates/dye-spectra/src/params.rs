@@ -1,5 +1,27 @@
-use crate::error::{Error, require};
+use thiserror::Error;
+
 use crate::light::{Lamp, Sensor};
+
+/// Why parameters were refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// One number lies outside the range its field allows.
+    #[error("{field} is {value}; it must be {accepted}")]
+    OutOfRange {
+        /// Path of the field, as in `lamp.temperature_k`.
+        field: &'static str,
+        /// What it held.
+        value: f64,
+        /// What would be accepted.
+        accepted: &'static str,
+    },
+}
+
+/// Fails unless `value` is finite and `holds`.
+pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'static str) -> Result<(), Error> {
+    if value.is_finite() && holds { Ok(()) } else { Err(Error::OutOfRange { field, value, accepted }) }
+}
 
 /// How the light of a channel follows from the amounts of dye.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -67,12 +89,7 @@ mod tests {
     fn refusals_name_field_value_and_range() {
         let default = ColourParams::default;
         let halogen = |temperature_k| ColourParams { lamp: Lamp::Halogen { temperature_k }, ..default() };
-        let fields: [(&dyn Fn(f64) -> ColourParams, &[f64], &str); 4] = [
-            (
-                &|v| ColourParams { wavelengths: v as usize, ..default() },
-                &[0.0, 2000.0],
-                "wavelengths is {}; it must be from 1 to 1024",
-            ),
+        let fields: [(&dyn Fn(f64) -> ColourParams, &[f64], &str); 3] = [
             (
                 &|v| ColourParams { from_um: v, to_um: 0.6, ..default() },
                 &[0.0, 0.6, 0.7, f64::NAN],
@@ -92,5 +109,9 @@ mod tests {
             }
         }
         default().check().unwrap();
+        for wavelengths in [0, 2000] {
+            let error = ColourParams { wavelengths, ..default() }.check().unwrap_err().to_string();
+            assert_eq!(error, format!("wavelengths is {wavelengths}; it must be from 1 to 1024"));
+        }
     }
 }

@@ -88,7 +88,7 @@ fn picture(c: &mut Criterion) {
         let depths: Vec<f64> = slabs.iter().map(|&k| SLABS[k]).collect();
         let field = field(&depths, &[0.0]);
         let mut specimen = field.specimen();
-        let mut out = vec![0.0; field.image_width() * field.image_height()];
+        let mut out = vec![0.0; field.image_size().into_iter().product()];
         group.bench_function(name, |b| {
             b.iter(|| {
                 for (i, &k) in slabs.iter().enumerate() {
@@ -111,7 +111,7 @@ fn stack(c: &mut Criterion) {
     let stages: Vec<f64> = (-10..=10).map(|i| 0.3 * f64::from(i)).collect();
     let field = field(&SLABS, &stages);
     let mut specimen = field.specimen();
-    let mut out = vec![0.0; field.image_width() * field.image_height()];
+    let mut out = vec![0.0; field.image_size().into_iter().product()];
     let absorbance: Vec<Vec<f32>> = (0..SLABS.len()).map(slab).collect();
     let mut group = c.benchmark_group("stack");
     group.sample_size(10);

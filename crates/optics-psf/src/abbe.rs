@@ -93,10 +93,6 @@ impl Layer {
 /// the uppermost layer; from a layer to the next it is carried by exp 2πi Δz γ_n(f + s). That is an
 /// FFT a direction and two more for each further layer; [`BrightField`](crate::BrightField) is
 /// measured against it. The grid is periodic: what leaves on one side comes back on the other.
-///
-/// # Differences from the paper
-///
-/// The paper blurs absorbance with Gaussians.
 #[derive(Debug, Clone)]
 pub struct Abbe {
     microscope: Microscope,
@@ -116,13 +112,6 @@ impl Plane {
     fn forward(&mut self) {
         self.plan.forward(&self.field, &mut self.spectrum, &mut self.scratch);
     }
-}
-
-/// Directions of one colour of the band, cycles/µm, and the weight of all together.
-struct Light {
-    wavelength_um: f64,
-    weight: f64,
-    directions: Vec<[f64; 2]>,
 }
 
 impl Abbe {
@@ -148,7 +137,7 @@ impl Abbe {
     /// How many coherent images make one image.
     #[must_use]
     pub fn directions(&self) -> usize {
-        self.lights().map(|light| light.directions.len()).sum()
+        self.microscope.bands().into_iter().map(|(wavelength, _)| self.directions_of(wavelength).len()).sum()
     }
 
     /// The intensity of `layers` relative to that of empty slide, after a travel of the stage (see
@@ -180,16 +169,16 @@ impl Abbe {
         plane.forward();
         let entering = plane.spectrum.clone();
         let mut image = vec![0.0; samples];
-        for light in self.lights() {
-            self.add(&light, &layers, stage_um, &entering, &mut plane, &mut image);
+        for band in self.microscope.bands() {
+            self.add(band, &layers, stage_um, &entering, &mut plane, &mut image);
         }
         Ok(image)
     }
 
-    /// Adds the images of one colour.
+    /// Adds the images of one colour, by its wavelength and weight.
     fn add(
         &self,
-        light: &Light,
+        (wavelength_um, weight): (f64, f64),
         layers: &[&Layer],
         stage_um: f64,
         entering: &[Complex64],
@@ -197,16 +186,17 @@ impl Abbe {
         image: &mut [f64],
     ) {
         let params = self.microscope.params();
-        let pupil = |depth, stage| Pupil::new(params, light.wavelength_um, depth, stage);
+        let pupil = |depth, stage| Pupil::new(params, wavelength_um, depth, stage);
         let lens = pupil(layers.last().map_or(0.0, |layer| layer.depth_um), stage_um);
         let steps: Vec<(Pupil, &Layer)> =
             layers.windows(2).map(|pair| (pupil(pair[0].depth_um - pair[1].depth_um, 0.0), pair[1])).collect();
         let square = |f: [f64; 2]| f[0] * f[0] + f[1] * f[1];
-        let passing = light.directions.iter().filter(|&&s| lens.passes(square(s))).count();
-        let share = light.weight / passing as f64;
-        let travelling = params.mount_index / light.wavelength_um;
+        let directions = self.directions_of(wavelength_um);
+        let passing = directions.iter().filter(|&&s| lens.passes(square(s))).count();
+        let share = weight / passing as f64;
+        let travelling = params.mount_index / wavelength_um;
         let samples = image.len() as f64;
-        for &s in &light.directions {
+        for s in directions {
             plane.spectrum.copy_from_slice(entering);
             for (step, layer) in &steps {
                 let wave = |f| (square(f) < travelling * travelling).then(|| step.medium_waves(square(f)));
@@ -246,18 +236,16 @@ impl Abbe {
         plane.plan.inverse(&plane.spectrum, is_dark, &mut plane.field, &mut plane.scratch);
     }
 
-    fn lights(&self) -> impl Iterator<Item = Light> {
+    /// Directions of light, cycles/µm.
+    fn directions_of(&self, wavelength_um: f64) -> Vec<[f64; 2]> {
         let pitch = self.microscope.pitch_um();
         let steps = [self.params.width, self.params.height].map(|side| 1.0 / (side as f64 * pitch));
-        self.microscope.bands().into_iter().map(move |(wavelength_um, weight)| {
-            let radius = self.microscope.params().condenser_na / wavelength_um;
-            let directions = match self.params.source {
-                Source::Vogel { points } => sunflower(points, radius),
-                Source::Lattice { stride } => lattice(steps.map(|step| step * stride as f64), radius),
-                Source::Axis => vec![[0.0; 2]],
-            };
-            Light { wavelength_um, weight, directions }
-        })
+        let radius = self.microscope.params().condenser_na / wavelength_um;
+        match self.params.source {
+            Source::Vogel { points } => sunflower(points, radius),
+            Source::Lattice { stride } => lattice(steps.map(|step| step * stride as f64), radius),
+            Source::Axis => vec![[0.0; 2]],
+        }
     }
 }
 

@@ -63,12 +63,7 @@ pub enum Padding {
 /// mean over each pixel of the camera, if little is left there of detail finer than the pixels. What is then lost are
 /// details that two slabs have in common within one pixel, below 0.1 % of the contrast; with an oversampling of 1
 /// there are no such details.
-///
-/// # Differences from the paper
-///
-/// The paper blurs absorbance with Gaussians (Eqs. 11 to 14), which [`Gaussian`](crate::Gaussian)
-/// and [`DepthOfFocus`](crate::DepthOfFocus) do; that is 8 to 87 % off from Abbe's image where this
-/// is 1 % off.
+/// The paper's Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) are 8 to 87 % off where this is 1 % off.
 #[derive(Debug)]
 pub struct BrightField {
     microscope: Microscope,
@@ -140,16 +135,10 @@ impl BrightField {
         Specimen { slabs: vec![Spectra::default(); slabs], ..Specimen::default() }
     }
 
-    /// Width of a picture in pixels of the camera.
+    /// Width and height of a picture in pixels of the camera.
     #[must_use]
-    pub fn image_width(&self) -> usize {
-        self.size[0] / self.microscope.params().oversampling
-    }
-
-    /// Height of a picture in pixels of the camera.
-    #[must_use]
-    pub fn image_height(&self) -> usize {
-        self.size[1] / self.microscope.params().oversampling
+    pub fn image_size(&self) -> [usize; 2] {
+        self.size.map(|side| side / self.microscope.params().oversampling)
     }
 
     /// Puts decadic absorbances, 0 or more, into a slab in place of what was there; its phase stays.
@@ -220,7 +209,7 @@ impl BrightField {
     /// If there is no such plane, or the specimen is another's.
     #[must_use]
     pub fn image(&self, specimen: &mut Specimen, plane: usize) -> Vec<f32> {
-        let mut out = vec![0.0; self.image_width() * self.image_height()];
+        let mut out = vec![0.0; self.image_size().into_iter().product()];
         self.image_into(specimen, plane, &mut out);
         out
     }
@@ -231,9 +220,10 @@ impl BrightField {
     /// # Panics
     ///
     /// If there is no such plane, the specimen is another's, or `out` has not
-    /// [`image_width`](Self::image_width) · [`image_height`](Self::image_height) pixels.
+    /// [as many pixels](Self::image_size).
     pub fn image_into(&self, specimen: &mut Specimen, plane: usize, out: &mut [f32]) -> usize {
-        assert_eq!(out.len(), self.image_width() * self.image_height(), "the picture has another size");
+        let [image_width, image_height] = self.image_size();
+        assert_eq!(out.len(), image_width * image_height, "the picture has another size");
         let Specimen { slabs, scratch, product } = specimen;
         let filters = &self.planes[plane];
         assert_eq!(slabs.len(), filters.len(), "the specimen has other slabs");
@@ -254,7 +244,7 @@ impl BrightField {
             floored = samples.div_ceil(oversampling * oversampling);
             mean_of_pixels(product, width, oversampling, out);
         }
-        floored += self.expose(Lattice::Camera, slabs, filters, out, self.image_width(), scratch);
+        floored += self.expose(Lattice::Camera, slabs, filters, out, image_width, scratch);
         lift(out, self.microscope.params().stray_light);
         floored
     }

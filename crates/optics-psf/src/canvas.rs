@@ -43,9 +43,20 @@ struct PixelMean {
 }
 
 impl PixelMean {
-    /// Whole blocks of frequencies.
-    fn new(side: usize, oversampling: usize) -> Self {
-        let mean = |k: usize| mean_over_pixel(k as f64 / side as f64, oversampling);
+    /// Whole blocks of frequencies. The mean is (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, f in cycles per sample:
+    /// around its middle, and from its first sample, k = 0 … n − 1.
+    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+    fn new(side: usize, n: usize) -> Self {
+        let mean = |place: usize| {
+            let f = place as f64 / side as f64;
+            let (mut middle, mut moved) = (0.0, [0.0; 2]);
+            for k in 0..n {
+                let (c, s) = turn(f * k as f64);
+                moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
+                middle += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
+            }
+            (middle as f32, moved.map(|v| v as f32))
+        };
         let (size, moved) = (0..(side / 2 + 1).next_multiple_of(LANES)).map(mean).unzip();
         Self { size, moved }
     }
@@ -151,14 +162,15 @@ impl Canvas {
         plane.forward(support, fill, spectrum, scratch);
     }
 
-    /// Frequencies of a block.
-    fn block(&self, block: usize) -> Block<'_> {
-        Block {
+    /// Adds a block of a spectrum, times a response of a filter, to `sum`.
+    fn add(&self, (filter, part): (&Filter, Part), spectrum: &[Lanes], block: usize, reach: usize, sum: &mut [Lanes]) {
+        let at = Block {
             step_x: self.step_x,
             y: &self.y[block],
             pixel_x: &self.pixel[0].size,
             pixel_y: &self.pixel[1].size.as_chunks().0[block],
-        }
+        };
+        filter.add(part, at, self.object.support.block(spectrum, block), reach, sum);
     }
 
     /// The correction of the in-focus form, if that is not known yet. With 1 − T = 2a − a² it is
@@ -171,16 +183,15 @@ impl Canvas {
         let Raster { plane, support } = &self.object;
         // Of the picture, and of its spectrum, that of as many samples as the object has.
         let (norm, share) = (plane.norm(), self.squares.norm() / plane.norm());
+        let blurred = (in_focus, Part::Absorption);
         let fill = |block: usize, line: &mut [Lanes]| {
-            let (at, from) = (self.block(block), support.block(amplitude, block));
-            in_focus.add(Part::Absorption, at, from, support.reach(block), line);
+            self.add(blurred, amplitude, block, support.reach(block), line);
         };
         let square = |stripe: &mut [Lanes]| squared(stripe.as_flattened_mut().as_flattened_mut(), norm, share);
         self.squares.mapped(support, fill, square, correction, scratch);
         twice_less(amplitude.as_flattened_mut().as_flattened_mut(), absorbed.as_flattened().as_flattened());
         for block in 0..support.blocks() {
-            let (at, from) = (self.block(block), support.block(amplitude, block));
-            in_focus.add(Part::Absorption, at, from, support.reach(block), support.block_mut(correction, block));
+            self.add(blurred, amplitude, block, support.reach(block), support.block_mut(correction, block));
         }
     }
 
@@ -218,10 +229,9 @@ impl Canvas {
         scratch: &mut LaneScratch,
     ) -> usize {
         let add = |block: usize, reach: usize, line: &mut [Lanes]| {
-            let (at, support) = (self.block(block), &self.object.support);
-            filter.add(Part::Absorption, at, support.block(&spectra.absorbed, block), reach, line);
+            self.add((filter, Part::Absorption), &spectra.absorbed, block, reach, line);
             if filter.is_corrected {
-                filter.add(Part::Correction, at, support.block(&spectra.correction, block), reach, line);
+                self.add((filter, Part::Correction), &spectra.correction, block, reach, line);
             }
         };
         let (norm, mut floored) = (self.object.plane.norm(), 0);
@@ -243,8 +253,7 @@ impl Canvas {
     ) {
         let add = |block: usize, reach: usize, line: &mut [Lanes]| {
             for (filter, spectra) in parts.clone() {
-                let from = self.object.support.block(&spectra.phase, block);
-                filter.add(Part::Phase, self.block(block), from, reach, line);
+                self.add((filter, Part::Phase), &spectra.phase, block, reach, line);
             }
         };
         let factor = -2.0 * self.object.plane.norm();
@@ -260,19 +269,6 @@ pub(crate) struct Samples<'a> {
     pub(crate) width: usize,
     pub(crate) offset: usize,
     pub(crate) background: f32,
-}
-
-/// (1/n) ∑ₖ exp 2πi f k over the samples of a pixel: around its middle, and from its first sample, k = 0 … n − 1. f
-/// in cycles per sample.
-#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
-fn mean_over_pixel(f: f64, n: usize) -> (f32, [f32; 2]) {
-    let (mut middle, mut moved) = (0.0, [0.0; 2]);
-    for k in 0..n {
-        let (c, s) = turn(f * k as f64);
-        moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
-        middle += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
-    }
-    (middle as f32, moved.map(|v| v as f32))
 }
 
 #[multiversion(targets = "simd")]

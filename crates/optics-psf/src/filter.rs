@@ -5,7 +5,7 @@ use num_complex::Complex32;
 
 use crate::Microscope;
 use crate::lane_plane::{LANES, Lanes};
-use crate::transfer::{SIDED_SAMPLES, Shape, Transfer, corners};
+use crate::transfer::{SIDED_SAMPLES, Transfer, corners};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the
 /// in-focus form is whole, and gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
@@ -180,18 +180,16 @@ fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes
 #[inline(always)]
 fn accumulate(weights: &[f32; LANES], k: usize, spectrum: &[Lanes], sum: &mut [Lanes]) {
     let [last_from, last_to] = [spectrum.len() - k, sum.len() - k];
-    weigh(weights, &spectrum[k], &mut sum[k]);
-    if k > 0 {
-        weigh(weights, &spectrum[last_from], &mut sum[last_to]);
-    }
-}
-
-#[inline(always)]
-fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
-    for (to, from) in to.iter_mut().zip(from) {
-        for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
-            *to += from * weight;
+    let mut weigh = |from: usize, to: usize| {
+        for (to, from) in sum[to].iter_mut().zip(&spectrum[from]) {
+            for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
+                *to += from * weight;
+            }
         }
+    };
+    weigh(k, k);
+    if k > 0 {
+        weigh(last_from, last_to);
     }
 }
 
@@ -232,35 +230,26 @@ fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
 impl Response {
     #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
     fn new(transfer: &Transfer, correction: impl Fn(f64) -> f64) -> Self {
-        match &transfer.shape {
-            Shape::Round(list) => {
-                let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
-                let mut before = [0.0; 3];
-                for (i, &[absorption, phase]) in list.iter().enumerate() {
-                    let values = [absorption, phase, correction(transfer.step * i as f64)];
-                    for ((table, before), value) in tables.iter_mut().zip(&mut before).zip(values) {
-                        let value = value as f32;
-                        table[i][0] = value;
-                        if let Some(last) = i.checked_sub(1) {
-                            table[last][1] = value - *before;
-                        }
-                        *before = value;
-                    }
-                }
-                for (table, before) in tables.iter_mut().zip(before) {
-                    table[list.len() - 1][1] = -before;
-                }
-                Self::Round(tables)
+        let list = transfer.table.iter().enumerate();
+        if transfer.is_round() {
+            let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
+            for (i, &[absorption, phase]) in list {
+                let values = [absorption[0], phase[0], correction(transfer.step * i as f64)];
+                tables.iter_mut().zip(values).for_each(|(table, value)| table[i][0] = value as f32);
             }
-            Shape::Sided(list) => {
-                let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
-                let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
-                    let correction = correction(transfer.step * (i % SIDED_SAMPLES) as f64);
-                    [complex(absorption), complex(phase), complex([correction, 0.0])]
-                };
-                Self::Sided(list.iter().enumerate().map(entry).collect())
+            for table in tables.iter_mut() {
+                for i in 0..transfer.table.len() {
+                    table[i][1] = table[i + 1][0] - table[i][0];
+                }
             }
+            return Self::Round(tables);
         }
+        let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
+        let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
+            let correction = correction(transfer.step * (i % SIDED_SAMPLES) as f64);
+            [complex(absorption), complex(phase), complex([correction, 0.0])]
+        };
+        Self::Sided(list.map(entry).collect())
     }
 }
 

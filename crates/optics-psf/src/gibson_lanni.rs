@@ -1,7 +1,7 @@
 use crate::error::{Error, require, within};
+use crate::lens::Rules;
 use crate::microscope::distance;
 use crate::pupil::turn;
-use crate::quadrature::Rules;
 
 /// A lens as it was designed, and what it looks through.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,10 +48,6 @@ impl Default for GibsonLanniParams {
 /// OPD = z_p g(n_s) + t g(n_i) − t_i⁰ g(n_i⁰) + t_g g(n_g) − t_g⁰ g(n_g⁰), g(n) = √(n² − NA² ρ²), and the
 /// immersion t = z_p − z + n_i (−z_p/n_s − t_g/n_g + t_g⁰/n_g⁰ + t_i⁰/n_i⁰) as thick as focusing by
 /// z leaves it.
-///
-/// # Differences from the paper
-///
-/// The paper has a normal point spread function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GibsonLanni {
     params: GibsonLanniParams,

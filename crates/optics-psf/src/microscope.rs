@@ -1,8 +1,7 @@
 use crate::error::{Error, require, within};
+use crate::lens::Rules;
 use crate::pupil::Pupil;
-use crate::quadrature::Rules;
 use crate::transfer::Transfer;
-use crate::zernike::Zernike;
 
 /// What a microscopist knows about a bright-field microscope.
 ///
@@ -85,7 +84,15 @@ impl Microscope {
         let half = 0.5 * p.wavelength_um;
         within("bandwidth_um", p.bandwidth_um, 0.0..=half, "a number from 0 to half of wavelength_um")?;
         within("cover_error_um", p.cover_error_um, -100.0..=100.0, "a number from -100 to 100")?;
-        for (field, value) in p.zernike.terms() {
+        let Zernike { defocus, astigmatism, coma, spherical } = p.zernike;
+        for (field, value) in [
+            ("zernike.defocus", defocus),
+            ("zernike.astigmatism[0]", astigmatism[0]),
+            ("zernike.astigmatism[1]", astigmatism[1]),
+            ("zernike.coma[0]", coma[0]),
+            ("zernike.coma[1]", coma[1]),
+            ("zernike.spherical", spherical),
+        ] {
             within(field, value, -5.0..=5.0, "a number from -5 to 5")?;
         }
         within("pixel_um", p.pixel_um, 0.001..=100.0, "a number from 0.001 to 100")?;
@@ -181,4 +188,44 @@ const BAND_NODES: [f64; 2] = [0.7, 4.0];
 /// A distance from the focal plane, µm: farther away nothing of an object is left.
 pub(crate) fn distance(field: &'static str, value: f64) -> Result<f64, Error> {
     within(field, value, -1000.0..=1000.0, "a number from -1000 to 1000")
+}
+
+/// Aberrations of the objective: Zernike terms over its pupil, each in waves rms, −5 to 5. All are
+/// 0 by default (ours).
+///
+/// The polynomials are orthonormal over the unit disc (Noll's; DOI 10.1364/JOSA.66.000207), so the
+/// square root of the sum of the squares is the error of the whole wavefront, σ, and the Strehl
+/// ratio of a small one is exp(−(2πσ)²).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Zernike {
+    /// √3 (2ρ² − 1).
+    pub defocus: f64,
+    /// √6 ρ² cos 2θ and √6 ρ² sin 2θ.
+    pub astigmatism: [f64; 2],
+    /// √8 (3ρ³ − 2ρ) cos θ and √8 (3ρ³ − 2ρ) sin θ.
+    pub coma: [f64; 2],
+    /// √5 (6ρ⁴ − 6ρ² + 1).
+    pub spherical: f64,
+}
+
+impl Zernike {
+    /// Waves of the terms with a direction, at a point of the pupil, whose rim lies at distance 1.
+    pub(crate) fn sided_waves(&self, [x, y]: [f64; 2]) -> f64 {
+        let [a, b] = self.astigmatism;
+        let [c, d] = self.coma;
+        6_f64.sqrt() * (a * (x * x - y * y) + b * 2.0 * x * y)
+            + 8_f64.sqrt() * (3.0 * (x * x + y * y) - 2.0) * (c * x + d * y)
+    }
+
+    /// The terms without direction, where the square of the distance from the centre is `r2`.
+    #[inline(always)]
+    pub(crate) fn round_waves(&self, r2: f64) -> f64 {
+        self.defocus * 3_f64.sqrt() * (2.0 * r2 - 1.0)
+            + self.spherical * 5_f64.sqrt() * (6.0 * r2 * r2 - 6.0 * r2 + 1.0)
+    }
+
+    /// Whether every direction is like every other.
+    pub(crate) fn is_round(&self) -> bool {
+        self.astigmatism == [0.0; 2] && self.coma == [0.0; 2]
+    }
 }

@@ -30,41 +30,16 @@ const DIRECTIONS: usize = 64;
 pub struct Transfer {
     /// Distance between the entries of the table, cycles/µm.
     pub(crate) step: f64,
-    pub(crate) shape: Shape,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Shape {
-    /// (H_A, H_P) at multiples of the step.
-    Round(Vec<[f64; 2]>),
-    /// The same, complex, one row of frequencies for each direction around the circle.
-    Sided(Vec<[[f64; 2]; 2]>),
-}
-
-impl Shape {
-    pub(crate) fn numbers(&self) -> &[f64] {
-        match self {
-            Self::Round(table) => table.as_flattened(),
-            Self::Sided(table) => table.as_flattened().as_flattened(),
-        }
-    }
-
-    fn numbers_mut(&mut self) -> &mut [f64] {
-        match self {
-            Self::Round(table) => table.as_flattened_mut(),
-            Self::Sided(table) => table.as_flattened_mut().as_flattened_mut(),
-        }
-    }
+    /// (H_A, H_P), complex, at multiples of the step: one row of frequencies, or one for each direction around the circle.
+    pub(crate) table: Vec<[[f64; 2]; 2]>,
 }
 
 impl Transfer {
     pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64) -> Self {
         let step = Self::step_of(microscope);
-        let pupils: Vec<(Pupil, f64)> = microscope
-            .bands()
-            .into_iter()
-            .map(|(wavelength, weight)| (Pupil::new(microscope.params(), wavelength, depth_um, stage_um), weight))
-            .collect();
+        let pupil = |wavelength| Pupil::new(microscope.params(), wavelength, depth_um, stage_um);
+        let bands = microscope.bands().into_iter();
+        let pupils: Vec<(Pupil, f64)> = bands.map(|(wavelength, weight)| (pupil(wavelength), weight)).collect();
         let mut lens = Lens::default();
         let is_far = microscope.defocus_um(depth_um, stage_um).abs() > FAR_UM;
         let mut row = |direction: [f64; 2], samples: usize| {
@@ -77,7 +52,8 @@ impl Transfer {
             mean
         };
         if microscope.params().zernike.is_round() {
-            return Self { step, shape: Shape::Round(row([1.0, 0.0], SAMPLES)) };
+            let row = row([1.0, 0.0], SAMPLES).into_iter();
+            return Self { step, table: row.map(|[a, p]| [[a, 0.0], [p, 0.0]]).collect() };
         }
         let rows: Vec<Vec<[f64; 2]>> = (0..DIRECTIONS).map(|k| row(direction(k), SIDED_SAMPLES)).collect();
         // H_A = (E(f) + E*(−f))/2, H_P = (E(f) − E*(−f))/2i
@@ -86,19 +62,24 @@ impl Transfer {
             [[0.5 * (a + c), 0.5 * (b - d)], [0.5 * (b + d), 0.5 * (c - a)]]
         };
         let table = (0..DIRECTIONS).flat_map(|k| (0..SIDED_SAMPLES).map(move |i| (k, i))).map(|(k, i)| pair(k, i));
-        Self { step, shape: Shape::Sided(table.collect()) }
+        Self { step, table: table.collect() }
     }
 
     /// The sum of several of one microscope, each times its weight.
     pub(crate) fn mixed(parts: &[(Arc<Self>, f64)]) -> Self {
-        let mut shape = parts[0].0.shape.clone();
-        shape.numbers_mut().fill(0.0);
+        let mut table = vec![[[0.0; 2]; 2]; parts[0].0.table.len()];
         for (part, weight) in parts {
-            for (sum, value) in shape.numbers_mut().iter_mut().zip(part.shape.numbers()) {
+            let sums = table.as_flattened_mut().as_flattened_mut().iter_mut();
+            for (sum, value) in sums.zip(part.table.as_flattened().as_flattened()) {
                 *sum += weight * value;
             }
         }
-        Self { step: parts[0].0.step, shape }
+        Self { step: parts[0].0.step, table }
+    }
+
+    /// Whether one row says all.
+    pub(crate) fn is_round(&self) -> bool {
+        self.table.len() == SAMPLES
     }
 
     /// The distance of a microscope's tables between their entries, cycles/µm.
@@ -122,41 +103,35 @@ impl Transfer {
     }
 
     /// H_A and H_P.
-    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
-        match &self.shape {
-            Shape::Round(table) => {
-                let position = (x * x + y * y).sqrt() / self.step;
-                let last = table.len() - 1;
-                if position >= last as f64 {
-                    return [[0.0; 2]; 2];
-                }
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
-                let i = position as usize;
-                let t = position - i as f64;
-                let mix = |k: usize| [table[i][k] + t * (table[i + 1][k] - table[i][k]), 0.0];
-                [mix(0), mix(1)]
+    fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
+        let table = &self.table;
+        if self.is_round() {
+            let position = (x * x + y * y).sqrt() / self.step;
+            if position >= (SAMPLES - 1) as f64 {
+                return [[0.0; 2]; 2];
             }
-            Shape::Sided(table) => {
-                let mut mixed = [[0.0; 2]; 2];
-                for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
-                    for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
-                        *sum += weight * value;
-                    }
-                }
-                mixed
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
+            let i = position as usize;
+            let t = position - i as f64;
+            return [0, 1].map(|k| [table[i][k][0] + t * (table[i + 1][k][0] - table[i][k][0]), 0.0]);
+        }
+        let mut mixed = [[0.0; 2]; 2];
+        for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
+            for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
+                *sum += weight * value;
             }
         }
+        mixed
     }
 
     /// The frequency beyond which neither H_A nor H_P exceeds `size`, cycles/µm.
     pub(crate) fn extent(&self, size: f64) -> f64 {
         let large = |pair: &[f64; 2]| pair[0] * pair[0] + pair[1] * pair[1] > size * size;
-        let last = match &self.shape {
-            Shape::Round(table) => table.iter().rposition(large),
-            Shape::Sided(table) => {
-                let rows = table.chunks_exact(SIDED_SAMPLES);
-                rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
-            }
+        let last = if self.is_round() {
+            self.table.iter().rposition(|[a, p]| large(&[a[0], p[0]]))
+        } else {
+            let rows = self.table.chunks_exact(SIDED_SAMPLES);
+            rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
         };
         last.map_or(0.0, |i| self.step * (i + 1) as f64)
     }
@@ -208,21 +183,17 @@ fn profile(
             ((to / step) as usize + 1).min(sum.len()),
             NODES.0 + (NODES.1 * steepest * (to - from)).min(sum.len() as f64) as usize,
         );
-        let entries = sum.iter_mut().enumerate().take(end).skip(next);
+        values.clear();
+        let mut integral = |f| lens.integral(pupil, f, direction);
         if end <= next + nodes {
-            for (i, sum) in entries {
-                let f = step * i as f64;
-                let ([re, im], weight) = (lens.integral(pupil, f, direction), faded(f));
-                *sum = [sum[0] + weight * re, sum[1] + weight * im];
-            }
+            values.extend((next..end).map(|i| integral(step * i as f64)));
         } else {
-            let known = chebyshev([from, to], nodes, |f| lens.integral(pupil, f, direction));
             values.resize(end - next, [0.0; 2]);
-            interpolate(&known, step, next, &mut values);
-            for ((i, sum), &[re, im]) in entries.zip(&values) {
-                let weight = faded(step * i as f64);
-                *sum = [sum[0] + weight * re, sum[1] + weight * im];
-            }
+            interpolate(&chebyshev([from, to], nodes, integral), step, next, &mut values);
+        }
+        for ((i, sum), &[re, im]) in sum.iter_mut().enumerate().skip(next).zip(&values) {
+            let weight = faded(step * i as f64);
+            *sum = [sum[0] + weight * re, sum[1] + weight * im];
         }
         next = end.max(next);
     }

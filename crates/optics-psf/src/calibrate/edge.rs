@@ -31,7 +31,7 @@ pub struct EdgeFit {
     pub difference: f64,
 }
 
-/// σ_xy of the image plane, from a straight edge in a window ("Impulse response", Eq. 13).
+/// σ_xy of the image plane, from a straight edge in a window ("Impulse response", Eq. 13; the paper fits by eye).
 ///
 /// # Errors
 ///
@@ -40,10 +40,6 @@ pub struct EdgeFit {
 /// # Panics
 ///
 /// If the image is not whole rows of `width`.
-///
-/// # Differences from the paper
-///
-/// The paper fits by eye.
 pub fn edge(image: &[f32], width: usize, window: Window) -> Result<EdgeFit, Error> {
     assert!(width > 0 && image.len().is_multiple_of(width), "the image is not whole rows of its width");
     window.check(width, image.len() / width)?;

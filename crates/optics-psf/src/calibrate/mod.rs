@@ -6,16 +6,14 @@
 //!
 //! Images are intensities of any unit, rows of `width` pixels.
 
-mod condenser;
 mod edge;
-mod focus;
 
-pub use condenser::{CondenserFit, condenser};
 pub use edge::{EdgeFit, edge};
-pub use focus::{FocusCurve, Line, focus};
 
-use crate::Error;
 use crate::error::require;
+use crate::grid::fast_length;
+use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
+use crate::{Border, Error, Gaussian, Microscope, MicroscopeParams, Scratch};
 
 /// Part of an image, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,4 +122,187 @@ fn lowest(samples: &[f64]) -> (f64, f64) {
     }
     let shift = 0.5 * (a - c) / bend;
     (best as f64 + shift, b - 0.25 * (a - c) * shift)
+}
+
+/// Widest Gaussian that is tried, and the step between two, pixels.
+const WIDEST_PX: f64 = 16.0;
+const STEP_PX: f64 = 0.2;
+
+/// How far beyond the window the focused plane is looked at: three times the widest.
+const BLUR_MARGIN_PX: usize = 48;
+
+/// Blur against focus offset: the paper's Fig. 10.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FocusCurve {
+    /// The plane in focus: the one with most detail in the window.
+    pub focused: usize,
+    /// For each plane, σ in pixels of the Gaussian that maps the focused plane to it best; 0 for itself.
+    pub sigma_px: Vec<f64>,
+    /// For each plane, the mean of what is left between the two.
+    pub difference: Vec<f64>,
+    /// The line through the planes before the focused one.
+    pub before: Line,
+    /// The line through those after it.
+    pub after: Line,
+}
+
+/// σ against the number of planes from focus, |n|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Pixels per plane, of the line that best fits.
+    pub slope_px: f64,
+    /// What that line has in focus, pixels.
+    pub intercept_px: f64,
+    /// Pixels per plane, of the line through 0 that best fits: σ = k·n.
+    pub proportional_px: f64,
+}
+
+impl Line {
+    /// Least squares through points (n, σ).
+    ///
+    /// With less than two points there is no slope, and it is that through 0.
+    #[must_use]
+    pub fn through(points: &[[f64; 2]]) -> Self {
+        let count = points.len() as f64;
+        let sum = |f: fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>();
+        let (x, y) = (sum(|p| p[0]), sum(|p| p[1]));
+        let (xx, xy) = (sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]));
+        let proportional_px = if xx > 0.0 { xy / xx } else { 0.0 };
+        let spread = count * xx - x * x;
+        if spread <= 0.0 {
+            return Self { slope_px: proportional_px, intercept_px: 0.0, proportional_px };
+        }
+        let slope_px = (count * xy - x * y) / spread;
+        Self { slope_px, intercept_px: (y - slope_px * x) / count, proportional_px }
+    }
+}
+
+/// σ against focus offset, from a stack of an object: for each plane the Gaussian is sought that, applied to the
+/// focused plane, which the paper selects by eye, gives the least ∑ |difference| over the window (Fig. 10, Eq. 14), up to
+/// 16 pixels.
+///
+/// # Errors
+///
+/// If there are less than three planes, the window is not inside the images, there is no detail in it, or
+/// the sharpest plane is the first or the last.
+///
+/// # Panics
+///
+/// If the images are not whole rows of `width` or differ in size.
+pub fn focus(stack: &[&[f32]], width: usize, window: Window) -> Result<FocusCurve, Error> {
+    let seen = Seen::new(stack, width, window, BLUR_MARGIN_PX)?;
+    let focused = seen.focused;
+    let mut differences = vec![Vec::new(); stack.len()];
+    let (mut blurred, mut scratch) = (seen.source.clone(), Scratch::new());
+    let mut sigma = 0.0;
+    while sigma <= WIDEST_PX {
+        let gaussian = Gaussian::new(sigma)?;
+        gaussian.blur_into(&seen.source, seen.outer.width, Border::Replicate, &mut blurred, &mut scratch);
+        for (plane, list) in differences.iter_mut().enumerate() {
+            list.push(seen.difference(&blurred, plane));
+        }
+        sigma += STEP_PX;
+    }
+    let (steps, difference): (Vec<f64>, Vec<f64>) = differences.iter().map(|list| lowest(list)).unzip();
+    let sigma_px: Vec<f64> = steps.iter().map(|s| s * STEP_PX).collect();
+    let points =
+        |planes: core::ops::Range<usize>| planes.map(|i| [i.abs_diff(focused) as f64, sigma_px[i]]).collect::<Vec<_>>();
+    let (before, after) = (Line::through(&points(0..focused)), Line::through(&points(focused + 1..stack.len())));
+    Ok(FocusCurve { focused, sigma_px, difference, before, after })
+}
+
+/// Pixels around the window that the transfer functions see.
+const MARGIN_PX: usize = 32;
+
+/// Apertures that are tried, as parts of the objective's: from a tenth on, in steps of a twentieth.
+const FIRST_NA: f64 = 0.1;
+const STEP_NA: f64 = 0.05;
+const TRIED: u32 = 19;
+
+/// What of the focused plane's own transfer counts as noise where it is to be undone.
+const NOISE: f64 = 0.1;
+
+/// The condenser's aperture that explains a stack best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CondenserFit {
+    /// The plane in focus.
+    pub focused: usize,
+    /// The numerical aperture.
+    pub condenser_na: f64,
+    /// Apertures that were tried, and the mean difference each leaves.
+    pub tried: Vec<[f64; 2]>,
+}
+
+/// The condenser's aperture, from a stack of an object taken by moving the stage by `step_um` for each plane through the
+/// immersion medium.
+///
+/// The other planes are computed from the focused one by the ratio of the transfer functions H_A,
+/// and the aperture is sought, from a tenth of the objective's to all of it, for which ∑ |difference| over
+/// the window and all planes is least. All else, the pixel too, is as `microscope` says; absorption alone
+/// counts, so an object that refracts much is no good one.
+///
+/// # Errors
+///
+/// As [`focus`](focus()); if `step_um` is not above 0 and at most 100, or `microscope` not in order.
+///
+/// # Panics
+///
+/// If the images are not whole rows of `width` or differ in size.
+pub fn condenser(
+    stack: &[&[f32]],
+    width: usize,
+    window: Window,
+    step_um: f64,
+    microscope: &MicroscopeParams,
+) -> Result<CondenserFit, Error> {
+    require("step_um", step_um, step_um > 0.0 && step_um <= 100.0, "above 0 and at most 100")?;
+    Microscope::new(microscope)?;
+    let seen = Seen::new(stack, width, window, MARGIN_PX)?;
+    let Seen { focused, outer, source, .. } = &seen;
+
+    // Reflected, so that the seam of the periodic grid has no step.
+    let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
+    let plane = LanePlane::new(wide, high, &LanePlans::default());
+    let support = LaneSupport::new(wide, high, 1.0);
+    let (mut scratch, mut spectrum) = (LaneScratch::default(), Vec::new());
+    let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
+    let fill = |left: usize, stripe: &mut [Lanes]| {
+        for (y, row) in stripe.iter_mut().enumerate() {
+            let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
+            for (x, value) in row.as_flattened_mut().iter_mut().enumerate() {
+                *value = if left + x < wide { from[reflected(left + x, outer.width)] } else { 0.0 };
+            }
+        }
+        true
+    };
+    plane.forward(&support, fill, &mut spectrum, &mut scratch);
+    let frequencies: Vec<[[f64; 2]; LANES]> =
+        support.frequencies(wide, high).map(|f| f.map(|f| f.map(|f| f / microscope.pixel_um))).collect();
+
+    let mut tried = Vec::new();
+    for i in 0..TRIED {
+        let condenser_na = microscope.na * (FIRST_NA + STEP_NA * f64::from(i));
+        let candidate = Microscope::new(&MicroscopeParams { condenser_na, ..microscope.clone() })?;
+        let rest = candidate.transfer(0.0, 0.0)?;
+        let mut sum = 0.0;
+        for k in (0..stack.len()).filter(|k| k != focused) {
+            let transfer = candidate.transfer(0.0, step_um * (k as f64 - *focused as f64))?;
+            let mut filtered = spectrum.clone();
+            for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
+                for (l, &f) in frequencies.iter().enumerate() {
+                    let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));
+                    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+                    let ratio = (now * then * (1.0 + NOISE * NOISE) / (then * then + NOISE * NOISE)) as f32;
+                    value[0][l] *= ratio * plane.norm();
+                    value[1][l] *= ratio * plane.norm();
+                }
+            }
+            let mut image = vec![0.0; outer.width * outer.height];
+            plane.image_into(&support, &filtered, outer.width, &mut image, &mut scratch);
+            sum += seen.difference(&image, k);
+        }
+        tried.push([condenser_na, sum / (stack.len() - 1) as f64]);
+    }
+    let (steps, _) = lowest(&tried.iter().map(|t| t[1]).collect::<Vec<_>>());
+    Ok(CondenserFit { focused: *focused, condenser_na: microscope.na * (FIRST_NA + STEP_NA * steps), tried })
 }

@@ -339,6 +339,17 @@ fn a_truncated_kernel_errs_by_its_tail() {
             }
         }
     }
+    // Decimated kernels are truncated likewise.
+    for lost_tail in [1e-4, 1e-3, 1e-2] {
+        for sigma in [3.5, 5.1, 8.0] {
+            let short = Gaussian::truncated(sigma, Method::Auto, lost_tail).unwrap();
+            for image in &images {
+                let blur = |gaussian: &Gaussian| gaussian.blur(image, width, Border::Reflect);
+                let error = f64::from(largest_difference(&blur(&short), &blur(&direct(sigma))));
+                assert!(error < 5.0 * lost_tail + 2e-4, "{sigma}, {lost_tail}: {error}");
+            }
+        }
+    }
     assert_eq!(Gaussian::truncated(2.0, Method::Auto, 1e-7), Gaussian::new(2.0));
     for bad in [0.0, 9e-8, 0.02, f64::NAN] {
         let error = Gaussian::truncated(1.0, Method::Auto, bad).unwrap_err();
