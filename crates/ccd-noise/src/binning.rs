@@ -1,4 +1,4 @@
-use crate::error::{Error, require};
+use crate::error::{Error, within};
 use crate::field::whole_rows;
 use crate::{CameraParams, ReadNoise};
 
@@ -76,13 +76,10 @@ impl CameraParams {
     ///
     /// If `side` is not 1 to 8.
     pub fn binned(&self, binning: Binning) -> Result<Self, Error> {
-        let side = binning.side();
-        require("binning.side", side as f64, (1..=8).contains(&side), "from 1 to 8")?;
-        let side = side as f64;
+        let side = within("binning.side", binning.side() as f64, 1.0..=8.0, "from 1 to 8")?;
         let n = side * side;
         let read_noise = match (binning, self.read_noise) {
-            (Binning::Charge { .. }, noise) => noise,
-            (Binning::Digital { side: 1 }, noise) => noise,
+            (Binning::Charge { .. } | Binning::Digital { side: 1 }, noise) => noise,
             (Binning::Digital { .. }, noise) => {
                 let rounding = 1.0 / (12.0 * self.gain_dn_per_e * self.gain_dn_per_e);
                 let rms_e = (n * (noise.rms_e() * noise.rms_e() + rounding)).sqrt();

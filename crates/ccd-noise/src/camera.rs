@@ -1,8 +1,8 @@
 use rand_core::Rng;
 
-use crate::bloom::{Spill, spread};
-use crate::chain::{Chain, Marker, expose_row, expose_uneven_row, gather_row, mean_row, read_row};
-use crate::field::{NoiseField, rows, whole_rows};
+use crate::bloom::spread;
+use crate::chain::{Chain, Marker, expose_row, gather_row, mean_row, read_row};
+use crate::field::{NoiseField, whole_rows};
 use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
 /// A camera: photo-electrons in, grey levels out (Eq. 13 without its optics).
@@ -23,7 +23,6 @@ use crate::{Blooming, CameraParams, Error, PhotonNoise};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     params: CameraParams,
-    max_dn: u16,
     chain: Chain,
 }
 
@@ -60,7 +59,7 @@ impl Camera {
     /// If a field lies outside its range.
     pub fn new(params: &CameraParams) -> Result<Self, Error> {
         params.check()?;
-        Ok(Self { params: params.clone(), max_dn: params.max_dn(), chain: Chain::new(params) })
+        Ok(Self { params: params.clone(), chain: Chain::new(params) })
     }
 
     /// The parameters it was made from.
@@ -78,7 +77,7 @@ impl Camera {
     /// The highest grey level, 2ᵇ - 1.
     #[must_use]
     pub fn max_dn(&self) -> u16 {
-        self.max_dn
+        self.params.max_dn()
     }
 
     /// Mean photo-electrons of this many photons on a pixel: η·µ_p.
@@ -90,7 +89,7 @@ impl Camera {
     /// Mean photo-electrons at which an average pixel saturates: it is full, or the converter at its highest level.
     #[must_use]
     pub fn saturation_e(&self) -> f64 {
-        let converter = (f64::from(self.max_dn) - self.params.offset_dn) / self.params.gain_dn_per_e;
+        let converter = (f64::from(self.max_dn()) - self.params.offset_dn) / self.params.gain_dn_per_e;
         converter.min(self.params.full_well_e) - self.params.dark_e()
     }
 
@@ -136,7 +135,7 @@ impl Camera {
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
     pub fn expose_into<R: Rng + ?Sized>(&self, electrons: &[f32], width: usize, out: &mut [u16], rng: &mut R) -> usize {
-        self.frame(electrons, width, rng.next_u64(), out, None).saturated
+        self.expose(electrons, width, None, rng.next_u64(), out, None).saturated
     }
 
     /// Exposes a frame under a `key`, and adds to `saturated` which of its pixels were, row by row.
@@ -154,7 +153,7 @@ impl Camera {
         out: &mut [u16],
         saturated: &mut Vec<SaturatedRun>,
     ) -> Exposure {
-        self.frame(electrons, width, key, out, Some(saturated))
+        self.expose(electrons, width, None, key, out, Some(saturated))
     }
 
     /// Exposes a window of a frame whose first pixel lies at `origin` [x, y] of it: the same grey
@@ -166,7 +165,7 @@ impl Camera {
     ///
     /// If `electrons` is not whole rows of `width`, or `out` not as long as it.
     pub fn expose_window(&self, electrons: &[f32], width: usize, origin: [u32; 2], key: u64, out: &mut [u16]) -> usize {
-        self.window(electrons, width, origin, key, out, None)
+        self.expose(electrons, width, Some(origin), key, out, None).saturated
     }
 
     /// As [`expose_window`](Self::expose_window), and adds to `saturated` which pixels of the frame were, row by row.
@@ -183,7 +182,7 @@ impl Camera {
         out: &mut [u16],
         saturated: &mut Vec<SaturatedRun>,
     ) -> usize {
-        self.window(electrons, width, origin, key, out, Some(saturated))
+        self.expose(electrons, width, Some(origin), key, out, Some(saturated)).saturated
     }
 
     /// The grey levels without noise and before rounding, within 0 … 2ᵇ - 1: the offset, the mean dark current and the
@@ -197,75 +196,43 @@ impl Camera {
         mean_row(&self.chain, electrons, out);
     }
 
-    /// Rounds grey levels, half up, and clips them to 0 … 2ᵇ - 1. Returns how many are at the
-    /// highest level.
-    ///
-    /// # Panics
-    ///
-    /// If `out` is not as long as `dn`.
-    pub fn quantise_into(&self, dn: &[f32], out: &mut [u16]) -> usize {
-        assert_eq!(out.len(), dn.len(), "out has the wrong number of pixels");
-        for (out, &dn) in out.iter_mut().zip(dn) {
-            *out = self.chain.code(dn);
-        }
-        out.iter().filter(|&&code| code == self.max_dn).count()
-    }
-
-    fn window(
-        &self,
-        electrons: &[f32],
-        width: usize,
-        origin: [u32; 2],
-        key: u64,
-        out: &mut [u16],
-        mut runs: Option<&mut Vec<SaturatedRun>>,
-    ) -> usize {
-        whole_rows(electrons.len(), width);
-        assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
-        let (field, chain, x) = (NoiseField::new(key), &self.chain, origin[0]);
-        let mut saturated = 0;
-        let both = electrons.chunks_exact(width).zip(out.chunks_exact_mut(width));
-        for (y, (electrons, out)) in rows(origin).zip(both) {
-            let marker = &mut Marker { y, runs: runs.as_deref_mut() };
-            saturated += match &chain.pattern {
-                None => expose_row(chain, &field.row(y), x, electrons, out, marker),
-                Some(pattern) => expose_uneven_row(chain, &field.row(y), &pattern.row(y), x, electrons, out, marker),
-            };
-        }
-        saturated
-    }
-
+    /// A window, in which no charge crosses rows, or without `origin` the whole frame.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a full well is at most 1e7")]
-    fn frame(
+    fn expose(
         &self,
         electrons: &[f32],
         width: usize,
+        origin: Option<[u32; 2]>,
         key: u64,
         out: &mut [u16],
         mut runs: Option<&mut Vec<SaturatedRun>>,
     ) -> Exposure {
-        let Blooming::On { vertical, anti_blooming } = self.params.blooming else {
-            return Exposure {
-                saturated: self.window(electrons, width, [0, 0], key, out, runs),
-                ..Exposure::default()
-            };
-        };
         whole_rows(electrons.len(), width);
         assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
         let (field, chain) = (NoiseField::new(key), &self.chain);
-        let full_well = chain.full_well as u32;
-        let mut charge = vec![0; electrons.len()];
-        for (y, (electrons, charge)) in (0..).zip(electrons.chunks_exact(width).zip(charge.chunks_exact_mut(width))) {
-            let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
-            gather_row(chain, &field.row(y), pattern.as_ref(), electrons, charge);
+        let pattern = |y| chain.pattern.as_ref().map(|pattern| pattern.row(y));
+        let (rows, mut exposure) = (electrons.chunks_exact(width), Exposure::default());
+        if let (Blooming::On { vertical, anti_blooming }, None) = (self.params.blooming, origin) {
+            let full_well = chain.full_well as u32;
+            let mut charge = vec![0; electrons.len()];
+            for (y, (electrons, charge)) in (0..).zip(rows.zip(charge.chunks_exact_mut(width))) {
+                gather_row(chain, &field.row(y), pattern(y).as_ref(), electrons, charge);
+            }
+            exposure = spread(&mut charge, width, full_well, vertical, anti_blooming);
+            for (y, (charge, out)) in (0..).zip(charge.chunks_exact(width).zip(out.chunks_exact_mut(width))) {
+                let marker = &mut Marker { y, runs: runs.as_deref_mut() };
+                let pattern = pattern(y);
+                exposure.saturated += read_row(chain, &field.row(y), pattern.as_ref(), full_well, charge, out, marker);
+            }
+        } else {
+            let origin = origin.unwrap_or_default();
+            for (y, (electrons, out)) in crate::field::rows(origin).zip(rows.zip(out.chunks_exact_mut(width))) {
+                let marker = &mut Marker { y, runs: runs.as_deref_mut() };
+                let pattern = pattern(y);
+                exposure.saturated +=
+                    expose_row(chain, &field.row(y), pattern.as_ref(), origin[0], electrons, out, marker);
+            }
         }
-        let Spill { drained, escaped } = spread(&mut charge, width, full_well, vertical, anti_blooming);
-        let mut saturated = 0;
-        for (y, (charge, out)) in (0..).zip(charge.chunks_exact(width).zip(out.chunks_exact_mut(width))) {
-            let pattern = chain.pattern.as_ref().map(|pattern| pattern.row(y));
-            let marker = &mut Marker { y, runs: runs.as_deref_mut() };
-            saturated += read_row(chain, &field.row(y), pattern.as_ref(), full_well, charge, out, marker);
-        }
-        Exposure { saturated, drained_e: drained, escaped_e: escaped }
+        exposure
     }
 }

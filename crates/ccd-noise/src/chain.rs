@@ -1,8 +1,10 @@
 //! The camera as its pixels see it, a row at a time.
 
+use portable_numerics::elementary::exp_f32;
+use portable_numerics::random::SplitMix64;
+
 use crate::field::{blocks, padded};
-use crate::hash::{BLOCK, Block, RowWords};
-use crate::pattern::{Pattern, PatternRow, Traits};
+use crate::hash::{BLOCK, Block, RowWords, Stream};
 use crate::poisson::{at_least_nothing, poisson};
 use crate::{CameraParams, PhotonNoise, ReadNoise, SaturatedRun};
 
@@ -72,15 +74,6 @@ impl Chain {
         self.gain * charge + self.offset
     }
 
-    /// ⌊y + ½⌋ within the range of the converter.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
-    pub(crate) fn code(&self, dn: f32) -> u16 {
-        /// Added to an integer below it, it leaves the integer in the lowest bits.
-        const UNIT: f32 = 8_388_608.0;
-        ((dn + 0.5).floor().max(0.0).min(self.highest) + UNIT).to_bits() as u16
-    }
-
     /// Mean electrons of a block of pixels, light and dark.
     #[inline(always)]
     fn means(&self, electrons: &[f32; BLOCK], traits: Option<&Traits>) -> [f32; BLOCK] {
@@ -90,29 +83,6 @@ impl Chain {
             *mean = traits.map_or(light, |traits| light * traits.response[i]) + self.dark;
         }
         means
-    }
-
-    /// Charges before and after reading, of a block of pixels.
-    #[inline(always)]
-    fn charges(
-        &self,
-        electrons: &[f32; BLOCK],
-        block: &Block<'_>,
-        traits: Option<&Traits>,
-    ) -> ([f32; BLOCK], [f32; BLOCK]) {
-        let [shot, read] = block.normal_pairs();
-        let means = self.means(electrons, traits);
-        // g_po and the standard deviation of g_g of Eq. 13
-        let mut noise = traits.map_or([self.read_noise; BLOCK], |traits| traits.read_noise);
-        let mut charge = match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, block),
-            PhotonNoise::Off => means,
-            PhotonNoise::NormalAbove { .. } => self.one_normal(&means, traits, &mut noise, &shot, block),
-        };
-        for charge in &mut charge {
-            *charge = charge.min(self.full_well);
-        }
-        (charge, with_read_noise(&charge, &noise, &read, traits))
     }
 
     /// The mean itself, and both noises in the standard deviation, where the mean is large enough.
@@ -140,37 +110,40 @@ impl Chain {
         charge
     }
 
-    /// Whole electrons that a block of pixels gathers, as if they had room for them.
+    /// Puts the grey levels of the block at `x` out, from the charges before and after reading, and returns the number of
+    /// its saturated pixels.
     #[inline(always)]
-    fn gathered(&self, electrons: &[f32; BLOCK], block: &Block<'_>, traits: Option<&Traits>) -> [f32; BLOCK] {
-        let means = self.means(electrons, traits);
-        let [shot, _] = block.normal_pairs();
-        match self.photon_noise {
-            PhotonNoise::Exact => poisson(&means, &shot, block),
-            PhotonNoise::Off => means.map(f32::round),
-            PhotonNoise::NormalAbove { .. } => {
-                let mut charge = poisson(&means, &shot, block);
-                for i in 0..BLOCK {
-                    let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
-                    charge[i] = if means[i] >= self.normal_from { normal } else { charge[i] };
-                }
-                charge
-            }
-        }
-    }
-
-    /// Grey levels of a block and its saturated pixels, from the charges before and after reading.
-    #[inline(always)]
-    fn convert(&self, full_well: f32, before: &[f32; BLOCK], after: &[f32; BLOCK]) -> ([u16; BLOCK], [u32; BLOCK]) {
+    #[expect(clippy::cast_possible_truncation, reason = "the lowest 16 bits are the level")]
+    fn convert(
+        &self,
+        full_well: f32,
+        [before, after]: [&[f32; BLOCK]; 2],
+        x: u32,
+        out: &mut [u16],
+        marker: &mut Marker<'_>,
+    ) -> usize {
+        /// Added to an integer below it, it leaves the integer in the lowest bits.
+        const UNIT: f32 = 8_388_608.0;
         let mut codes = [0; BLOCK];
         let mut full = [0; BLOCK];
         for i in 0..BLOCK {
             let dn = self.level(after[i]);
-            codes[i] = self.code(dn);
+            // ⌊y + ½⌋ within the range of the converter.
+            codes[i] = ((dn + 0.5).floor().max(0.0).min(self.highest) + UNIT).to_bits() as u16;
             let saturated = (before[i] >= full_well) | (dn + 0.5 >= self.highest);
             full[i] = u32::from(saturated);
         }
-        (codes, full)
+        if let Some(out) = out.first_chunk_mut() {
+            *out = codes;
+        } else {
+            full[out.len()..].fill(0);
+            out.copy_from_slice(&codes[..out.len()]);
+        }
+        let saturated = full.iter().sum::<u32>();
+        if saturated != 0 {
+            marker.mark(x, &full);
+        }
+        saturated as usize
     }
 }
 
@@ -190,27 +163,29 @@ fn with_read_noise(
     after
 }
 
-/// Puts the block at `x` out and returns the number of its saturated pixels.
-#[inline(always)]
-fn finish(codes: [u16; BLOCK], mut full: [u32; BLOCK], x: u32, out: &mut [u16], marker: &mut Marker<'_>) -> usize {
-    if let Some(out) = out.first_chunk_mut() {
-        *out = codes;
-    } else {
-        full[out.len()..].fill(0);
-        out.copy_from_slice(&codes[..out.len()]);
-    }
-    let saturated = full.iter().sum::<u32>();
-    if saturated != 0 {
-        marker.mark(x, &full);
-    }
-    saturated as usize
-}
-
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
     for (dn, &mean) in out.iter_mut().zip(electrons) {
         let charge = (at_least_nothing(mean) + chain.dark).min(chain.full_well);
         *dn = chain.level(charge).max(0.0).min(chain.highest);
+    }
+}
+
+/// A row of a camera, with a fixed pattern or none.
+#[multiversion::multiversion(targets = "simd")]
+pub(crate) fn expose_row(
+    chain: &Chain,
+    row: &RowWords,
+    pattern: Option<&PatternRow<'_>>,
+    x: u32,
+    electrons: &[f32],
+    out: &mut [u16],
+    marker: &mut Marker<'_>,
+) -> usize {
+    // Two loops: that of a camera whose pixels are alike has no branches.
+    match pattern {
+        None => expose(chain, row, None, x, electrons, out, marker),
+        Some(pattern) => expose(chain, row, Some(pattern), x, electrons, out, marker),
     }
 }
 
@@ -229,42 +204,26 @@ fn expose(
     for (x, (electrons, out)) in blocks(x).zip(both) {
         // Whole blocks are copied at once, which is what `first_chunk` is for; only the last of a row is not.
         let electrons = electrons.first_chunk().copied().unwrap_or_else(|| padded(electrons));
-        let traits = pattern.map(|pattern| pattern.block(x));
-        let (before, after) = chain.charges(&electrons, &row.block(x), traits.as_ref());
-        let (codes, full) = chain.convert(chain.full_well, &before, &after);
-        saturated += finish(codes, full, x, out, marker);
+        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let (traits, [shot, read]) = (traits.as_ref(), block.normal_pairs());
+        let means = chain.means(&electrons, traits);
+        // g_po and the standard deviation of g_g of Eq. 13
+        let mut noise = traits.map_or([chain.read_noise; BLOCK], |traits| traits.read_noise);
+        let mut charge = match chain.photon_noise {
+            PhotonNoise::Exact => poisson(&means, &shot, &block),
+            PhotonNoise::Off => means,
+            PhotonNoise::NormalAbove { .. } => chain.one_normal(&means, traits, &mut noise, &shot, &block),
+        };
+        for charge in &mut charge {
+            *charge = charge.min(chain.full_well);
+        }
+        let after = with_read_noise(&charge, &noise, &read, traits);
+        saturated += chain.convert(chain.full_well, [&charge, &after], x, out, marker);
     }
     saturated
 }
 
-/// A row of a camera whose pixels are alike.
-#[multiversion::multiversion(targets = "simd")]
-pub(crate) fn expose_row(
-    chain: &Chain,
-    row: &RowWords,
-    x: u32,
-    electrons: &[f32],
-    out: &mut [u16],
-    marker: &mut Marker<'_>,
-) -> usize {
-    expose(chain, row, None, x, electrons, out, marker)
-}
-
-/// A row of a camera with a fixed pattern.
-#[multiversion::multiversion(targets = "simd")]
-pub(crate) fn expose_uneven_row(
-    chain: &Chain,
-    row: &RowWords,
-    pattern: &PatternRow<'_>,
-    x: u32,
-    electrons: &[f32],
-    out: &mut [u16],
-    marker: &mut Marker<'_>,
-) -> usize {
-    expose(chain, row, Some(pattern), x, electrons, out, marker)
-}
-
-/// The whole electrons that a row gathers.
+/// The whole electrons that a row gathers, as if pixels had room for them.
 #[multiversion::multiversion(targets = "simd")]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts from 0 to 2²⁵")]
 pub(crate) fn gather_row(
@@ -276,8 +235,17 @@ pub(crate) fn gather_row(
 ) {
     let both = electrons.chunks(BLOCK).zip(charge.chunks_mut(BLOCK));
     for (x, (electrons, charge)) in blocks(0).zip(both) {
-        let traits = pattern.map(|pattern| pattern.block(x));
-        let gathered = chain.gathered(&padded(electrons), &row.block(x), traits.as_ref());
+        let (block, traits) = (row.block(x), pattern.map(|pattern| pattern.block(x)));
+        let means = chain.means(&padded(electrons), traits.as_ref());
+        let [shot, _] = block.normal_pairs();
+        let mut gathered =
+            if chain.photon_noise == PhotonNoise::Off { means.map(f32::round) } else { poisson(&means, &shot, &block) };
+        if let PhotonNoise::NormalAbove { .. } = chain.photon_noise {
+            for i in 0..BLOCK {
+                let normal = (means[i] + means[i].sqrt() * shot[i]).round().max(0.0);
+                gathered[i] = if means[i] >= chain.normal_from { normal } else { gathered[i] };
+            }
+        }
         for (charge, gathered) in charge.iter_mut().zip(gathered) {
             *charge = gathered as u32;
         }
@@ -305,8 +273,78 @@ pub(crate) fn read_row(
             *before = charge as f32;
         }
         let after = with_read_noise(&before, &noise, &read, traits.as_ref());
-        let (codes, full) = chain.convert(full_well as f32, &before, &after);
-        saturated += finish(codes, full, x, out, marker);
+        saturated += chain.convert(full_well as f32, [&before, &after], x, out, marker);
     }
     saturated
+}
+
+/// The fixed pattern of a camera, a pure function of its serial number and the place.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pattern {
+    key: u64,
+    prnu: f32,
+    dsnu: f32,
+    read_noise: f32,
+    /// Standard deviation of the logarithm of the read noise.
+    spread: f32,
+}
+
+/// The pattern of one row.
+pub(crate) struct PatternRow<'a> {
+    pattern: &'a Pattern,
+    words: RowWords,
+}
+
+/// The pattern of a block of pixels.
+struct Traits {
+    /// Response to light, 1 on average.
+    response: [f32; BLOCK],
+    /// Offset in electrons, 0 on average.
+    offset: [f32; BLOCK],
+    /// Standard deviation of the read noise in electrons.
+    read_noise: [f32; BLOCK],
+}
+
+impl Pattern {
+    /// The pattern of these parameters, whose read noise is `read_noise` at the median, or none if all pixels are alike.
+    #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
+    fn new(params: &CameraParams, read_noise: f32) -> Option<Self> {
+        /// Sets serial numbers apart from the keys of frames, which may be the same numbers.
+        const CAMERAS: u64 = 0xca_3e7a_0000_1288;
+        let spread = params.read_noise.spread() as f32;
+        let uneven = params.prnu > 0.0 || params.dsnu_e > 0.0 || spread > 0.0;
+        uneven.then(|| Self {
+            key: SplitMix64::word(params.serial ^ CAMERAS, 0),
+            prnu: params.prnu as f32,
+            dsnu: params.dsnu_e as f32,
+            read_noise,
+            spread,
+        })
+    }
+
+    pub(crate) fn row(&self, y: u32) -> PatternRow<'_> {
+        PatternRow { pattern: self, words: RowWords::new(self.key, y) }
+    }
+}
+
+impl PatternRow<'_> {
+    /// The pixels from `x` on.
+    #[inline(always)]
+    fn block(&self, x: u32) -> Traits {
+        let Pattern { prnu, dsnu, read_noise, spread, .. } = *self.pattern;
+        let block = self.words.block(x);
+        let [mut response, mut offset] = block.normal_pairs();
+        for i in 0..BLOCK {
+            response[i] = (1.0 + prnu * response[i]).max(0.0);
+            offset[i] *= dsnu;
+        }
+        let mut noise = [read_noise; BLOCK];
+        if spread > 0.0 {
+            let [normal, _] = block.normal_pairs_of(Stream::Chance, Stream::Fine);
+            for i in 0..BLOCK {
+                noise[i] = read_noise * exp_f32(spread * normal[i]);
+            }
+        }
+        Traits { response, offset, read_noise: noise }
+    }
 }

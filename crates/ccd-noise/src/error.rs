@@ -1,3 +1,5 @@
+use core::ops::RangeInclusive;
+
 use thiserror::Error;
 
 /// Why parameters or frames were refused.
@@ -69,6 +71,16 @@ pub enum Error {
         /// Mean of the brightest flat in use, above that of the dark, in grey levels.
         above_dark_dn: f64,
     },
+}
+
+/// `value`, if it lies in a range.
+pub(crate) fn within(
+    field: &'static str,
+    value: f64,
+    range: RangeInclusive<f64>,
+    accepted: &'static str,
+) -> Result<f64, Error> {
+    require(field, value, range.contains(&value), accepted)
 }
 
 /// `value`, if it is finite and `holds`.

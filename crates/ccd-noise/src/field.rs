@@ -1,5 +1,3 @@
-use rand_core::Rng;
-
 use crate::hash::{BLOCK, BLOCK_STEP, RowWords};
 use crate::poisson::poisson;
 
@@ -15,17 +13,6 @@ impl NoiseField {
     #[must_use]
     pub fn new(key: u64) -> Self {
         Self { key }
-    }
-
-    /// The field of a key drawn from `rng`, of which it takes one 64-bit word.
-    pub fn draw<R: Rng + ?Sized>(rng: &mut R) -> Self {
-        Self::new(rng.next_u64())
-    }
-
-    /// The key.
-    #[must_use]
-    pub fn key(&self) -> u64 {
-        self.key
     }
 
     pub(crate) fn row(&self, y: u32) -> RowWords {

@@ -137,15 +137,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn words_do_not_depend_on_the_block_they_are_asked_in() {
-        let row = RowWords::new(3, 4);
-        let whole = row.block(u32::MAX - 20).words(Stream::Radius);
-        for (i, word) in whole.into_iter().enumerate() {
-            let alone = row.block((u32::MAX - 20).wrapping_add(u32::try_from(i).unwrap()));
-            assert_eq!(alone.words(Stream::Radius)[0], word);
-            assert_eq!(alone.rare(0).next_u64(), row.block(u32::MAX - 20).rare(i).next_u64());
-        }
-    }
 }

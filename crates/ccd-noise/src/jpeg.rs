@@ -1,6 +1,6 @@
 //! What JPEG compression takes from an image, without its entropy coding, which takes nothing.
 
-use crate::error::{Error, require};
+use crate::error::{Error, require, within};
 use crate::field::whole_rows;
 
 /// How far the two colour differences are thinned out before they are compressed.
@@ -45,15 +45,10 @@ const SIDE: usize = 8;
 /// pixels, as there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Jpeg {
-    luma: Table,
-    chroma: Table,
+    /// The steps of the coefficients.
+    luma: Block,
+    chroma: Block,
     subsampling: Subsampling,
-}
-
-/// The steps of the coefficients.
-#[derive(Debug, Clone, PartialEq)]
-struct Table {
-    steps: Block,
 }
 
 /// ITU-T T.81, table K.1.
@@ -109,9 +104,9 @@ impl Jpeg {
     /// If the quality lies outside its range, or the bit depth is not 8.
     pub fn new(params: &JpegParams) -> Result<Self, Error> {
         let JpegParams { quality, subsampling, bit_depth } = *params;
-        require("quality", f64::from(quality), (1..=100).contains(&quality), "from 1 to 100")?;
+        within("quality", quality.into(), 1.0..=100.0, "from 1 to 100")?;
         require("bit_depth", f64::from(bit_depth), bit_depth == 8, "8, all that baseline JPEG has")?;
-        Ok(Self { luma: Table::new(&LUMA, quality), chroma: Table::new(&CHROMA, quality), subsampling })
+        Ok(Self { luma: steps(&LUMA, quality), chroma: steps(&CHROMA, quality), subsampling })
     }
 
     /// A grey image of 8 bits, in rows of `width` pixels.
@@ -121,7 +116,7 @@ impl Jpeg {
     /// If `grey` is not whole rows of `width`.
     pub fn grey(&self, grey: &mut [u8], width: usize) {
         whole_rows(grey.len(), width);
-        self.luma.plane(grey, width);
+        compress(&self.luma, grey, width);
     }
 
     /// A frame of a camera of 8 bits, in rows of `width` pixels. What is above 255 counts as 255.
@@ -146,7 +141,7 @@ impl Jpeg {
         whole_rows(rgb.len(), 3 * width);
         let [mut luma, mut blue, mut red] = [(); 3].map(|()| vec![0; rgb.len() / 3]);
         split(rgb, &mut luma, &mut blue, &mut red);
-        self.luma.plane(&mut luma, width);
+        compress(&self.luma, &mut luma, width);
         let [blue, red] = [blue, red].map(|plane| self.difference(plane, width));
         join(&luma, &blue, &red, rgb);
     }
@@ -155,7 +150,7 @@ impl Jpeg {
     fn difference(&self, mut plane: Vec<u8>, width: usize) -> Vec<u8> {
         let [across, down] = match self.subsampling {
             Subsampling::Full => {
-                self.chroma.plane(&mut plane, width);
+                compress(&self.chroma, &mut plane, width);
                 return plane;
             }
             Subsampling::Columns => [2, 1],
@@ -176,71 +171,49 @@ impl Jpeg {
                 thin.push(narrow((i32::from(sum) + turn) >> 2));
             }
         }
-        self.chroma.plane(&mut thin, thin_width);
-        let thin = Thinned { plane: &thin, stride: thin_width, width: width.div_ceil(across), height: thin_height };
-        for (y, row) in plane.chunks_exact_mut(width).enumerate() {
-            thin.row_into(y, down, row);
+        compress(&self.chroma, &mut thin, thin_width);
+        // Between the samples: three parts of the nearest and one of the next nearest, along either axis.
+        let columns = width.div_ceil(across);
+        let row = |y: usize| &thin[y.min(thin_height - 1) * thin_width..][..columns];
+        for (y, out) in plane.chunks_exact_mut(width).enumerate() {
+            let near = row(y / down);
+            let far = match (down, y % 2) {
+                (1, _) => near,
+                (_, 0) => row((y / 2).saturating_sub(1)),
+                _ => row(y / 2 + 1),
+            };
+            let column = |x: usize| 3 * i32::from(near[x]) + i32::from(far[x]);
+            for (x, out) in out.iter_mut().enumerate() {
+                let here = x / 2;
+                let next = if x % 2 == 0 { here.saturating_sub(1) } else { (here + 1).min(columns - 1) };
+                // Halves go up and down in turn.
+                let half = if down == 1 { 4 + 4 * odd(x) } else { 8 - odd(x) };
+                *out = narrow((3 * column(here) + column(next) + half) >> 4);
+            }
         }
         plane
     }
 }
 
-/// Every second column, and row, of a plane.
-struct Thinned<'a> {
-    plane: &'a [u8],
-    stride: usize,
-    width: usize,
-    height: usize,
+/// The steps of the coefficients.
+fn steps(annex: &[u32; 64], quality: u32) -> Block {
+    let scale = if quality < 50 { 5000 / quality } else { 200 - 2 * quality };
+    let step = |i: usize| ((annex[i] * scale + 50) / 100).clamp(1, 255).cast_signed();
+    core::array::from_fn(|u| core::array::from_fn(|v| step(SIDE * u + v)))
 }
 
-impl Thinned<'_> {
-    /// A row between the samples: three parts of the nearest and one of the next nearest, along either axis.
-    fn row_into(&self, y: usize, down: usize, out: &mut [u8]) {
-        let row = |y: usize| &self.plane[y.min(self.height - 1) * self.stride..][..self.width];
-        let near = row(y / down);
-        let far = match (down, y % 2) {
-            (1, _) => near,
-            (_, 0) => row((y / 2).saturating_sub(1)),
-            _ => row(y / 2 + 1),
-        };
-        let column = |x: usize| 3 * i32::from(near[x]) + i32::from(far[x]);
-        for (x, out) in out.iter_mut().enumerate() {
-            let here = x / 2;
-            let next = if x % 2 == 0 { here.saturating_sub(1) } else { (here + 1).min(self.width - 1) };
-            // Halves go up and down in turn.
-            let half = if down == 1 { 4 + 4 * odd(x) } else { 8 - odd(x) };
-            *out = narrow((3 * column(here) + column(next) + half) >> 4);
+/// There, rounded, and back.
+#[inline(always)]
+fn round(steps: &Block, block: &Block) -> Block {
+    let rows = product(block, &TRANSPOSED, COSINE_DIGITS - KEPT_DIGITS);
+    let mut coefficients = product(&COSINES, &rows, COSINE_DIGITS + KEPT_DIGITS);
+    for (row, steps) in coefficients.iter_mut().zip(steps) {
+        for (coefficient, step) in row.iter_mut().zip(steps) {
+            *coefficient = step * nearest(*coefficient, step << NORM_DIGITS);
         }
     }
-}
-
-impl Table {
-    fn new(annex: &[u32; 64], quality: u32) -> Self {
-        let scale = if quality < 50 { 5000 / quality } else { 200 - 2 * quality };
-        let step = |i: usize| ((annex[i] * scale + 50) / 100).clamp(1, 255).cast_signed();
-        Self { steps: core::array::from_fn(|u| core::array::from_fn(|v| step(SIDE * u + v))) }
-    }
-
-    /// Compresses and decompresses one plane.
-    fn plane(&self, plane: &mut [u8], width: usize) {
-        for rows in plane.chunks_mut(SIDE * width) {
-            blocks(self, rows, width);
-        }
-    }
-
-    /// There, rounded, and back.
-    #[inline(always)]
-    fn round(&self, block: &Block) -> Block {
-        let rows = product(block, &TRANSPOSED, COSINE_DIGITS - KEPT_DIGITS);
-        let mut coefficients = product(&COSINES, &rows, COSINE_DIGITS + KEPT_DIGITS);
-        for (row, steps) in coefficients.iter_mut().zip(&self.steps) {
-            for (coefficient, step) in row.iter_mut().zip(steps) {
-                *coefficient = step * nearest(*coefficient, step << NORM_DIGITS);
-            }
-        }
-        let columns = product(&TRANSPOSED, &coefficients, COSINE_DIGITS - KEPT_DIGITS);
-        product(&columns, &COSINES, COSINE_DIGITS + KEPT_DIGITS + NORM_DIGITS)
-    }
+    let columns = product(&TRANSPOSED, &coefficients, COSINE_DIGITS - KEPT_DIGITS);
+    product(&columns, &COSINES, COSINE_DIGITS + KEPT_DIGITS + NORM_DIGITS)
 }
 
 /// The integer nearest to a / b, halves away from 0. Single precision is exact enough for integers below 2¹⁶, and it divides
@@ -269,65 +242,56 @@ fn product(a: &Block, b: &Block, digits: u32) -> Block {
     out
 }
 
-/// The blocks of at most eight rows.
+/// Compresses and decompresses one plane.
 #[multiversion::multiversion(targets = "simd")]
-fn blocks(table: &Table, rows: &mut [u8], width: usize) {
-    let height = rows.len() / width;
-    for left in (0..width).step_by(SIDE) {
-        let columns = SIDE.min(width - left);
-        let mut block = [[0; SIDE]; SIDE];
-        for (y, block) in block.iter_mut().enumerate() {
-            let row = &rows[y.min(height - 1) * width + left..][..columns];
-            for (x, level) in block.iter_mut().enumerate() {
-                *level = i32::from(row[x.min(columns - 1)]) - MIDDLE;
+fn compress(steps: &Block, plane: &mut [u8], width: usize) {
+    for rows in plane.chunks_mut(SIDE * width) {
+        let height = rows.len() / width;
+        for left in (0..width).step_by(SIDE) {
+            let columns = SIDE.min(width - left);
+            let mut block = [[0; SIDE]; SIDE];
+            for (y, block) in block.iter_mut().enumerate() {
+                let row = &rows[y.min(height - 1) * width + left..][..columns];
+                for (x, level) in block.iter_mut().enumerate() {
+                    *level = i32::from(row[x.min(columns - 1)]) - MIDDLE;
+                }
             }
-        }
-        let block = table.round(&block);
-        for (row, block) in rows.chunks_exact_mut(width).zip(&block) {
-            for (level, value) in row[left..left + columns].iter_mut().zip(block) {
-                *level = narrow(value + MIDDLE);
+            let block = round(steps, &block);
+            for (row, block) in rows.chunks_exact_mut(width).zip(&block) {
+                for (level, value) in row[left..left + columns].iter_mut().zip(block) {
+                    *level = narrow(value + MIDDLE);
+                }
             }
         }
     }
 }
 
-/// Binary digits of the colour transform's factors.
+/// Binary digits of the colour transform's factors (ITU-T T.871).
 const DIGITS: u32 = 16;
 const HALF: i32 = 1 << (DIGITS - 1);
+
+/// To Y, C_b and C_r.
 #[multiversion::multiversion(targets = "simd")]
 fn split(rgb: &[u8], luma: &mut [u8], blue: &mut [u8], red: &mut [u8]) {
+    let difference = |sum: i32| narrow((sum + (MIDDLE << DIGITS) + HALF - 1) >> DIGITS);
     let planes = luma.iter_mut().zip(blue).zip(red);
     for (pixel, ((luma, blue), red)) in rgb.chunks_exact(3).zip(planes) {
-        [*luma, *blue, *red] = luma_and_differences([pixel[0], pixel[1], pixel[2]]);
+        let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(i32::from);
+        *luma = narrow((19_595 * r + 38_470 * g + 7_471 * b + HALF) >> DIGITS);
+        *blue = difference(-11_059 * r - 21_709 * g + 32_768 * b);
+        *red = difference(32_768 * r - 27_439 * g - 5_329 * b);
     }
 }
 
+/// And back.
 #[multiversion::multiversion(targets = "simd")]
 fn join(luma: &[u8], blue: &[u8], red: &[u8], rgb: &mut [u8]) {
     let planes = luma.iter().zip(blue).zip(red);
-    for (pixel, ((luma, blue), red)) in rgb.chunks_exact_mut(3).zip(planes) {
-        pixel.copy_from_slice(&colour(*luma, *blue, *red));
+    for (pixel, ((&luma, &blue), &red)) in rgb.chunks_exact_mut(3).zip(planes) {
+        let (luma, blue, red) = (i32::from(luma), i32::from(blue) - MIDDLE, i32::from(red) - MIDDLE);
+        let part = |sum: i32| narrow(luma + ((sum + HALF) >> DIGITS));
+        pixel.copy_from_slice(&[part(91_881 * red), part(-22_554 * blue - 46_802 * red), part(116_130 * blue)]);
     }
-}
-
-/// Y, C_b and C_r (ITU-T T.871).
-#[inline(always)]
-fn luma_and_differences(rgb: [u8; 3]) -> [u8; 3] {
-    let [r, g, b] = rgb.map(i32::from);
-    let difference = |sum: i32| (sum + (MIDDLE << DIGITS) + HALF - 1) >> DIGITS;
-    [
-        (19_595 * r + 38_470 * g + 7_471 * b + HALF) >> DIGITS,
-        difference(-11_059 * r - 21_709 * g + 32_768 * b),
-        difference(32_768 * r - 27_439 * g - 5_329 * b),
-    ]
-    .map(narrow)
-}
-
-#[inline(always)]
-fn colour(luma: u8, blue: u8, red: u8) -> [u8; 3] {
-    let (luma, blue, red) = (i32::from(luma), i32::from(blue) - MIDDLE, i32::from(red) - MIDDLE);
-    let part = |sum: i32| luma + ((sum + HALF) >> DIGITS);
-    [part(91_881 * red), part(-22_554 * blue - 46_802 * red), part(116_130 * blue)].map(narrow)
 }
 
 #[expect(clippy::cast_sign_loss, reason = "clipped to 8 bits")]

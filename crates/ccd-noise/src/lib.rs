@@ -10,9 +10,7 @@ mod field;
 mod hash;
 mod jpeg;
 mod params;
-mod pattern;
 mod poisson;
-mod presets;
 
 pub use binning::Binning;
 pub use camera::{Camera, Exposure, SaturatedRun};

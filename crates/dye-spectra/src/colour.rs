@@ -1,10 +1,8 @@
 use crate::curve::Curve;
 use crate::dye::{Amounts, DYES, Dye};
-use crate::error::{Error, require};
-use crate::params::{ColourParams, Mixing};
-use crate::rows::{self, Terms};
+use crate::params::{ColourParams, Error, Mixing, require};
+use crate::rows::{self, Terms, Wavelength};
 use crate::srgb;
-use crate::sum::{Term, transmittance};
 
 /// Bands over which lamp times sensitivity is summed: 0.25 nm each, where the sharpest edge of a sensitivity has a
 /// standard deviation of 3.7 nm.
@@ -36,9 +34,7 @@ pub struct Channel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Colour {
     channels: [Channel; 3],
-    mixing: Mixing,
-    /// Absorbance of unit amounts, and weight in each channel.
-    terms: Vec<Term>,
+    terms: Vec<Wavelength>,
     rows: Terms,
     to_srgb: [[f64; 3]; 3],
 }
@@ -52,7 +48,7 @@ impl Colour {
     pub fn new(params: &ColourParams) -> Result<Self, Error> {
         params.check()?;
         let channels = channels(params);
-        let spectral: Vec<Term> = (0..params.wavelengths)
+        let spectral: Vec<Wavelength> = (0..params.wavelengths)
             .map(|i| {
                 let wavelength_um = channels[0].nodes[i].wavelength_um;
                 let weights = std::array::from_fn(|c| channels[c].nodes[i].weight);
@@ -64,20 +60,13 @@ impl Colour {
             Mixing::Spectral => spectral,
             Mixing::ThreeVectors => (0..3).map(|c| mean_term(&spectral, c)).collect(),
         };
-        let rows = Terms::new(terms.iter().copied());
-        Ok(Self { channels, mixing: params.mixing, terms, rows, to_srgb })
+        Ok(Self { channels, rows: Terms::new(&terms), terms, to_srgb })
     }
 
     /// What red, green and blue see of an empty slide.
     #[must_use]
     pub fn channels(&self) -> &[Channel; 3] {
         &self.channels
-    }
-
-    /// How the light of a channel follows from the amounts of dye.
-    #[must_use]
-    pub fn mixing(&self) -> Mixing {
-        self.mixing
     }
 
     /// Factors that make the empty slide grey, as a microscope camera's white balance does: 1 / share.
@@ -97,7 +86,7 @@ impl Colour {
     /// Light in each channel relative to the empty slide, in double precision.
     #[must_use]
     pub fn transmittance(&self, amounts: &Amounts) -> [f64; 3] {
-        transmittance(&self.terms, amounts)
+        rows::exact(&self.terms, amounts)
     }
 
     /// Light in each channel relative to the empty slide, from planes of amounts in the order of [`Dye::ALL`], each 0
@@ -142,7 +131,7 @@ impl Colour {
 }
 
 /// Mean absorbance of each dye over a channel's light, for that channel alone.
-fn mean_term(spectral: &[Term], c: usize) -> Term {
+fn mean_term(spectral: &[Wavelength], c: usize) -> Wavelength {
     let mean = |d: usize| spectral.iter().map(|(absorbances, weights)| weights[c] * absorbances[d]).sum();
     let mut weights = [0.0; 3];
     weights[c] = 1.0;

@@ -1,8 +1,7 @@
 use multiversion::multiversion;
 
 use crate::dye::{Amounts, DYES};
-use crate::rows::{LANES, Terms, padded};
-use crate::sum::{Term, transmittance};
+use crate::rows::{LANES, Terms, Wavelength, exact, padded};
 
 /// Degree of the polynomials: with `DEEPEST`, an error below 1e-5.
 const DEGREE: usize = 9;
@@ -27,28 +26,26 @@ pub struct Curve {
 
 impl Curve {
     #[expect(clippy::cast_possible_truncation, reason = "pixels are single precision")]
-    pub(crate) fn new(terms: &[Term], mix: &Amounts) -> Self {
-        let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, share)| a * share).sum::<f64>();
-        let alone = |absorbances: &Amounts| {
+    pub(crate) fn new(terms: &[Wavelength], mix: &Amounts) -> Self {
+        let alone = |amount: f64| {
             let mut alone = [0.0; DYES];
-            alone[0] = mixed(absorbances);
+            alone[0] = amount;
             alone
         };
-        let terms: Vec<Term> = terms.iter().map(|(a, weights)| (alone(a), *weights)).collect();
+        let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, share)| a * share).sum::<f64>();
+        let terms: Vec<Wavelength> = terms.iter().map(|(a, weights)| (alone(mixed(a)), *weights)).collect();
         let steepest = terms.iter().fold(0.0_f64, |steepest, (a, _)| steepest.max(a[0]));
         // A mixture of nothing absorbs nothing, however much of it there is.
         let most = if steepest > 0.0 { (DEEPEST / steepest).min(f64::from(f32::MAX)) } else { f64::from(f32::MAX) };
         let quotient = |u: f64| {
             let amount = 0.5 * most * (u + 1.0);
-            let mut amounts = [0.0; DYES];
-            amounts[0] = amount;
-            transmittance(&terms, &amounts).map(|light| (1.0 - light) / amount)
+            exact(&terms, &alone(amount)).map(|light| (1.0 - light) / amount)
         };
         Self {
             coefficients: interpolate(quotient).map(|channel| channel.map(|c| c as f32)),
             scale: (2.0 / most) as f32,
             most: most as f32,
-            beyond: Terms::new(terms.iter().copied()),
+            beyond: Terms::new(&terms),
         }
     }
 

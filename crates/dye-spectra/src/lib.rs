@@ -4,20 +4,14 @@
 mod colour;
 mod curve;
 mod dye;
-mod error;
-#[cfg(feature = "image")]
-mod interop;
 mod light;
-mod lobe;
 mod params;
 mod rows;
 mod srgb;
-mod sum;
 
 pub use colour::{Channel, Colour, Node};
 pub use curve::Curve;
 pub use dye::{Amounts, DYES, Dye, absorbance, amounts};
-pub use error::Error;
 pub use light::{Lamp, Sensor};
-pub use params::{ColourParams, Mixing};
+pub use params::{ColourParams, Error, Mixing};
 pub use srgb::encode_srgb;

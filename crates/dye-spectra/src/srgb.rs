@@ -1,9 +1,9 @@
 //! From the camera's channels to the colours of a screen.
 
 use crate::dye::{Amounts, DYES, Dye, amounts};
-use crate::lobe::{Lobe, lobe, sum};
+use crate::light::{Lobe, lobe, sum};
 use crate::params::ColourParams;
-use crate::sum::{Term, transmittance};
+use crate::rows::{Wavelength, exact};
 
 type Matrix = [[f64; 3]; 3];
 
@@ -42,10 +42,9 @@ const RIDGE: f64 = 1e-6;
 
 /// The matrix whose rows add up to 1, so that white stays white, and which best takes the camera's light of stained
 /// smears to what the observer sees.
-pub(crate) fn matrix(params: &ColourParams, spectral: &[Term]) -> Matrix {
-    let observer = Observer::new(params);
-    let smears = smears();
-    let pairs: Vec<[[f64; 3]; 2]> = smears.map(|c| [transmittance(spectral, &c), observer.see(&c)]).collect();
+pub(crate) fn matrix(params: &ColourParams, spectral: &[Wavelength]) -> Matrix {
+    let observer = observer(params);
+    let pairs: Vec<[[f64; 3]; 2]> = smears().map(|c| [exact(spectral, &c), exact(&observer, &c)]).collect();
     std::array::from_fn(|row| {
         // m·t with m = (p, q, 1 − p − q) is p·(t₀ − t₂) + q·(t₁ − t₂) + t₂: least squares in p and q, by Cramer's rule.
         let identity = |column: usize| if row == column { 1.0 } else { 0.0 };
@@ -84,41 +83,64 @@ fn smears() -> impl Iterator<Item = Amounts> {
     })
 }
 
-/// The standard observer, adapted to the lamp.
-struct Observer {
-    /// Absorbance of unit amounts, and weights that give linear sRGB; those of each colour add up to 1.
-    terms: Vec<Term>,
-}
-
-impl Observer {
-    fn new(params: &ColourParams) -> Self {
-        let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
-        let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
-        let mut white = [0.0; 3];
-        for w in visible.middles(OBSERVER_BANDS) {
-            for (white, seen) in white.iter_mut().zip(seen(w)) {
-                *white += seen;
-            }
+/// The standard observer, adapted to the lamp, with weights that give linear sRGB; those of each colour add up to 1.
+fn observer(params: &ColourParams) -> Vec<Wavelength> {
+    let visible = ColourParams { from_um: 0.40, to_um: 0.70, ..params.clone() };
+    let seen = |w: f64| [sum(&X, w), sum(&Y, w), sum(&Z, w)].map(|response| response * params.lamp.power(w));
+    let mut white = [0.0; 3];
+    for w in visible.middles(OBSERVER_BANDS) {
+        for (white, seen) in white.iter_mut().zip(seen(w)) {
+            *white += seen;
         }
-        let (cones, cones_d65) = (times(&CONES, white), times(&CONES, D65));
-        let adapt = |xyz: [f64; 3]| {
-            let responses = times(&CONES, xyz);
-            times(&FROM_CONES, std::array::from_fn(|c| responses[c] * cones_d65[c] / cones[c]))
-        };
-        let srgb_white = times(&XYZ_TO_SRGB, adapt(white));
-        let term = |w: f64| {
-            let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
-            (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
-        };
-        Self { terms: visible.middles(OBSERVER_BANDS).map(term).collect() }
     }
-
-    /// Linear sRGB of stained glass; white is 1.
-    fn see(&self, amounts: &Amounts) -> [f64; 3] {
-        transmittance(&self.terms, amounts)
-    }
+    let (cones, cones_d65) = (times(&CONES, white), times(&CONES, D65));
+    let adapt = |xyz: [f64; 3]| {
+        let responses = times(&CONES, xyz);
+        times(&FROM_CONES, std::array::from_fn(|c| responses[c] * cones_d65[c] / cones[c]))
+    };
+    let srgb_white = times(&XYZ_TO_SRGB, adapt(white));
+    let term = |w: f64| {
+        let srgb = times(&XYZ_TO_SRGB, adapt(seen(w)));
+        (Dye::ALL.map(|dye| dye.absorbance(w)), std::array::from_fn(|c| srgb[c] / srgb_white[c]))
+    };
+    visible.middles(OBSERVER_BANDS).map(term).collect()
 }
 
 fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| row.iter().zip(vector).map(|(m, v)| m * v).sum())
+}
+
+#[cfg(feature = "image")]
+impl crate::Colour {
+    /// The picture that a screen shows: light of [`transmittance_into`](Self::transmittance_into), row by row of `width`, by the matrix
+    /// [`to_srgb`](Self::to_srgb) and the curve [`encode_srgb`].
+    ///
+    /// ```
+    /// use dye_spectra::{Colour, ColourParams, Dye, amounts};
+    ///
+    /// let colour = Colour::new(&ColourParams::default())?;
+    /// let ramp: Vec<f32> = (0..64 * 48).map(|i| (i % 64) as f32 / 64.0).collect();
+    /// let mut light = [(); 3].map(|()| vec![0.0; ramp.len()]);
+    /// let eosin = colour.curve(&amounts([(Dye::EosinY, 1.0)]))?;
+    /// eosin.transmittance_into(&ramp, light.each_mut().map(|plane| &mut plane[..]));
+    /// let picture = colour.srgb_image(light.each_ref().map(|plane| &plane[..]), 64);
+    /// assert_eq!(picture.get_pixel(0, 0).0, [255; 3]);
+    /// # Ok::<(), dye_spectra::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If the planes of `light` are not whole rows of `width`, all of one length.
+    #[must_use]
+    pub fn srgb_image(&self, light: [&[f32]; 3], width: usize) -> image::RgbImage {
+        let pixels = light[0].len();
+        assert!(light.iter().all(|plane| plane.len() == pixels), "the channels differ in length");
+        assert!(width > 0 && pixels.is_multiple_of(width), "width {width} must divide the {pixels} pixels");
+        let side = |pixels: usize| u32::try_from(pixels).expect("sides are below 2^32");
+        image::RgbImage::from_fn(side(width), side(pixels / width), |x, y| {
+            let i = y as usize * width + x as usize;
+            let seen = light.map(|plane| f64::from(plane[i]));
+            image::Rgb(self.to_srgb().map(|row| encode_srgb(row.iter().zip(seen).map(|(m, v)| m * v).sum())))
+        })
+    }
 }

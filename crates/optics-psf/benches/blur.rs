@@ -21,7 +21,7 @@ fn frame(c: &mut Criterion) {
             if method == Method::Decimated && sigma < 3.5 {
                 continue;
             }
-            let gaussian = Gaussian::with_method(sigma, method).expect("a finite width");
+            let gaussian = Gaussian::truncated(sigma, method, 1e-7).expect("a finite width");
             group.bench_function(BenchmarkId::new(format!("{method:?}"), sigma), |b| {
                 b.iter(|| gaussian.blur_into(&image, width, Border::Reflect, &mut dst, &mut scratch));
             });

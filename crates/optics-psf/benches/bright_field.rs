@@ -88,7 +88,7 @@ fn picture(c: &mut Criterion) {
         let depths: Vec<f64> = slabs.iter().map(|&k| SLABS[k]).collect();
         let field = field(&depths, &[0.0]);
         let mut specimen = field.specimen();
-        let mut out = vec![0.0; field.image_width() * field.image_height()];
+        let mut out = vec![0.0; field.image_size().into_iter().product()];
         group.bench_function(name, |b| {
             b.iter(|| {
                 for (i, &k) in slabs.iter().enumerate() {
@@ -111,7 +111,7 @@ fn stack(c: &mut Criterion) {
     let stages: Vec<f64> = (-10..=10).map(|i| 0.3 * f64::from(i)).collect();
     let field = field(&SLABS, &stages);
     let mut specimen = field.specimen();
-    let mut out = vec![0.0; field.image_width() * field.image_height()];
+    let mut out = vec![0.0; field.image_size().into_iter().product()];
     let absorbance: Vec<Vec<f32>> = (0..SLABS.len()).map(slab).collect();
     let mut group = c.benchmark_group("stack");
     group.sample_size(10);
@@ -129,7 +129,7 @@ fn stack(c: &mut Criterion) {
 
 fn abbe(c: &mut Criterion) {
     let abbe = Abbe::new(&microscope(), &AbbeParams::default()).expect("the defaults are in order");
-    let layers = [Layer::absorbing(2.0, &slab(0)).expect("a finite depth")];
+    let layers = [Layer::refracting(2.0, &slab(0), &[]).expect("a finite depth")];
     let mut group = c.benchmark_group("abbe");
     group.sample_size(10);
     group.bench_function("one layer, 64 points", |b| b.iter(|| abbe.image(&layers, 0.0)));

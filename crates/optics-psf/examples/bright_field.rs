@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut picture = GrayImage::new(4 * PANEL as u32, 4 * PANEL as u32);
     for (column, depth) in DEPTHS_UM.into_iter().enumerate() {
         let abbe = AbbeParams { width: SIDE, height: SIDE, source: Source::Vogel { points: 256 } };
-        let exact = Abbe::new(&microscope, &abbe)?.image(&[Layer::absorbing(depth, &nucleus)?], 0.0)?;
+        let exact = Abbe::new(&microscope, &abbe)?.image(&[Layer::refracting(depth, &nucleus, &[])?], 0.0)?;
         draw(&mut picture, column, 0, &pixels(&exact.iter().map(|v| *v as f32).collect::<Vec<_>>()));
         draw(
             &mut picture,

@@ -1,13 +1,13 @@
-use core::f64::consts::PI;
+use core::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
-use crate::error::{Error, require_count};
-use crate::grid::{LONGEST_SIDE, signed};
+use crate::Microscope;
+use crate::error::{Error, within};
+use crate::grid::{SIDES, signed};
 use crate::microscope::distance;
 use crate::pupil::{Pupil, RIM, turn};
-use crate::{Layer, Microscope};
 
 /// Where the condenser's light comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,8 +45,45 @@ impl Default for AbbeParams {
     }
 }
 
-/// Most directions of [`Source::Vogel`].
-const MOST_POINTS: usize = 65_536;
+/// What light meets at one depth: the complex amplitude √T · exp(iφ) that each sample lets through.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    depth_um: f64,
+    amplitude: Vec<[f64; 2]>,
+}
+
+impl Layer {
+    /// A layer of complex amplitudes, real and imaginary part, at a depth about the focal plane when the stage has not
+    /// moved, positive towards the objective.
+    ///
+    /// # Errors
+    ///
+    /// If `depth_um` is not a number from −1000 to 1000.
+    pub fn new(depth_um: f64, amplitude: Vec<[f64; 2]>) -> Result<Self, Error> {
+        Ok(Self { depth_um: distance("depth_um", depth_um)?, amplitude })
+    }
+
+    /// A layer of decadic absorbance A that delays light by φ radians, or does not if that slice is empty: amplitudes
+    /// 10^(−A/2) exp(iφ) (Eq. 11's transmittance).
+    ///
+    /// # Errors
+    ///
+    /// As [`Layer::new`].
+    ///
+    /// # Panics
+    ///
+    /// If the slices differ in length.
+    pub fn refracting(depth_um: f64, absorbance: &[f32], phase_rad: &[f32]) -> Result<Self, Error> {
+        let same = phase_rad.is_empty() || phase_rad.len() == absorbance.len();
+        assert!(same, "absorbance and phase differ in size");
+        let phases = phase_rad.iter().copied().chain(core::iter::repeat(0.0));
+        let amplitude = absorbance.iter().zip(phases).map(|(&a, phase)| {
+            let (size, (cos, sin)) = (libm::exp10(-0.5 * f64::from(a)), turn(f64::from(phase) / TAU));
+            [size * cos, size * sin]
+        });
+        Self::new(depth_um, amplitude.collect())
+    }
+}
 
 /// Image formation from first principles: Abbe's integration over the source, light carried from
 /// layer to layer (multislice).
@@ -56,17 +93,13 @@ const MOST_POINTS: usize = 65_536;
 /// the uppermost layer; from a layer to the next it is carried by exp 2πi Δz γ_n(f + s). That is an
 /// FFT a direction and two more for each further layer; [`BrightField`](crate::BrightField) is
 /// measured against it. The grid is periodic: what leaves on one side comes back on the other.
-///
-/// # Differences from the paper
-///
-/// The paper blurs absorbance with Gaussians.
 #[derive(Debug, Clone)]
 pub struct Abbe {
     microscope: Microscope,
     params: AbbeParams,
 }
 
-/// A complex image and its spectrum, in double precision. The spectrum lies column after column.
+/// A complex image and its spectrum, which lies column after column.
 struct Plane {
     plan: ComplexPlane<f64, 8>,
     field: Vec<Complex64>,
@@ -75,32 +108,10 @@ struct Plane {
 }
 
 impl Plane {
-    fn new(width: usize, height: usize) -> Self {
-        let blank = vec![Complex64::ZERO; width * height];
-        Self {
-            plan: ComplexPlane::new(width, height),
-            field: blank.clone(),
-            spectrum: blank,
-            scratch: PlaneScratch::default(),
-        }
-    }
-
     /// Spectrum of the field.
     fn forward(&mut self) {
         self.plan.forward(&self.field, &mut self.spectrum, &mut self.scratch);
     }
-
-    /// Field of the spectrum, times the number of samples. Columns for which `is_dark` holds are taken for empty.
-    fn inverse(&mut self, is_dark: impl Fn(usize) -> bool) {
-        self.plan.inverse(&self.spectrum, is_dark, &mut self.field, &mut self.scratch);
-    }
-}
-
-/// Directions of one colour of the band, cycles/µm, and the weight of all together.
-struct Light {
-    wavelength_um: f64,
-    weight: f64,
-    directions: Vec<[f64; 2]>,
 }
 
 impl Abbe {
@@ -110,28 +121,23 @@ impl Abbe {
     ///
     /// If a side, the stride or the number of directions is 0 or too large.
     pub fn new(microscope: &Microscope, params: &AbbeParams) -> Result<Self, Error> {
-        let side = |field, value| {
-            require_count(field, value, (1..=LONGEST_SIDE).contains(&value), "a whole number from 1 to 32768")
-        };
+        let side = |field, value: usize| within(field, value as f64, SIDES, "a whole number from 1 to 32768");
         side("width", params.width)?;
         side("height", params.height)?;
         match params.source {
             Source::Vogel { points } => {
-                let holds = (1..=MOST_POINTS).contains(&points);
-                require_count("source.points", points, holds, "a whole number from 1 to 65536")?;
+                within("source.points", points as f64, 1.0..=65_536.0, "a whole number from 1 to 65536")?
             }
-            Source::Lattice { stride } => {
-                side("source.stride", stride)?;
-            }
-            Source::Axis => {}
-        }
+            Source::Lattice { stride } => side("source.stride", stride)?,
+            Source::Axis => 0.0,
+        };
         Ok(Self { microscope: microscope.clone(), params: params.clone() })
     }
 
     /// How many coherent images make one image.
     #[must_use]
     pub fn directions(&self) -> usize {
-        self.lights().map(|light| light.directions.len()).sum()
+        self.microscope.bands().into_iter().map(|(wavelength, _)| self.directions_of(wavelength).len()).sum()
     }
 
     /// The intensity of `layers` relative to that of empty slide, after a travel of the stage (see
@@ -149,31 +155,30 @@ impl Abbe {
         distance("stage_um", stage_um)?;
         let samples = self.params.width * self.params.height;
         for layer in layers {
-            assert_eq!(layer.amplitude().len(), samples, "a layer has other samples than the grid");
+            assert_eq!(layer.amplitude.len(), samples, "a layer has other samples than the grid");
         }
         let mut layers: Vec<&Layer> = layers.iter().collect();
-        layers.sort_by(|a, b| a.depth_um().total_cmp(&b.depth_um()));
-        let mut image = vec![0.0; samples];
-        let Some(first) = layers.first() else {
-            image.fill(1.0);
-            return Ok(image);
+        layers.sort_by(|a, b| a.depth_um.total_cmp(&b.depth_um));
+        let Some(first) = layers.first() else { return Ok(vec![1.0; samples]) };
+        let mut plane = Plane {
+            plan: ComplexPlane::new(self.params.width, self.params.height),
+            field: first.amplitude.iter().map(|&[re, im]| Complex64::new(re, im)).collect(),
+            spectrum: vec![Complex64::ZERO; samples],
+            scratch: PlaneScratch::default(),
         };
-        let mut plane = Plane::new(self.params.width, self.params.height);
-        for (value, &[re, im]) in plane.field.iter_mut().zip(first.amplitude()) {
-            *value = Complex64::new(re, im);
-        }
         plane.forward();
         let entering = plane.spectrum.clone();
-        for light in self.lights() {
-            self.add(&light, &layers, stage_um, &entering, &mut plane, &mut image);
+        let mut image = vec![0.0; samples];
+        for band in self.microscope.bands() {
+            self.add(band, &layers, stage_um, &entering, &mut plane, &mut image);
         }
         Ok(image)
     }
 
-    /// Adds the images of one colour.
+    /// Adds the images of one colour, by its wavelength and weight.
     fn add(
         &self,
-        light: &Light,
+        (wavelength_um, weight): (f64, f64),
         layers: &[&Layer],
         stage_um: f64,
         entering: &[Complex64],
@@ -181,21 +186,22 @@ impl Abbe {
         image: &mut [f64],
     ) {
         let params = self.microscope.params();
-        let pupil = |depth, stage| Pupil::new(params, light.wavelength_um, depth, stage);
-        let lens = pupil(layers.last().map_or(0.0, |layer| layer.depth_um()), stage_um);
+        let pupil = |depth, stage| Pupil::new(params, wavelength_um, depth, stage);
+        let lens = pupil(layers.last().map_or(0.0, |layer| layer.depth_um), stage_um);
         let steps: Vec<(Pupil, &Layer)> =
-            layers.windows(2).map(|pair| (pupil(pair[0].depth_um() - pair[1].depth_um(), 0.0), pair[1])).collect();
+            layers.windows(2).map(|pair| (pupil(pair[0].depth_um - pair[1].depth_um, 0.0), pair[1])).collect();
         let square = |f: [f64; 2]| f[0] * f[0] + f[1] * f[1];
-        let passing = light.directions.iter().filter(|&&s| lens.passes(square(s))).count();
-        let share = light.weight / passing as f64;
-        let travelling = params.mount_index / light.wavelength_um;
+        let directions = self.directions_of(wavelength_um);
+        let passing = directions.iter().filter(|&&s| lens.passes(square(s))).count();
+        let share = weight / passing as f64;
+        let travelling = params.mount_index / wavelength_um;
         let samples = image.len() as f64;
-        for &s in &light.directions {
+        for s in directions {
             plane.spectrum.copy_from_slice(entering);
             for (step, layer) in &steps {
                 let wave = |f| (square(f) < travelling * travelling).then(|| step.medium_waves(square(f)));
                 self.filter(plane, s, travelling, wave);
-                for (value, &[re, im]) in plane.field.iter_mut().zip(layer.amplitude()) {
+                for (value, &[re, im]) in plane.field.iter_mut().zip(&layer.amplitude) {
                     *value *= Complex64::new(re, im) / samples;
                 }
                 plane.forward();
@@ -227,21 +233,19 @@ impl Abbe {
                 });
             }
         }
-        plane.inverse(is_dark);
+        plane.plan.inverse(&plane.spectrum, is_dark, &mut plane.field, &mut plane.scratch);
     }
 
-    fn lights(&self) -> impl Iterator<Item = Light> {
+    /// Directions of light, cycles/µm.
+    fn directions_of(&self, wavelength_um: f64) -> Vec<[f64; 2]> {
         let pitch = self.microscope.pitch_um();
         let steps = [self.params.width, self.params.height].map(|side| 1.0 / (side as f64 * pitch));
-        self.microscope.bands().into_iter().map(move |(wavelength_um, weight)| {
-            let radius = self.microscope.params().condenser_na / wavelength_um;
-            let directions = match self.params.source {
-                Source::Vogel { points } => sunflower(points, radius),
-                Source::Lattice { stride } => lattice(steps.map(|step| step * stride as f64), radius),
-                Source::Axis => vec![[0.0; 2]],
-            };
-            Light { wavelength_um, weight, directions }
-        })
+        let radius = self.microscope.params().condenser_na / wavelength_um;
+        match self.params.source {
+            Source::Vogel { points } => sunflower(points, radius),
+            Source::Lattice { stride } => lattice(steps.map(|step| step * stride as f64), radius),
+            Source::Axis => vec![[0.0; 2]],
+        }
     }
 }
 

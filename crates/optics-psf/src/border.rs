@@ -64,31 +64,3 @@ impl Extension<'_> {
         self.line
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn extended(border: Border, start: isize, len: usize) -> Vec<f32> {
-        let mut line = vec![-1.0; len];
-        let mut extension = border.extension(3, start, &mut line);
-        extension.of(&[7.0, 8.0, 9.0]);
-        extension.of(&[1.0, 2.0, 3.0]).to_vec()
-    }
-
-    #[test]
-    fn borders_are_what_the_words_say() {
-        assert_eq!(extended(Border::Zero, -2, 7), [0., 0., 1., 2., 3., 0., 0.]);
-        assert_eq!(extended(Border::Reflect, -2, 7), [2., 1., 1., 2., 3., 3., 2.]);
-        assert_eq!(extended(Border::Replicate, -2, 7), [1., 1., 1., 2., 3., 3., 3.]);
-    }
-
-    #[test]
-    fn a_border_wider_than_the_image_folds_again() {
-        let folded = [1., 2., 3., 3., 2., 1., 1., 2., 3., 3., 2., 1., 1., 2., 3.];
-        assert_eq!(extended(Border::Reflect, -6, 15), folded);
-        assert_eq!(extended(Border::Zero, 5, 2), [0., 0.]);
-        assert_eq!(extended(Border::Zero, -9, 2), [0., 0.]);
-        assert_eq!(extended(Border::Replicate, 1, 4), [2., 3., 3., 3.]);
-    }
-}

@@ -1,12 +1,11 @@
-use core::fmt;
-
-use crate::canvas::Canvas;
-use crate::error::{Error, require_count};
-use crate::filter::Filter;
-use crate::grid::{LONGEST_SIDE, fast_length};
-use crate::lanes::LanePlans;
+use crate::canvas::{Canvas, Samples, Spectra, absorbed, absorbed_of, amplitude_of, is_lit};
+use crate::error::{Error, require, within};
+use crate::filter::{Filter, Lattice};
+use crate::grid::{SIDES, fast_length};
+use crate::lane_plane::{LanePlans, LaneScratch, Lanes};
+use crate::light::{lift, mean_of_pixels};
 use crate::microscope::distance;
-use crate::{Microscope, Specimen, Transfer};
+use crate::{Microscope, Transfer};
 
 /// Which object, cut into slabs, [`BrightField`] images, and at which planes.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,20 +25,11 @@ pub struct BrightFieldParams {
     /// Travels of the stage at which pictures are taken, each −1000 to 1000 µm. Default one at 0,
     /// ours.
     pub stages_um: Vec<f64>,
-    /// Where slabs far from focus are computed. Default [`Defocused::OnCamera`], ours.
-    pub defocused: Defocused,
 }
 
 impl Default for BrightFieldParams {
     fn default() -> Self {
-        Self {
-            width: 512,
-            height: 512,
-            padding: Padding::Clear { px: 64 },
-            depths_um: vec![0.0],
-            stages_um: vec![0.0],
-            defocused: Defocused::OnCamera,
-        }
+        Self { width: 512, height: 512, padding: Padding::Clear { px: 64 }, depths_um: vec![0.0], stages_um: vec![0.0] }
     }
 }
 
@@ -56,20 +46,6 @@ pub enum Padding {
     },
 }
 
-/// Where slabs that are far from focus are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Defocused {
-    /// On the lattice of the object, as all others.
-    OnObject,
-    /// On that of the camera, as the mean over each pixel, from 2 µm of defocus on if little is
-    /// left there of detail finer than the pixels. What is then lost are details that two slabs have in
-    /// common within one pixel, below 0.1 % of the contrast.
-    OnCamera,
-}
-
-/// Widest padding.
-const MOST_PADDING: usize = 16_384;
-
 /// Bright field: the image as a product of filtered transmittances, one factor for each slab of the
 /// object.
 ///
@@ -83,29 +59,35 @@ const MOST_PADDING: usize = 16_384;
 /// contrast for one slab and 2 % for two that overlap.
 ///
 /// Filters are computed once, here; a [`Specimen`] holds what is on the slide, and each picture of
-/// it then costs one inverse FFT for each slab that is not empty.
-///
-/// # Differences from the paper
-///
-/// The paper blurs absorbance with Gaussians (Eqs. 11 to 14), which [`Gaussian`](crate::Gaussian)
-/// and [`DepthOfFocus`](crate::DepthOfFocus) do; that is 8 to 87 % off from Abbe's image where this
-/// is 1 % off.
+/// it then costs one inverse FFT for each slab that is not empty. Slabs from 2 µm of defocus on are computed as the
+/// mean over each pixel of the camera, if little is left there of detail finer than the pixels. What is then lost are
+/// details that two slabs have in common within one pixel, below 0.1 % of the contrast; with an oversampling of 1
+/// there are no such details.
+/// The paper's Gaussians (Eqs. 11 to 14, [`Gaussian`](crate::Gaussian)) are 8 to 87 % off where this is 1 % off.
+#[derive(Debug)]
 pub struct BrightField {
-    pub(crate) microscope: Microscope,
-    pub(crate) size: [usize; 2],
-    pub(crate) canvas: Canvas,
-    pub(crate) in_focus: Filter,
+    microscope: Microscope,
+    size: [usize; 2],
+    canvas: Canvas,
+    in_focus: Filter,
     /// For each plane, the filters of the slabs.
-    pub(crate) planes: Vec<Vec<Filter>>,
+    planes: Vec<Vec<Filter>>,
 }
 
-impl fmt::Debug for BrightField {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BrightField")
-            .field("microscope", &self.microscope)
-            .field("size", &self.size)
-            .field("grid", &[self.canvas.width(), self.canvas.height()])
-            .finish_non_exhaustive()
+/// What is on the slide, slab by slab, as the spectra of what it absorbs and delays. It is made by
+/// [`BrightField::specimen`], belongs to that, and is also its working memory: with the same one,
+/// nothing is allocated after the first object and picture.
+#[derive(Debug, Clone, Default)]
+pub struct Specimen {
+    slabs: Vec<Spectra>,
+    scratch: LaneScratch,
+    product: Vec<f32>,
+}
+
+impl Specimen {
+    /// Empties the slide.
+    pub fn clear(&mut self) {
+        self.slabs.iter_mut().for_each(Spectra::clear);
     }
 }
 
@@ -119,31 +101,22 @@ impl BrightField {
     pub fn new(microscope: &Microscope, params: &BrightFieldParams) -> Result<Self, Error> {
         let oversampling = microscope.params().oversampling;
         let side = |field, value: usize| {
-            let holds = (1..=LONGEST_SIDE).contains(&value) && value.is_multiple_of(oversampling);
-            require_count(field, value, holds, "a multiple of the oversampling from 1 to 32768")
+            let holds = SIDES.contains(&(value as f64)) && value.is_multiple_of(oversampling);
+            require(field, value as f64, holds, "a multiple of the oversampling from 1 to 32768").map(|_| value)
         };
         let size = [side("width", params.width)?, side("height", params.height)?];
         let grid = match params.padding {
             Padding::Periodic => size,
             Padding::Clear { px } => {
-                require_count("padding.px", px, px <= MOST_PADDING, "a whole number from 0 to 16384")?;
+                within("padding.px", px as f64, 0.0..=16_384.0, "a whole number from 0 to 16384")?;
                 size.map(|side| oversampling * fast_length((side + px).div_ceil(oversampling)))
             }
         };
-        for &depth in &params.depths_um {
-            distance("depths_um", depth)?;
-        }
-        for &stage in &params.stages_um {
-            distance("stages_um", stage)?;
+        for (field, list) in [("depths_um", &params.depths_um), ("stages_um", &params.stages_um)] {
+            list.iter().try_for_each(|&value| distance(field, value).map(drop))?;
         }
         let plane = |&stage: &f64| {
-            let filter = |&depth: &f64| {
-                let filter = Filter::new(microscope, depth, stage, &Transfer::new(microscope, depth, stage));
-                match params.defocused {
-                    Defocused::OnCamera => filter,
-                    Defocused::OnObject => filter.on_object(),
-                }
-            };
+            let filter = |&depth: &f64| Filter::new(microscope, depth, stage, &Transfer::new(microscope, depth, stage));
             params.depths_um.iter().map(filter).collect()
         };
         Ok(Self {
@@ -158,23 +131,142 @@ impl BrightField {
     /// An empty slide.
     #[must_use]
     pub fn specimen(&self) -> Specimen {
-        Specimen::new(self.planes.first().map_or(0, Vec::len))
+        let slabs = self.planes.first().map_or(0, Vec::len);
+        Specimen { slabs: vec![Spectra::default(); slabs], ..Specimen::default() }
     }
 
-    /// Width of a picture in pixels of the camera.
+    /// Width and height of a picture in pixels of the camera.
     #[must_use]
-    pub fn image_width(&self) -> usize {
-        self.size[0] / self.microscope.params().oversampling
+    pub fn image_size(&self) -> [usize; 2] {
+        self.size.map(|side| side / self.microscope.params().oversampling)
     }
 
-    /// Height of a picture in pixels of the camera.
+    /// Puts decadic absorbances, 0 or more, into a slab in place of what was there; its phase stays.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such slab, or the slice has not as many samples as the object.
+    pub fn set_absorbance(&self, specimen: &mut Specimen, slab: usize, absorbance: &[f32]) {
+        self.set_absorbed(specimen, slab, absorbance, 0.0, absorbed);
+    }
+
+    /// Puts transmittances, 0 to 1, into a slab in place of what was there; its phase stays.
+    ///
+    /// # Panics
+    ///
+    /// As [`BrightField::set_absorbance`].
+    pub fn set_transmittance(&self, specimen: &mut Specimen, slab: usize, transmittance: &[f32]) {
+        self.set_absorbed(specimen, slab, transmittance, 1.0, absorbed_of);
+    }
+
+    /// Puts phases, by how many radians light is late, into a slab in place of those that were
+    /// there; what it absorbs stays.
+    ///
+    /// # Panics
+    ///
+    /// As [`BrightField::set_absorbance`].
+    pub fn set_phase(&self, specimen: &mut Specimen, slab: usize, phase_rad: &[f32]) {
+        let Specimen { slabs, scratch, .. } = specimen;
+        self.transform(phase_rad, 0.0, &mut slabs[slab].phase, scratch, is_lit);
+    }
+
+    fn set_absorbed(
+        &self,
+        specimen: &mut Specimen,
+        slab: usize,
+        samples: &[f32],
+        background: f32,
+        map: impl Fn(&mut [f32]) -> bool,
+    ) {
+        let Specimen { slabs, scratch, .. } = specimen;
+        let spectra = &mut slabs[slab];
+        spectra.clear_absorbed();
+        self.transform(samples, background, &mut spectra.absorbed, scratch, &map);
+        if self.planes.iter().any(|plane| plane[slab].is_corrected) {
+            self.transform(samples, background, &mut spectra.amplitude, scratch, amplitude_of(map));
+        }
+    }
+
+    /// The spectrum of what `map` makes of samples; none if all are empty, as the background is.
+    fn transform(
+        &self,
+        samples: &[f32],
+        background: f32,
+        spectrum: &mut Vec<Lanes>,
+        scratch: &mut LaneScratch,
+        map: impl Fn(&mut [f32]) -> bool,
+    ) {
+        let [width, height] = self.size;
+        assert_eq!(samples.len(), width * height, "a slab has other samples than the object");
+        self.canvas.transform(Samples { samples, width, offset: 0, background }, map, spectrum, scratch);
+    }
+
+    /// The picture of a plane: the light of each pixel of the camera relative to that of empty slide, stray
+    /// light included.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such plane, or the specimen is another's.
     #[must_use]
-    pub fn image_height(&self) -> usize {
-        self.size[1] / self.microscope.params().oversampling
+    pub fn image(&self, specimen: &mut Specimen, plane: usize) -> Vec<f32> {
+        let mut out = vec![0.0; self.image_size().into_iter().product()];
+        self.image_into(specimen, plane, &mut out);
+        out
     }
 
-    /// Whether some plane needs the correction of the in-focus form of a slab.
-    pub(crate) fn is_corrected(&self, slab: usize) -> bool {
-        self.planes.iter().any(|plane| plane[slab].is_corrected)
+    /// The picture of a plane, into `out`. Gives the number of places where a slab would have let
+    /// less than [`LEAST_LIGHT`](crate::LEAST_LIGHT) through, in pixels of the camera.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such plane, the specimen is another's, or `out` has not
+    /// [as many pixels](Self::image_size).
+    pub fn image_into(&self, specimen: &mut Specimen, plane: usize, out: &mut [f32]) -> usize {
+        let [image_width, image_height] = self.image_size();
+        assert_eq!(out.len(), image_width * image_height, "the picture has another size");
+        let Specimen { slabs, scratch, product } = specimen;
+        let filters = &self.planes[plane];
+        assert_eq!(slabs.len(), filters.len(), "the specimen has other slabs");
+        for (slab, filter) in slabs.iter_mut().zip(filters) {
+            if filter.is_corrected {
+                self.canvas.correct(&self.in_focus, slab, scratch);
+            }
+        }
+        let oversampling = self.microscope.params().oversampling;
+        let [width, height] = self.size;
+        let mut floored = 0;
+        out.fill(1.0);
+        let on_object = |(slab, filter): (&Spectra, &Filter)| filter.lattice == Lattice::Object && !slab.is_empty();
+        if slabs.iter().zip(filters).any(on_object) {
+            product.clear();
+            product.resize(width * height, 1.0);
+            let samples = self.expose(Lattice::Object, slabs, filters, product, width, scratch);
+            floored = samples.div_ceil(oversampling * oversampling);
+            mean_of_pixels(product, width, oversampling, out);
+        }
+        floored += self.expose(Lattice::Camera, slabs, filters, out, image_width, scratch);
+        lift(out, self.microscope.params().stray_light);
+        floored
+    }
+
+    /// Multiplies `product` by what the slabs that are computed on `lattice` let through.
+    fn expose(
+        &self,
+        lattice: Lattice,
+        slabs: &[Spectra],
+        filters: &[Filter],
+        product: &mut [f32],
+        width: usize,
+        scratch: &mut LaneScratch,
+    ) -> usize {
+        let here = || filters.iter().zip(slabs).filter(|(filter, _)| filter.lattice == lattice);
+        let absorbing = here().filter(|(_, slab)| !slab.absorbed.is_empty());
+        let transmit = |(filter, slab)| self.canvas.transmit::<false>(filter, slab, product, width, scratch);
+        let floored = absorbing.map(transmit).sum();
+        let refracting = here().filter(|(_, slab)| !slab.phase.is_empty());
+        if refracting.clone().next().is_some() {
+            self.canvas.refract(lattice, refracting, product, width, scratch);
+        }
+        floored
     }
 }

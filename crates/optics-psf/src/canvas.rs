@@ -3,8 +3,7 @@ use portable_numerics::elementary::exp_f32;
 
 use crate::Microscope;
 use crate::filter::{Block, Filter, Lattice, Part};
-use crate::lane_plane::{LanePlane, LaneScratch, LaneSupport, STRIPE};
-use crate::lanes::{LANES, LanePlans, Lanes, ZERO};
+use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes, STRIPE, ZERO};
 use crate::pupil::turn;
 use crate::transfer::Transfer;
 
@@ -13,6 +12,7 @@ use crate::transfer::Transfer;
 pub const LEAST_LIGHT: f32 = 1e-3;
 
 /// A periodic rectangle of the slide: the lattices on which what is in it is imaged.
+#[derive(Debug)]
 pub(crate) struct Canvas {
     object: Raster,
     camera: Raster,
@@ -27,12 +27,14 @@ pub(crate) struct Canvas {
 }
 
 /// A lattice, and its frequencies that the microscope transfers.
+#[derive(Debug)]
 struct Raster {
     plane: LanePlane,
     support: LaneSupport,
 }
 
 /// What the mean over a pixel does to frequencies 0, 1, … of one axis.
+#[derive(Debug)]
 struct PixelMean {
     /// Around the middle of the pixel.
     size: Vec<f32>,
@@ -41,9 +43,20 @@ struct PixelMean {
 }
 
 impl PixelMean {
-    /// Whole blocks of frequencies.
-    fn new(side: usize, oversampling: usize) -> Self {
-        let mean = |k: usize| mean_over_pixel(k as f64 / side as f64, oversampling);
+    /// Whole blocks of frequencies. The mean is (1/n) ∑ₖ exp 2πi f k over the samples of a pixel, f in cycles per sample:
+    /// around its middle, and from its first sample, k = 0 … n − 1.
+    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+    fn new(side: usize, n: usize) -> Self {
+        let mean = |place: usize| {
+            let f = place as f64 / side as f64;
+            let (mut middle, mut moved) = (0.0, [0.0; 2]);
+            for k in 0..n {
+                let (c, s) = turn(f * k as f64);
+                moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
+                middle += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
+            }
+            (middle as f32, moved.map(|v| v as f32))
+        };
         let (size, moved) = (0..(side / 2 + 1).next_multiple_of(LANES)).map(mean).unzip();
         Self { size, moved }
     }
@@ -67,7 +80,6 @@ impl Spectra {
         self.absorbed.is_empty() && self.phase.is_empty()
     }
 
-    /// Forgets what is absorbed.
     pub(crate) fn clear_absorbed(&mut self) {
         for spectrum in [&mut self.absorbed, &mut self.amplitude, &mut self.correction] {
             spectrum.clear();
@@ -78,12 +90,6 @@ impl Spectra {
         self.clear_absorbed();
         self.phase.clear();
     }
-}
-
-/// Working memory of [`Canvas`].
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Memory {
-    plane: LaneScratch,
 }
 
 /// Samples for each period of the finest detail that is transferred, where that is squared. Three would keep all that is
@@ -119,23 +125,6 @@ impl Canvas {
         }
     }
 
-    /// Samples of the object from left to right.
-    pub(crate) fn width(&self) -> usize {
-        self.object.plane.width
-    }
-
-    /// Samples of the object from top to bottom.
-    pub(crate) fn height(&self) -> usize {
-        self.object.plane.height
-    }
-
-    fn raster(&self, lattice: Lattice) -> &Raster {
-        match lattice {
-            Lattice::Object => &self.object,
-            Lattice::Camera => &self.camera,
-        }
-    }
-
     /// The spectrum of an image on the object's lattice, or an empty one if the image is empty. It is what `map` makes of
     /// rows of `width` samples, which lie `offset` samples from the left and the upper edge in `background`, and
     /// 0 around them: `map` makes 0 of the background, and says whether it made anything else.
@@ -144,7 +133,7 @@ impl Canvas {
         image: Samples<'_>,
         map: impl Fn(&mut [f32]) -> bool,
         spectrum: &mut Vec<Lanes>,
-        memory: &mut Memory,
+        scratch: &mut LaneScratch,
     ) {
         let Samples { samples, width, offset, background } = image;
         let Raster { plane, support } = &self.object;
@@ -170,22 +159,23 @@ impl Canvas {
             }
             map(inside.as_flattened_mut().as_flattened_mut())
         };
-        plane.forward(support, fill, spectrum, &mut memory.plane);
+        plane.forward(support, fill, spectrum, scratch);
     }
 
-    /// Frequencies of a block.
-    fn block(&self, block: usize) -> Block<'_> {
-        Block {
+    /// Adds a block of a spectrum, times a response of a filter, to `sum`.
+    fn add(&self, (filter, part): (&Filter, Part), spectrum: &[Lanes], block: usize, reach: usize, sum: &mut [Lanes]) {
+        let at = Block {
             step_x: self.step_x,
             y: &self.y[block],
             pixel_x: &self.pixel[0].size,
             pixel_y: &self.pixel[1].size.as_chunks().0[block],
-        }
+        };
+        filter.add(part, at, self.object.support.block(spectrum, block), reach, sum);
     }
 
     /// The correction of the in-focus form, if that is not known yet. With 1 − T = 2a − a² it is
     /// (1 − W₀ ⊗ a)² − W₀ ⊗ T = (W₀ ⊗ a)² + W₀ ⊗ (1 − T − 2a).
-    pub(crate) fn correct(&self, in_focus: &Filter, spectra: &mut Spectra, memory: &mut Memory) {
+    pub(crate) fn correct(&self, in_focus: &Filter, spectra: &mut Spectra, scratch: &mut LaneScratch) {
         let Spectra { absorbed, amplitude, correction, .. } = spectra;
         if !correction.is_empty() || amplitude.is_empty() {
             return;
@@ -193,55 +183,16 @@ impl Canvas {
         let Raster { plane, support } = &self.object;
         // Of the picture, and of its spectrum, that of as many samples as the object has.
         let (norm, share) = (plane.norm(), self.squares.norm() / plane.norm());
+        let blurred = (in_focus, Part::Absorption);
         let fill = |block: usize, line: &mut [Lanes]| {
-            let (at, from) = (self.block(block), support.block(amplitude, block));
-            in_focus.add(Part::Absorption, at, from, support.reach(block), line);
+            self.add(blurred, amplitude, block, support.reach(block), line);
         };
         let square = |stripe: &mut [Lanes]| squared(stripe.as_flattened_mut().as_flattened_mut(), norm, share);
-        self.squares.mapped(support, fill, square, correction, &mut memory.plane);
+        self.squares.mapped(support, fill, square, correction, scratch);
         twice_less(amplitude.as_flattened_mut().as_flattened_mut(), absorbed.as_flattened().as_flattened());
         for block in 0..support.blocks() {
-            let (at, from) = (self.block(block), support.block(amplitude, block));
-            in_focus.add(Part::Absorption, at, from, support.reach(block), support.block_mut(correction, block));
+            self.add(blurred, amplitude, block, support.reach(block), support.block_mut(correction, block));
         }
-    }
-
-    /// What is absorbed in the picture, in units of 1 over the object's samples: `visit` gets all rows of stripe after
-    /// stripe of columns as far as the first `columns` go.
-    pub(crate) fn absorption(
-        &self,
-        filter: &Filter,
-        spectra: &Spectra,
-        memory: &mut Memory,
-        columns: usize,
-        visit: impl FnMut(usize, &[Lanes]),
-    ) {
-        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
-            let (at, support) = (self.block(block), &self.object.support);
-            filter.add(Part::Absorption, at, support.block(&spectra.absorbed, block), reach, line);
-            if filter.is_corrected {
-                filter.add(Part::Correction, at, support.block(&spectra.correction, block), reach, line);
-            }
-        };
-        self.invert(filter.lattice, add, columns, visit, &mut memory.plane);
-    }
-
-    /// The phases in the picture of all that is imaged on `lattice`, in units of 1 over the object's samples.
-    pub(crate) fn phase<'a>(
-        &self,
-        lattice: Lattice,
-        parts: impl Iterator<Item = (&'a Filter, &'a Spectra)> + Clone,
-        memory: &mut Memory,
-        columns: usize,
-        visit: impl FnMut(usize, &[Lanes]),
-    ) {
-        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
-            for (filter, spectra) in parts.clone() {
-                let from = self.object.support.block(&spectra.phase, block);
-                filter.add(Part::Phase, self.block(block), from, reach, line);
-            }
-        };
-        self.invert(lattice, add, columns, visit, &mut memory.plane);
     }
 
     fn invert(
@@ -252,7 +203,10 @@ impl Canvas {
         visit: impl FnMut(usize, &[Lanes]),
         scratch: &mut LaneScratch,
     ) {
-        let Raster { plane, support } = self.raster(lattice);
+        let Raster { plane, support } = match lattice {
+            Lattice::Object => &self.object,
+            Lattice::Camera => &self.camera,
+        };
         let fill = |block: usize, line: &mut [Lanes]| {
             let reach = support.reach(block);
             add(block, reach, line);
@@ -264,51 +218,47 @@ impl Canvas {
         plane.inverse(support, fill, columns, visit, scratch);
     }
 
-    /// Makes `light`, rows of `width`, what one thing lets through; gives the number of values that were too low.
-    pub(crate) fn transmit_into(
+    /// Multiplies `product`, rows of `width`, by what one thing lets through, or makes it that if it is the first; gives
+    /// the number of values that were too low.
+    pub(crate) fn transmit<const FIRST: bool>(
         &self,
         filter: &Filter,
         spectra: &Spectra,
-        memory: &mut Memory,
-        light: &mut [f32],
-        width: usize,
-    ) -> usize {
-        let (norm, mut floored) = (self.object.plane.norm(), 0);
-        self.absorption(filter, spectra, memory, width, |left, stripe| {
-            floored += transmit::<true>(light, width, left, stripe, norm);
-        });
-        floored
-    }
-
-    /// Multiplies `product` by that.
-    pub(crate) fn transmit(
-        &self,
-        filter: &Filter,
-        spectra: &Spectra,
-        memory: &mut Memory,
         product: &mut [f32],
         width: usize,
+        scratch: &mut LaneScratch,
     ) -> usize {
+        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
+            self.add((filter, Part::Absorption), &spectra.absorbed, block, reach, line);
+            if filter.is_corrected {
+                self.add((filter, Part::Correction), &spectra.correction, block, reach, line);
+            }
+        };
         let (norm, mut floored) = (self.object.plane.norm(), 0);
-        self.absorption(filter, spectra, memory, width, |left, stripe| {
-            floored += transmit::<false>(product, width, left, stripe, norm);
-        });
+        let visit = |left: usize, stripe: &[Lanes]| {
+            floored += transmit::<FIRST>(product, width, left, stripe, norm);
+        };
+        self.invert(filter.lattice, add, width, visit, scratch);
         floored
     }
 
-    /// Multiplies `product`, rows of `width`, by the light that phases move.
+    /// Multiplies `product`, rows of `width`, by the light that the phases of all that is imaged on `lattice` move.
     pub(crate) fn refract<'a>(
         &self,
         lattice: Lattice,
         parts: impl Iterator<Item = (&'a Filter, &'a Spectra)> + Clone,
-        memory: &mut Memory,
         product: &mut [f32],
         width: usize,
+        scratch: &mut LaneScratch,
     ) {
-        let norm = self.object.plane.norm();
-        self.phase(lattice, parts, memory, width, |left, stripe| {
-            delay(product, width, left, stripe, -2.0 * norm);
-        });
+        let add = |block: usize, reach: usize, line: &mut [Lanes]| {
+            for (filter, spectra) in parts.clone() {
+                self.add((filter, Part::Phase), &spectra.phase, block, reach, line);
+            }
+        };
+        let factor = -2.0 * self.object.plane.norm();
+        let visit = |left: usize, stripe: &[Lanes]| delay(product, width, left, stripe, factor);
+        self.invert(lattice, add, width, visit, scratch);
     }
 }
 
@@ -319,19 +269,6 @@ pub(crate) struct Samples<'a> {
     pub(crate) width: usize,
     pub(crate) offset: usize,
     pub(crate) background: f32,
-}
-
-/// (1/n) ∑ₖ exp 2πi f k over the samples of a pixel: around its middle, and from its first sample, k = 0 … n − 1. f
-/// in cycles per sample.
-#[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
-fn mean_over_pixel(f: f64, n: usize) -> (f32, [f32; 2]) {
-    let (mut middle, mut moved) = (0.0, [0.0; 2]);
-    for k in 0..n {
-        let (c, s) = turn(f * k as f64);
-        moved = [moved[0] + c / n as f64, moved[1] + s / n as f64];
-        middle += turn(f * (k as f64 - 0.5 * (n - 1) as f64)).0 / n as f64;
-    }
-    (middle as f32, moved.map(|v| v as f32))
 }
 
 #[multiversion(targets = "simd")]
@@ -402,22 +339,26 @@ fn delay(product: &mut [f32], width: usize, left: usize, phases: &[Lanes], facto
 
 /// From 1 − T to 1 − √T.
 #[multiversion(targets = "simd")]
-pub(crate) fn amplitude(line: &mut [f32]) {
+fn amplitude(line: &mut [f32]) {
     for v in line {
         // (1 − T)/(1 + √T) keeps the digits of little absorption.
         *v /= 1.0 + (1.0 - *v).max(0.0).sqrt();
     }
 }
 
-/// From absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11).
+/// From absorbance A to 1 − T = 1 − 10^(−A) (Eq. 11); says whether there is anything.
 #[multiversion(targets = "simd")]
-pub(crate) fn absorbed(values: &mut [f32]) {
-    for value in values {
-        *value = 1.0 - exp_f32(-*value * core::f32::consts::LN_10);
+pub(crate) fn absorbed(values: &mut [f32]) -> bool {
+    let lit = is_lit(values);
+    if lit {
+        for value in values {
+            *value = 1.0 - exp_f32(-*value * core::f32::consts::LN_10);
+        }
     }
+    lit
 }
 
-/// From T to 1 − T; says whether there is anything.
+/// From T to 1 − T, likewise.
 #[multiversion(targets = "simd")]
 pub(crate) fn absorbed_of(values: &mut [f32]) -> bool {
     let mut lit = 0_u32;
@@ -428,13 +369,15 @@ pub(crate) fn absorbed_of(values: &mut [f32]) -> bool {
     lit != 0
 }
 
-/// From T to 1 − √T, likewise.
-pub(crate) fn amplitude_of(values: &mut [f32]) -> bool {
-    let lit = absorbed_of(values);
-    if lit {
-        amplitude(values);
+/// To 1 − √T, likewise, from what `absorbed` makes 1 − T of.
+pub(crate) fn amplitude_of(absorbed: impl Fn(&mut [f32]) -> bool) -> impl Fn(&mut [f32]) -> bool {
+    move |values| {
+        let lit = absorbed(values);
+        if lit {
+            amplitude(values);
+        }
+        lit
     }
-    lit
 }
 
 /// Whether there is anything.
@@ -473,12 +416,12 @@ mod tests {
                 let transfer = Transfer::new(&microscope, depth, 0.0);
                 let filter = Filter::new(&microscope, depth, 0.0, &transfer);
                 let light = |canvas: &Canvas| {
-                    let (mut spectra, mut memory) = (Spectra::default(), Memory::default());
-                    canvas.transform(samples, absorbed_of, &mut spectra.absorbed, &mut memory);
-                    canvas.transform(samples, amplitude_of, &mut spectra.amplitude, &mut memory);
-                    canvas.correct(&in_focus, &mut spectra, &mut memory);
+                    let (mut spectra, mut scratch) = (Spectra::default(), LaneScratch::default());
+                    canvas.transform(samples, absorbed_of, &mut spectra.absorbed, &mut scratch);
+                    canvas.transform(samples, amplitude_of(absorbed_of), &mut spectra.amplitude, &mut scratch);
+                    canvas.correct(&in_focus, &mut spectra, &mut scratch);
                     let mut product = vec![1.0; 240 * 192];
-                    canvas.transmit(&filter, &spectra, &mut memory, &mut product, 240);
+                    canvas.transmit::<false>(&filter, &spectra, &mut product, 240, &mut scratch);
                     product
                 };
                 let (found, expected) = (light(&sparse), light(&full));
@@ -486,16 +429,5 @@ mod tests {
                 assert!(error < 5e-4, "{na} {condenser_na} {depth}: {error}");
             }
         }
-    }
-
-    #[test]
-    fn absorbed_shares_are_those_of_the_library_function() {
-        let absorbance: Vec<f32> = (0..6000).map(|i| i as f32 * 0.001).collect();
-        let mut shares = absorbance.clone();
-        absorbed(&mut shares);
-        for (a, share) in absorbance.iter().zip(&shares) {
-            assert!((f64::from(*share) - (1.0 - libm::exp10(-f64::from(*a)))).abs() < 3e-7, "{a}");
-        }
-        assert_eq!(shares[0], 0.0);
     }
 }

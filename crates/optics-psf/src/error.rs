@@ -1,3 +1,5 @@
+use core::ops::RangeInclusive;
+
 use thiserror::Error;
 
 /// Why parameters were refused.
@@ -11,16 +13,6 @@ pub enum Error {
         field: &'static str,
         /// What it held.
         value: f64,
-        /// What would be accepted.
-        accepted: &'static str,
-    },
-    /// A whole number lies outside the range its field allows.
-    #[error("{field} is {value}; it must be {accepted}")]
-    Count {
-        /// Name of the field or argument.
-        field: &'static str,
-        /// What it held.
-        value: usize,
         /// What would be accepted.
         accepted: &'static str,
     },
@@ -61,12 +53,12 @@ pub(crate) fn require(field: &'static str, value: f64, holds: bool, accepted: &'
     if value.is_finite() && holds { Ok(value) } else { Err(Error::OutOfRange { field, value, accepted }) }
 }
 
-/// `value`, if it `holds`.
-pub(crate) fn require_count(
+/// `value`, if it lies in a range.
+pub(crate) fn within(
     field: &'static str,
-    value: usize,
-    holds: bool,
+    value: f64,
+    range: RangeInclusive<f64>,
     accepted: &'static str,
-) -> Result<usize, Error> {
-    if holds { Ok(value) } else { Err(Error::Count { field, value, accepted }) }
+) -> Result<f64, Error> {
+    require(field, value, range.contains(&value), accepted)
 }

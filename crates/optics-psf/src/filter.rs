@@ -4,23 +4,19 @@ use multiversion::multiversion;
 use num_complex::Complex32;
 
 use crate::Microscope;
-use crate::lanes::{LANES, Lanes};
-use crate::transfer::{SIDED_SAMPLES, Shape, Transfer, corners};
+use crate::lane_plane::{LANES, Lanes};
+use crate::transfer::{SIDED_SAMPLES, Transfer, corners};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the
-/// in-focus form is whole, and gone. It gains little at 1 µm and nothing from 2 µm on.
+/// in-focus form is whole, and gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
 const CORRECTED_UM: [f64; 2] = [1.0, 2.0];
 
 /// The part of the correction that is lost under a full aperture. It says how light that is scattered twice interferes,
 /// and there much of it does not; fitted to Abbe's images of discs, specks and nuclei.
 const SCATTERED_APART: f64 = 0.4;
 
-/// Where the spectrum of the correction begins to fade, as a part of the cutoff.
+/// Where the spectrum of the correction begins to fade, as a part of the cutoff: a step would ring around sharp things.
 const TAPER_FROM: f64 = 0.75;
-
-/// Least defocus for the camera's lattice, µm of mountant: where the correction of the in-focus form
-/// has ended.
-const SMOOTH_UM: f64 = 2.0;
 
 /// The transfer that may be left of detail finer than pixels, on the camera's lattice.
 const SMOOTH_TRANSFER: f64 = 0.05;
@@ -29,18 +25,18 @@ const SMOOTH_TRANSFER: f64 = 0.05;
 const LEAST_TRANSFER: f32 = 0.1;
 
 /// Which lattice a factor of the light is sampled on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Lattice {
     /// That of the object, [`oversampling`](crate::MicroscopeParams::oversampling) samples along the side of a pixel.
     Object,
     /// That of the camera, each value the mean over its pixel.
+    #[default]
     Camera,
 }
 
 /// What the spectra of something at one depth are multiplied with for one plane.
 #[derive(Debug, Clone)]
 pub(crate) struct Filter {
-    /// Where the factor of the light is computed.
     pub(crate) lattice: Lattice,
     /// Whether the correction of the in-focus form takes part.
     pub(crate) is_corrected: bool,
@@ -92,18 +88,15 @@ impl Filter {
         let [whole, gone] = CORRECTED_UM;
         let coherent = 1.0 - SCATTERED_APART * incoherence(params.condenser_na / params.na);
         let share = coherent * fade((defocus - whole) / (gone - whole));
-        let radius = microscope.cone_radius_um(depth_um, stage_um);
+        let (radius, cutoff) = (microscope.cone_radius_um(depth_um, stage_um), microscope.cutoff());
         let nyquist = 0.5 / params.pixel_um;
-        let is_smooth = params.oversampling > 1 && defocus >= SMOOTH_UM && transfer.extent(SMOOTH_TRANSFER) <= nyquist;
+        let is_smooth = params.oversampling > 1 && defocus >= gone && transfer.extent(SMOOTH_TRANSFER) <= nyquist;
         let lattice = if is_smooth { Lattice::Camera } else { Lattice::Object };
-        let correction = |f: f64| -share * pillbox(TAU * f * radius) * taper(f / microscope.cutoff());
-        let response = if share > 0.0 { Response::new(transfer, correction) } else { Response::new(transfer, |_| 0.0) };
+        let correction =
+            |f: f64| -share * pillbox(TAU * f * radius) * fade((f / cutoff - TAPER_FROM) / (1.0 - TAPER_FROM));
+        let correction = |f: f64| if share > 0.0 { correction(f) } else { 0.0 };
+        let response = Response::new(transfer, correction);
         Self { lattice, is_corrected: share > 0.0, response, restores: false }
-    }
-
-    /// The same filter on the object's lattice.
-    pub(crate) fn on_object(self) -> Self {
-        Self { lattice: Lattice::Object, ..self }
     }
 
     /// The in-focus transfer function alone.
@@ -112,8 +105,8 @@ impl Filter {
         Self { lattice: Lattice::Object, is_corrected: false, response, restores: false }
     }
 
-    /// The same filter for what was seen in focus, through `in_focus` and the camera's pixels, already.
-    pub(crate) fn restoring(mut self, in_focus: &Self) -> Self {
+    /// Makes it the filter for what was seen in focus, through `in_focus` and the camera's pixels, already.
+    pub(crate) fn restore(&mut self, in_focus: &Self) {
         match (&mut self.response, &in_focus.response) {
             (Response::Round(tables), Response::Round(focused)) => tables[2] = focused[0],
             (Response::Sided(table), Response::Sided(focused)) => {
@@ -123,7 +116,7 @@ impl Filter {
             }
             _ => unreachable!("filters of one microscope have one shape"),
         }
-        Self { is_corrected: false, restores: true, ..self }
+        (self.is_corrected, self.restores) = (false, true);
     }
 
     /// Adds a block of a spectrum, times a response, to `sum`: kx up to `reach`, of both signs, the negative ones at
@@ -187,18 +180,16 @@ fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes
 #[inline(always)]
 fn accumulate(weights: &[f32; LANES], k: usize, spectrum: &[Lanes], sum: &mut [Lanes]) {
     let [last_from, last_to] = [spectrum.len() - k, sum.len() - k];
-    weigh(weights, &spectrum[k], &mut sum[k]);
-    if k > 0 {
-        weigh(weights, &spectrum[last_from], &mut sum[last_to]);
-    }
-}
-
-#[inline(always)]
-fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
-    for (to, from) in to.iter_mut().zip(from) {
-        for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
-            *to += from * weight;
+    let mut weigh = |from: usize, to: usize| {
+        for (to, from) in sum[to].iter_mut().zip(&spectrum[from]) {
+            for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
+                *to += from * weight;
+            }
         }
+    };
+    weigh(k, k);
+    if k > 0 {
+        weigh(last_from, last_to);
     }
 }
 
@@ -239,35 +230,26 @@ fn sided(table: &[[Complex32; 3]], x: f32, y: f32) -> [Complex32; 3] {
 impl Response {
     #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
     fn new(transfer: &Transfer, correction: impl Fn(f64) -> f64) -> Self {
-        match transfer.shape() {
-            Shape::Round(list) => {
-                let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
-                let mut before = [0.0; 3];
-                for (i, &[absorption, phase]) in list.iter().enumerate() {
-                    let values = [absorption, phase, correction(transfer.step() * i as f64)];
-                    for ((table, before), value) in tables.iter_mut().zip(&mut before).zip(values) {
-                        let value = value as f32;
-                        table[i][0] = value;
-                        if let Some(last) = i.checked_sub(1) {
-                            table[last][1] = value - *before;
-                        }
-                        *before = value;
-                    }
-                }
-                for (table, before) in tables.iter_mut().zip(before) {
-                    table[list.len() - 1][1] = -before;
-                }
-                Self::Round(tables)
+        let list = transfer.table.iter().enumerate();
+        if transfer.is_round() {
+            let mut tables = Box::new([[[0.0; 2]; ENTRIES]; 3]);
+            for (i, &[absorption, phase]) in list {
+                let values = [absorption[0], phase[0], correction(transfer.step * i as f64)];
+                tables.iter_mut().zip(values).for_each(|(table, value)| table[i][0] = value as f32);
             }
-            Shape::Sided(list) => {
-                let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
-                let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
-                    let correction = correction(transfer.step() * (i % SIDED_SAMPLES) as f64);
-                    [complex(absorption), complex(phase), complex([correction, 0.0])]
-                };
-                Self::Sided(list.iter().enumerate().map(entry).collect())
+            for table in tables.iter_mut() {
+                for i in 0..transfer.table.len() {
+                    table[i][1] = table[i + 1][0] - table[i][0];
+                }
             }
+            return Self::Round(tables);
         }
+        let complex = |[re, im]: [f64; 2]| Complex32::new(re as f32, im as f32);
+        let entry = |(i, &[absorption, phase]): (usize, &[[f64; 2]; 2])| {
+            let correction = correction(transfer.step * (i % SIDED_SAMPLES) as f64);
+            [complex(absorption), complex(phase), complex([correction, 0.0])]
+        };
+        Self::Sided(list.map(entry).collect())
     }
 }
 
@@ -279,13 +261,8 @@ pub(crate) fn incoherence(ratio: f64) -> f64 {
     cube * cube * r
 }
 
-/// Ends the spectrum of the correction without a step, which would ring around sharp things.
-fn taper(part_of_cutoff: f64) -> f64 {
-    fade((part_of_cutoff - TAPER_FROM) / (1.0 - TAPER_FROM))
-}
-
 /// From 1 where t is 0 to 0 where it is 1.
-fn fade(t: f64) -> f64 {
+pub(crate) fn fade(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
 }

@@ -35,15 +35,9 @@ impl Source<'_> {
     }
 }
 
-/// Blurs `source` into `dst`, which is larger by `margin` on each side, with the taps
-/// `half[0]` at the centre and `half[k]` at ±k.
-pub(crate) fn blur(source: Source<'_>, half: &[f32], margin: usize, dst: &mut [f32], scratch: &mut Scratch) {
-    blur_rows(source, half, margin, -margin.cast_signed(), dst, scratch);
-}
-
-/// As many rows of that as `dst` holds, from the one at row `first` of `source` on, which lies before it where
-/// negative.
-pub(crate) fn blur_rows(
+/// Blurs `source`, larger by `margin` on each side, with the taps `half[0]` at the centre and `half[k]` at ±k: as many rows
+/// of that as `dst` holds, from the one at row `first` of `source` on, which lies before it where negative.
+pub(crate) fn blur(
     source: Source<'_>,
     half: &[f32],
     margin: usize,

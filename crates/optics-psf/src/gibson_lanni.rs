@@ -1,6 +1,7 @@
-use crate::error::{Error, require};
+use crate::error::{Error, require, within};
+use crate::lens::Rules;
+use crate::microscope::distance;
 use crate::pupil::turn;
-use crate::quadrature::Rules;
 
 /// A lens as it was designed, and what it looks through.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,10 +48,6 @@ impl Default for GibsonLanniParams {
 /// OPD = z_p g(n_s) + t g(n_i) − t_i⁰ g(n_i⁰) + t_g g(n_g) − t_g⁰ g(n_g⁰), g(n) = √(n² − NA² ρ²), and the
 /// immersion t = z_p − z + n_i (−z_p/n_s − t_g/n_g + t_g⁰/n_g⁰ + t_i⁰/n_i⁰) as thick as focusing by
 /// z leaves it.
-///
-/// # Differences from the paper
-///
-/// The paper has a normal point spread function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GibsonLanni {
     params: GibsonLanniParams,
@@ -67,9 +64,6 @@ impl GibsonLanni {
     /// If a number is not finite or outside the range its field states.
     pub fn new(params: &GibsonLanniParams) -> Result<Self, Error> {
         let p = params;
-        let within = |field, value: f64, low: f64, high: f64, accepted| {
-            require(field, value, (low..=high).contains(&value), accepted)
-        };
         for (field, value) in [
             ("mount_index", p.mount_index),
             ("immersion_index[0]", p.immersion_index[0]),
@@ -77,17 +71,19 @@ impl GibsonLanni {
             ("cover_index[0]", p.cover_index[0]),
             ("cover_index[1]", p.cover_index[1]),
         ] {
-            within(field, value, 1.0, 3.0, "a number from 1 to 3")?;
+            within(field, value, 1.0..=3.0, "a number from 1 to 3")?;
         }
         let smallest = p.immersion_index.into_iter().chain(p.cover_index).fold(f64::INFINITY, f64::min);
         let holds = p.na > 0.0 && p.na <= smallest && p.na < p.mount_index;
         require("na", p.na, holds, "above 0, at most every index and below mount_index")?;
-        within("wavelength_um", p.wavelength_um, 0.1, 10.0, "a number from 0.1 to 10")?;
-        within("depth_um", p.depth_um, 0.0, 1000.0, "a number from 0 to 1000")?;
-        let thick = "a number from 0 to 10000";
-        within("working_distance_um", p.working_distance_um, 0.0, 10_000.0, thick)?;
-        within("cover_um[0]", p.cover_um[0], 0.0, 10_000.0, thick)?;
-        within("cover_um[1]", p.cover_um[1], 0.0, 10_000.0, thick)?;
+        within("wavelength_um", p.wavelength_um, 0.1..=10.0, "a number from 0.1 to 10")?;
+        within("depth_um", p.depth_um, 0.0..=1000.0, "a number from 0 to 1000")?;
+        let [cover, designed] = p.cover_um;
+        for (field, value) in
+            [("working_distance_um", p.working_distance_um), ("cover_um[0]", cover), ("cover_um[1]", designed)]
+        {
+            within(field, value, 0.0..=10_000.0, "a number from 0 to 10000")?;
+        }
         Ok(Self { params: params.clone() })
     }
 
@@ -98,17 +94,13 @@ impl GibsonLanni {
     ///
     /// If a distance is not finite or beyond ±1000 µm.
     pub fn profile(&self, r_um: &[f64], z_um: &[f64]) -> Result<Vec<f64>, Error> {
-        let accepted = "a number from -1000 to 1000";
         for (field, list) in [("r_um", r_um), ("z_um", z_um)] {
-            for &value in list {
-                require(field, value, value.abs() <= 1000.0, accepted)?;
-            }
+            list.iter().try_for_each(|&value| distance(field, value).map(drop))?;
         }
         let p = &self.params;
         let fringes = |&z: &f64| {
-            (1..=32)
-                .map(|i| (self.waves(f64::from(i) / 32.0, z) - self.waves(f64::from(i - 1) / 32.0, z)).abs())
-                .sum::<f64>()
+            let at = |i: i32| self.waves(f64::from(i) / 32.0, z);
+            (1..=32).map(|i| (at(i) - at(i - 1)).abs()).sum::<f64>()
         };
         let rings = r_um.iter().fold(0.0_f64, |most, r| most.max(r.abs())) * p.na / p.wavelength_um;
         let most = z_um.iter().map(fringes).fold(0.0, f64::max) + rings;
@@ -117,10 +109,8 @@ impl GibsonLanni {
         let mut rules = Rules::default();
         let rule = rules.get(nodes);
         // Of each node and z, the wave on the pupil; of each node and r, the Bessel function.
-        let waves: Vec<Vec<(f64, f64)>> = z_um
-            .iter()
-            .map(|&z| rule.iter().map(|&[rho, _]| turn(self.waves(rho, z) - self.waves(0.0, z))).collect())
-            .collect();
+        let wave = |&z: &f64| rule.iter().map(|&[rho, _]| turn(self.waves(rho, z) - self.waves(0.0, z))).collect();
+        let waves: Vec<Vec<(f64, f64)>> = z_um.iter().map(wave).collect();
         let k_na = core::f64::consts::TAU * p.na / p.wavelength_um;
         let mut intensity = vec![0.0; r_um.len() * z_um.len()];
         for (i, &r) in r_um.iter().enumerate() {

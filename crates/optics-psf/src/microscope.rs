@@ -1,8 +1,7 @@
-use crate::error::{Error, require};
+use crate::error::{Error, require, within};
+use crate::lens::Rules;
 use crate::pupil::Pupil;
-use crate::quadrature::Rules;
 use crate::transfer::Transfer;
-use crate::zernike::Zernike;
 
 /// What a microscopist knows about a bright-field microscope.
 ///
@@ -61,9 +60,6 @@ impl Default for MicroscopeParams {
     }
 }
 
-/// Samples along a pixel's side, at most.
-const MOST_OVERSAMPLING: usize = 16;
-
 /// A bright-field microscope whose parameters are in order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Microscope {
@@ -78,9 +74,6 @@ impl Microscope {
     /// If a number is not finite or outside the range its field states.
     pub fn new(params: &MicroscopeParams) -> Result<Self, Error> {
         let p = params;
-        let within = |field, value: f64, range: core::ops::RangeInclusive<f64>, accepted| {
-            require(field, value, range.contains(&value), accepted)
-        };
         within("mount_index", p.mount_index, 1.0..=3.0, "a number from 1 to 3")?;
         within("immersion_index", p.immersion_index, 1.0..=3.0, "a number from 1 to 3")?;
         let below = p.na > 0.0 && p.na <= p.immersion_index && p.na < p.mount_index;
@@ -91,14 +84,19 @@ impl Microscope {
         let half = 0.5 * p.wavelength_um;
         within("bandwidth_um", p.bandwidth_um, 0.0..=half, "a number from 0 to half of wavelength_um")?;
         within("cover_error_um", p.cover_error_um, -100.0..=100.0, "a number from -100 to 100")?;
-        for (field, value) in p.zernike.terms() {
+        let Zernike { defocus, astigmatism, coma, spherical } = p.zernike;
+        for (field, value) in [
+            ("zernike.defocus", defocus),
+            ("zernike.astigmatism[0]", astigmatism[0]),
+            ("zernike.astigmatism[1]", astigmatism[1]),
+            ("zernike.coma[0]", coma[0]),
+            ("zernike.coma[1]", coma[1]),
+            ("zernike.spherical", spherical),
+        ] {
             within(field, value, -5.0..=5.0, "a number from -5 to 5")?;
         }
         within("pixel_um", p.pixel_um, 0.001..=100.0, "a number from 0.001 to 100")?;
-        if !(1..=MOST_OVERSAMPLING).contains(&p.oversampling) {
-            let accepted = "a whole number from 1 to 16";
-            return Err(Error::Count { field: "oversampling", value: p.oversampling, accepted });
-        }
+        within("oversampling", p.oversampling as f64, 1.0..=16.0, "a whole number from 1 to 16")?;
         let glare = (0.0..1.0).contains(&p.stray_light);
         require("stray_light", p.stray_light, glare, "0 or more and below 1")?;
         Ok(Self { params: params.clone() })
@@ -114,14 +112,6 @@ impl Microscope {
     #[must_use]
     pub fn pitch_um(&self) -> f64 {
         self.params.pixel_um / self.params.oversampling as f64
-    }
-
-    /// The share of the condenser's light that passes outside the objective's aperture and is
-    /// lost: 1 − (NA/NAc)², or 0.
-    #[must_use]
-    pub fn lost_light(&self) -> f64 {
-        let ratio = (self.params.na / self.params.condenser_na).min(1.0);
-        1.0 - ratio * ratio
     }
 
     /// The finest detail that reaches the image to first order, cycles per µm: (NA + NAc)/λ at the
@@ -195,9 +185,47 @@ impl Microscope {
 /// objective's rim. Transfer functions are then within 0.002 up to 10 µm from focus.
 const BAND_NODES: [f64; 2] = [0.7, 4.0];
 
-/// Farthest from the focal plane, µm: beyond it nothing of an object is left.
-const FARTHEST_UM: f64 = 1000.0;
-
+/// A distance from the focal plane, µm: farther away nothing of an object is left.
 pub(crate) fn distance(field: &'static str, value: f64) -> Result<f64, Error> {
-    require(field, value, value.abs() <= FARTHEST_UM, "a number from -1000 to 1000")
+    within(field, value, -1000.0..=1000.0, "a number from -1000 to 1000")
+}
+
+/// Aberrations of the objective: Zernike terms over its pupil, each in waves rms, −5 to 5. All are
+/// 0 by default (ours).
+///
+/// The polynomials are orthonormal over the unit disc (Noll's; DOI 10.1364/JOSA.66.000207), so the
+/// square root of the sum of the squares is the error of the whole wavefront, σ, and the Strehl
+/// ratio of a small one is exp(−(2πσ)²).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Zernike {
+    /// √3 (2ρ² − 1).
+    pub defocus: f64,
+    /// √6 ρ² cos 2θ and √6 ρ² sin 2θ.
+    pub astigmatism: [f64; 2],
+    /// √8 (3ρ³ − 2ρ) cos θ and √8 (3ρ³ − 2ρ) sin θ.
+    pub coma: [f64; 2],
+    /// √5 (6ρ⁴ − 6ρ² + 1).
+    pub spherical: f64,
+}
+
+impl Zernike {
+    /// Waves of the terms with a direction, at a point of the pupil, whose rim lies at distance 1.
+    pub(crate) fn sided_waves(&self, [x, y]: [f64; 2]) -> f64 {
+        let [a, b] = self.astigmatism;
+        let [c, d] = self.coma;
+        6_f64.sqrt() * (a * (x * x - y * y) + b * 2.0 * x * y)
+            + 8_f64.sqrt() * (3.0 * (x * x + y * y) - 2.0) * (c * x + d * y)
+    }
+
+    /// The terms without direction, where the square of the distance from the centre is `r2`.
+    #[inline(always)]
+    pub(crate) fn round_waves(&self, r2: f64) -> f64 {
+        self.defocus * 3_f64.sqrt() * (2.0 * r2 - 1.0)
+            + self.spherical * 5_f64.sqrt() * (6.0 * r2 * r2 - 6.0 * r2 + 1.0)
+    }
+
+    /// Whether every direction is like every other.
+    pub(crate) fn is_round(&self) -> bool {
+        self.astigmatism == [0.0; 2] && self.coma == [0.0; 2]
+    }
 }

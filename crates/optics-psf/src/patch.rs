@@ -1,17 +1,17 @@
-use core::fmt;
+use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::canvas::{Canvas, Memory, Samples, Spectra, absorbed_of, amplitude_of, is_lit};
+use crate::canvas::{Canvas, Samples, Spectra, absorbed_of, amplitude_of, is_lit};
 use crate::filter::{Filter, Lattice, incoherence};
 use crate::grid::fast_length;
-use crate::ladder::Ladder;
-use crate::lanes::LanePlans;
+use crate::lane_plane::{LanePlans, LaneScratch};
 use crate::microscope::distance;
-use crate::{Error, Microscope};
+use crate::{Error, Microscope, Transfer};
 
 /// Images what is on the slide patch by patch: each patch lies at one depth and gives a factor of the light around
 /// it.
+#[derive(Debug)]
 pub struct PatchImager {
     ladder: Ladder,
     plans: Arc<LanePlans>,
@@ -19,28 +19,13 @@ pub struct PatchImager {
     in_focus: Filter,
 }
 
-impl fmt::Debug for PatchImager {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PatchImager").field("microscope", self.microscope()).finish_non_exhaustive()
-    }
-}
-
 /// How a microscope images what is at one depth, for one travel of the stage.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Focus {
     filter: Arc<Filter>,
     margin_px: usize,
     defocus_um: f64,
     plans: Arc<LanePlans>,
-}
-
-impl fmt::Debug for Focus {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Focus")
-            .field("defocus_um", &self.defocus_um)
-            .field("margin_px", &self.margin_px)
-            .finish_non_exhaustive()
-    }
 }
 
 impl Focus {
@@ -64,7 +49,7 @@ impl Focus {
 }
 
 /// What is in a small rectangle of the slide at one depth, and its spectra for each margin that was needed.
-#[derive(Clone, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Patch {
     width: usize,
     transmittance: Vec<f32>,
@@ -75,30 +60,19 @@ pub struct Patch {
     fresh: usize,
 }
 
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Sheet {
     margin_px: usize,
     canvas: Arc<Canvas>,
     spectra: Spectra,
 }
 
-impl fmt::Debug for Patch {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Patch")
-            .field("width", &self.width)
-            .field("samples", &self.transmittance.len())
-            .finish_non_exhaustive()
-    }
-}
-
 /// Working memory of [`PatchImager`]: one for each thread.
 #[derive(Debug, Clone, Default)]
-pub struct PatchScratch {
-    memory: Memory,
-}
+pub struct PatchScratch(LaneScratch);
 
 /// What a patch lets through of the light, relative to empty slide.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Factor {
     /// Which lattice `values` lie on.
     pub lattice: Lattice,
@@ -110,12 +84,6 @@ pub struct Factor {
     pub margin_px: usize,
     /// At how many values less than [`LEAST_LIGHT`](crate::LEAST_LIGHT) would have been let through.
     pub floored: usize,
-}
-
-impl Default for Factor {
-    fn default() -> Self {
-        Self { lattice: Lattice::Camera, width: 0, values: Vec::new(), margin_px: 0, floored: 0 }
-    }
 }
 
 /// How far light is spread: in radii of the condenser's cone, beyond that in λ/NA, and in more of those as the condenser
@@ -140,7 +108,7 @@ impl PatchImager {
     /// The microscope.
     #[must_use]
     pub fn microscope(&self) -> &Microscope {
-        self.ladder.microscope()
+        &self.ladder.microscope
     }
 
     /// How what lies at that depth is imaged while the stage is there: see [`Microscope::transfer`].
@@ -153,8 +121,14 @@ impl PatchImager {
     ///
     /// If a number is not finite or beyond ±1000 µm.
     pub fn focus(&self, depth_um: f64, stage_um: f64) -> Result<Focus, Error> {
-        let (depth, stage) = (distance("depth_um", depth_um)?, distance("stage_um", stage_um)?);
-        Ok(self.focus_with(self.filter(depth, stage), depth, stage))
+        let margin_px = self.margin_px(depth_um, stage_um)?;
+        let transfer = self.ladder.transfer(depth_um, stage_um);
+        Ok(Focus {
+            filter: Arc::new(Filter::new(self.microscope(), depth_um, stage_um, &transfer)),
+            margin_px,
+            defocus_um: self.microscope().defocus_um(depth_um, stage_um),
+            plans: Arc::clone(&self.plans),
+        })
     }
 
     /// The same for something whose transmittance was taken from an image in which it was in focus, and that the lens
@@ -164,13 +138,9 @@ impl PatchImager {
     ///
     /// As [`PatchImager::focus`].
     pub fn refocus(&self, depth_um: f64, stage_um: f64) -> Result<Focus, Error> {
-        let (depth, stage) = (distance("depth_um", depth_um)?, distance("stage_um", stage_um)?);
-        let filter = self.filter(depth, stage).restoring(&self.in_focus);
-        Ok(self.focus_with(filter, depth, stage))
-    }
-
-    fn filter(&self, depth: f64, stage: f64) -> Filter {
-        Filter::new(self.microscope(), depth, stage, &self.ladder.transfer(depth, stage))
+        let mut focus = self.focus(depth_um, stage_um)?;
+        Arc::make_mut(&mut focus.filter).restore(&self.in_focus);
+        Ok(focus)
     }
 
     /// The margin that a patch needs at a focus ([`Focus::margin_px`]), without anything being computed for it.
@@ -179,26 +149,16 @@ impl PatchImager {
     ///
     /// As [`PatchImager::focus`].
     pub fn margin_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Error> {
-        Ok(self.margin(distance("depth_um", depth_um)?, distance("stage_um", stage_um)?))
-    }
-
-    fn margin(&self, depth: f64, stage: f64) -> usize {
+        let (depth, stage) = (distance("depth_um", depth_um)?, distance("stage_um", stage_um)?);
         let params = self.microscope().params();
         let cone = self.microscope().spread_um(depth, stage);
         let fringes = FRINGES + OPEN_FRINGES * incoherence(params.condenser_na / params.na);
         let reach = CONES * cone + fringes * params.wavelength_um / params.na;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a distance in pixels")]
         let pixels = (reach / params.pixel_um).ceil() as usize;
-        margin_class(pixels)
-    }
-
-    fn focus_with(&self, filter: Filter, depth: f64, stage: f64) -> Focus {
-        Focus {
-            filter: Arc::new(filter),
-            margin_px: self.margin(depth, stage),
-            defocus_um: self.microscope().defocus_um(depth, stage),
-            plans: Arc::clone(&self.plans),
-        }
+        // The next 2ⁿ or 3 · 2ⁿ.
+        let twos = pixels.next_power_of_two();
+        Ok(if 4 * pixels <= 3 * twos { 3 * twos / 4 } else { twos })
     }
 
     /// Puts into `patch` what is in a rectangle of the slide: transmittances, 0 to 1, and phases, by how many radians
@@ -231,11 +191,10 @@ impl PatchImager {
     pub fn expose(&self, patch: &mut Patch, focus: &Focus, scratch: &mut PatchScratch, factor: &mut Factor) {
         let own = |plans: &Arc<LanePlans>| Arc::ptr_eq(plans, &self.plans);
         assert!(patch.plans.as_ref().is_some_and(own) && own(&focus.plans), "a patch or a focus of another imager");
-        let memory = &mut scratch.memory;
-        let filter = &*focus.filter;
+        let (filter, scratch) = (&*focus.filter, &mut scratch.0);
         let oversampling = self.microscope().params().oversampling;
         let [width, height] = [patch.width, patch.transmittance.len() / patch.width];
-        let Sheet { canvas, spectra, .. } = self.sheet(patch, focus, memory);
+        let Sheet { canvas, spectra, .. } = self.sheet(patch, focus, scratch);
         let (scale, stride) = match filter.lattice {
             Lattice::Object => (oversampling, 1),
             Lattice::Camera => (1, oversampling),
@@ -252,16 +211,16 @@ impl PatchImager {
         if spectra.absorbed.is_empty() {
             factor.values.fill(1.0);
         } else {
-            factor.floored = canvas.transmit_into(filter, spectra, memory, &mut factor.values, factor.width);
+            factor.floored = canvas.transmit::<true>(filter, spectra, &mut factor.values, factor.width, scratch);
         }
         if !spectra.phase.is_empty() {
             let part = core::iter::once((filter, &*spectra));
-            canvas.refract(filter.lattice, part, memory, &mut factor.values, factor.width);
+            canvas.refract(filter.lattice, part, &mut factor.values, factor.width, scratch);
         }
     }
 
     /// The patch's spectra with the margin of a focus, and all that this needs.
-    fn sheet<'a>(&self, patch: &'a mut Patch, focus: &Focus, memory: &mut Memory) -> &'a mut Sheet {
+    fn sheet<'a>(&self, patch: &'a mut Patch, focus: &Focus, scratch: &mut LaneScratch) -> &'a mut Sheet {
         let Patch { width, transmittance, phase_rad, sheets, fresh, .. } = patch;
         let width = *width;
         let height = transmittance.len() / width;
@@ -279,18 +238,18 @@ impl PatchImager {
             sheet.canvas = canvas;
             sheet.spectra.clear();
             *fresh += 1;
-            sheet.canvas.transform(absorbing, absorbed_of, &mut sheet.spectra.absorbed, memory);
+            sheet.canvas.transform(absorbing, absorbed_of, &mut sheet.spectra.absorbed, scratch);
             if !phase_rad.is_empty() {
-                sheet.canvas.transform(late, is_lit, &mut sheet.spectra.phase, memory);
+                sheet.canvas.transform(late, is_lit, &mut sheet.spectra.phase, scratch);
             }
             *fresh - 1
         });
         let sheet = &mut sheets[index];
         if focus.filter.is_corrected {
             if sheet.spectra.amplitude.is_empty() {
-                sheet.canvas.transform(absorbing, amplitude_of, &mut sheet.spectra.amplitude, memory);
+                sheet.canvas.transform(absorbing, amplitude_of(absorbed_of), &mut sheet.spectra.amplitude, scratch);
             }
-            sheet.canvas.correct(&self.in_focus, &mut sheet.spectra, memory);
+            sheet.canvas.correct(&self.in_focus, &mut sheet.spectra, scratch);
         }
         sheet
     }
@@ -306,8 +265,118 @@ impl PatchImager {
     }
 }
 
-/// Margins: the next 2ⁿ or 3 · 2ⁿ.
-fn margin_class(pixels: usize) -> usize {
-    let twos = pixels.next_power_of_two();
-    if 4 * pixels <= 3 * twos { 3 * twos / 4 } else { twos }
+/// Transfer functions of any depth, between those of a ladder of depths, which are computed when first asked for.
+///
+/// As a function of depth, a transfer function has no frequency above (n − √(n² − NA²))/λ: between rungs that are
+/// close to that, a polynomial errs by less than 0.001.
+#[derive(Debug)]
+struct Ladder {
+    microscope: Microscope,
+    step_um: f64,
+    /// By travel of the stage and rung.
+    made: Mutex<BTreeMap<(u64, i64), Arc<Transfer>>>,
+}
+
+/// Rungs for each of those periods, about.
+const RUNGS: f64 = 6.7;
+
+/// Rungs on each side of a depth.
+const SIDE: i64 = 3;
+
+/// How many entries of tables are kept.
+const MOST_ENTRIES: usize = 1 << 20;
+
+impl Ladder {
+    fn new(microscope: &Microscope) -> Self {
+        let params = microscope.params();
+        let n = params.mount_index;
+        let fastest = (n - (n * n - params.na * params.na).sqrt()) / (params.wavelength_um - 0.5 * params.bandwidth_um);
+        Self { microscope: microscope.clone(), step_um: 1.0 / (RUNGS * fastest), made: Mutex::default() }
+    }
+
+    /// The transfer function at a depth and travel of the stage, of whatever was asked for before.
+    fn transfer(&self, depth_um: f64, stage_um: f64) -> Transfer {
+        // Rungs are counted away from the objective.
+        let position = -depth_um / self.step_um;
+        let below = position.floor();
+        let t = position - below;
+        #[expect(clippy::cast_possible_truncation, reason = "depths are at most 1000 µm")]
+        let below = below as i64;
+        if t == 0.0 {
+            return (*self.rungs(below..=below, stage_um)[0]).clone();
+        }
+        // Lagrange's polynomials.
+        let weight = |k: i64| {
+            let others = (1 - SIDE..=SIDE).filter(|&j| j != k);
+            others.map(|j| (t - j as f64) / (k - j) as f64).product::<f64>()
+        };
+        let rungs = self.rungs(below + 1 - SIDE..=below + SIDE, stage_um);
+        Transfer::mixed(&rungs.into_iter().zip((1 - SIDE..=SIDE).map(weight)).collect::<Vec<_>>())
+    }
+
+    fn rungs(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
+        // A transfer function is whole or absent, even if a thread has panicked.
+        let lock = || self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = |number| (stage_um.to_bits(), number);
+        let known: Vec<Option<Arc<Transfer>>> = {
+            let made = lock();
+            numbers.clone().map(|number| made.get(&key(number)).cloned()).collect()
+        };
+        let make = |(number, known): (i64, Option<Arc<Transfer>>)| {
+            known.unwrap_or_else(|| {
+                let transfer = Arc::new(Transfer::new(&self.microscope, -(number as f64) * self.step_um, stage_um));
+                let mut made = lock();
+                if made.len() * transfer.table.len() >= MOST_ENTRIES {
+                    made.clear();
+                }
+                Arc::clone(made.entry(key(number)).or_insert(transfer))
+            })
+        };
+        numbers.zip(known).map(make).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{MicroscopeParams, Zernike};
+
+    #[test]
+    fn depths_between_rungs_are_near_the_integral() {
+        let coma = Zernike { coma: [0.05, 0.02], ..Zernike::default() };
+        let broad = MicroscopeParams { wavelength_um: 0.45, bandwidth_um: 0.08, ..MicroscopeParams::default() };
+        let cases = [
+            MicroscopeParams::default(),
+            MicroscopeParams { condenser_na: 0.2, ..MicroscopeParams::default() },
+            MicroscopeParams { condenser_na: 0.9, ..MicroscopeParams::default() },
+            MicroscopeParams { zernike: coma, bandwidth_um: 0.0, ..MicroscopeParams::default() },
+            broad,
+        ];
+        for params in cases {
+            let microscope = Microscope::new(&params).unwrap();
+            let ladder = Ladder::new(&microscope);
+            let depths: &[f64] = if params.zernike == coma { &[0.3] } else { &[0.0, 0.3, -1.1, 2.6, 5.2, -9.3] };
+            for &depth in depths {
+                for stage in [0.0, 2.0] {
+                    let (found, exact) = (ladder.transfer(depth, stage), Transfer::new(&microscope, depth, stage));
+                    for i in 0..150 {
+                        let f = [0.02 * f64::from(i), 0.005 * f64::from(i)];
+                        for (a, b) in [(found.absorption(f), exact.absorption(f)), (found.phase(f), exact.phase(f))] {
+                            let error = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+                            assert!(error < 1e-3, "{depth} {stage} {f:?}: {error}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_asked_before_makes_no_difference() {
+        let fresh = || Ladder::new(&Microscope::new(&MicroscopeParams::default()).unwrap());
+        let ladder = fresh();
+        for (depth, stage) in [(1.2, 0.5), (1.4, 0.0), (1.3, 0.5)] {
+            assert_eq!(ladder.transfer(depth, stage), fresh().transfer(depth, stage));
+        }
+    }
 }

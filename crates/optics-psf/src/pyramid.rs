@@ -76,7 +76,7 @@ impl Pyramid {
         let (least, mut small) = (self.halvings, core::mem::take(&mut levels[0]));
         small.resize(levels[least].len(), 0.0);
         let coarse = alone(&levels[least], width >> least);
-        fir::blur(coarse, self.kernel.half(), 0, &mut small, scratch);
+        fir::blur(coarse, &self.kernel.half, 0, 0, &mut small, scratch);
         levels[0] = small;
         levels.swap(0, least);
 

@@ -1,7 +1,10 @@
+use core::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
+use multiversion::multiversion;
+
 use crate::Microscope;
-use crate::curve::Curve;
+use crate::filter::fade;
 use crate::lens::Lens;
 use crate::pupil::Pupil;
 
@@ -25,42 +28,18 @@ const DIRECTIONS: usize = 64;
 /// with coma they are complex; they are averaged over the band of wavelengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transfer {
-    step: f64,
-    shape: Shape,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Shape {
-    /// (H_A, H_P) at multiples of the step.
-    Round(Vec<[f64; 2]>),
-    /// The same, complex, one row of frequencies for each direction around the circle.
-    Sided(Vec<[[f64; 2]; 2]>),
-}
-
-impl Shape {
-    fn numbers(&self) -> &[f64] {
-        match self {
-            Self::Round(table) => table.as_flattened(),
-            Self::Sided(table) => table.as_flattened().as_flattened(),
-        }
-    }
-
-    fn numbers_mut(&mut self) -> &mut [f64] {
-        match self {
-            Self::Round(table) => table.as_flattened_mut(),
-            Self::Sided(table) => table.as_flattened_mut().as_flattened_mut(),
-        }
-    }
+    /// Distance between the entries of the table, cycles/µm.
+    pub(crate) step: f64,
+    /// (H_A, H_P), complex, at multiples of the step: one row of frequencies, or one for each direction around the circle.
+    pub(crate) table: Vec<[[f64; 2]; 2]>,
 }
 
 impl Transfer {
     pub(crate) fn new(microscope: &Microscope, depth_um: f64, stage_um: f64) -> Self {
         let step = Self::step_of(microscope);
-        let pupils: Vec<(Pupil, f64)> = microscope
-            .bands()
-            .into_iter()
-            .map(|(wavelength, weight)| (Pupil::new(microscope.params(), wavelength, depth_um, stage_um), weight))
-            .collect();
+        let pupil = |wavelength| Pupil::new(microscope.params(), wavelength, depth_um, stage_um);
+        let bands = microscope.bands().into_iter();
+        let pupils: Vec<(Pupil, f64)> = bands.map(|(wavelength, weight)| (pupil(wavelength), weight)).collect();
         let mut lens = Lens::default();
         let is_far = microscope.defocus_um(depth_um, stage_um).abs() > FAR_UM;
         let mut row = |direction: [f64; 2], samples: usize| {
@@ -73,7 +52,8 @@ impl Transfer {
             mean
         };
         if microscope.params().zernike.is_round() {
-            return Self { step, shape: Shape::Round(row([1.0, 0.0], SAMPLES)) };
+            let row = row([1.0, 0.0], SAMPLES).into_iter();
+            return Self { step, table: row.map(|[a, p]| [[a, 0.0], [p, 0.0]]).collect() };
         }
         let rows: Vec<Vec<[f64; 2]>> = (0..DIRECTIONS).map(|k| row(direction(k), SIDED_SAMPLES)).collect();
         // H_A = (E(f) + E*(−f))/2, H_P = (E(f) − E*(−f))/2i
@@ -82,24 +62,24 @@ impl Transfer {
             [[0.5 * (a + c), 0.5 * (b - d)], [0.5 * (b + d), 0.5 * (c - a)]]
         };
         let table = (0..DIRECTIONS).flat_map(|k| (0..SIDED_SAMPLES).map(move |i| (k, i))).map(|(k, i)| pair(k, i));
-        Self { step, shape: Shape::Sided(table.collect()) }
+        Self { step, table: table.collect() }
     }
 
     /// The sum of several of one microscope, each times its weight.
     pub(crate) fn mixed(parts: &[(Arc<Self>, f64)]) -> Self {
-        let mut shape = parts[0].0.shape.clone();
-        shape.numbers_mut().fill(0.0);
+        let mut table = vec![[[0.0; 2]; 2]; parts[0].0.table.len()];
         for (part, weight) in parts {
-            for (sum, value) in shape.numbers_mut().iter_mut().zip(part.shape.numbers()) {
+            let sums = table.as_flattened_mut().as_flattened_mut().iter_mut();
+            for (sum, value) in sums.zip(part.table.as_flattened().as_flattened()) {
                 *sum += weight * value;
             }
         }
-        Self { step: parts[0].0.step, shape }
+        Self { step: parts[0].0.step, table }
     }
 
-    /// How many numbers it holds.
-    pub(crate) fn numbers(&self) -> usize {
-        self.shape.numbers().len()
+    /// Whether one row says all.
+    pub(crate) fn is_round(&self) -> bool {
+        self.table.len() == SAMPLES
     }
 
     /// The distance of a microscope's tables between their entries, cycles/µm.
@@ -123,52 +103,37 @@ impl Transfer {
     }
 
     /// H_A and H_P.
-    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
-        match &self.shape {
-            Shape::Round(table) => {
-                let position = (x * x + y * y).sqrt() / self.step;
-                let last = table.len() - 1;
-                if position >= last as f64 {
-                    return [[0.0; 2]; 2];
-                }
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
-                let i = position as usize;
-                let t = position - i as f64;
-                let mix = |k: usize| [table[i][k] + t * (table[i + 1][k] - table[i][k]), 0.0];
-                [mix(0), mix(1)]
+    fn at(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
+        let table = &self.table;
+        if self.is_round() {
+            let position = (x * x + y * y).sqrt() / self.step;
+            if position >= (SAMPLES - 1) as f64 {
+                return [[0.0; 2]; 2];
             }
-            Shape::Sided(table) => {
-                let mut mixed = [[0.0; 2]; 2];
-                for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
-                    for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
-                        *sum += weight * value;
-                    }
-                }
-                mixed
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the last entry")]
+            let i = position as usize;
+            let t = position - i as f64;
+            return [0, 1].map(|k| [table[i][k][0] + t * (table[i + 1][k][0] - table[i][k][0]), 0.0]);
+        }
+        let mut mixed = [[0.0; 2]; 2];
+        for (place, weight) in corners([x / self.step, y / self.step]).into_iter().flatten() {
+            for (sum, value) in mixed.as_flattened_mut().iter_mut().zip(table[place].as_flattened()) {
+                *sum += weight * value;
             }
         }
+        mixed
     }
 
     /// The frequency beyond which neither H_A nor H_P exceeds `size`, cycles/µm.
     pub(crate) fn extent(&self, size: f64) -> f64 {
         let large = |pair: &[f64; 2]| pair[0] * pair[0] + pair[1] * pair[1] > size * size;
-        let last = match &self.shape {
-            Shape::Round(table) => table.iter().rposition(large),
-            Shape::Sided(table) => {
-                let rows = table.chunks_exact(SIDED_SAMPLES);
-                rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
-            }
+        let last = if self.is_round() {
+            self.table.iter().rposition(|[a, p]| large(&[a[0], p[0]]))
+        } else {
+            let rows = self.table.chunks_exact(SIDED_SAMPLES);
+            rows.filter_map(|row| row.iter().rposition(|pairs| pairs.iter().any(large))).max()
         };
         last.map_or(0.0, |i| self.step * (i + 1) as f64)
-    }
-
-    /// Distance between the entries of the table, cycles/µm.
-    pub(crate) fn step(&self) -> f64 {
-        self.step
-    }
-
-    pub(crate) fn shape(&self) -> &Shape {
-        &self.shape
     }
 }
 
@@ -186,7 +151,7 @@ const FADES_FROM: f64 = 0.8;
 
 /// The frequency from which on nothing is transferred for being faint, cycles/µm.
 fn faint(pupil: &Pupil, is_far: bool) -> f64 {
-    if is_far { FAINT / (core::f64::consts::TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
+    if is_far { FAINT / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
 }
 
 /// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `faint`.
@@ -205,9 +170,8 @@ fn profile(
     let bend = pupil.objective - pupil.condenser;
     let steepest = pupil.steepest(pupil.objective);
     let cutoff = pupil.cutoff();
-    let fade = |f: f64| {
-        let t = ((f / faint - FADES_FROM) / (1.0 - FADES_FROM)).clamp(0.0, 1.0);
-        if faint < cutoff { weight * (1.0 - t * t * (3.0 - 2.0 * t)) } else { weight }
+    let faded = |f: f64| {
+        if faint < cutoff { weight * fade((f / faint - FADES_FROM) / (1.0 - FADES_FROM)) } else { weight }
     };
     let (mut next, mut values) = (0, Vec::new());
     for [from, to] in [[0.0, bend.min(faint)], [bend, cutoff.min(faint)]] {
@@ -219,23 +183,69 @@ fn profile(
             ((to / step) as usize + 1).min(sum.len()),
             NODES.0 + (NODES.1 * steepest * (to - from)).min(sum.len() as f64) as usize,
         );
-        let entries = sum.iter_mut().enumerate().take(end).skip(next);
+        values.clear();
+        let mut integral = |f| lens.integral(pupil, f, direction);
         if end <= next + nodes {
-            for (i, sum) in entries {
-                let f = step * i as f64;
-                let ([re, im], weight) = (lens.integral(pupil, f, direction), fade(f));
-                *sum = [sum[0] + weight * re, sum[1] + weight * im];
-            }
+            values.extend((next..end).map(|i| integral(step * i as f64)));
         } else {
-            let curve = Curve::new([from, to], nodes, |f| lens.integral(pupil, f, direction));
             values.resize(end - next, [0.0; 2]);
-            curve.values_into(step, next, &mut values);
-            for ((i, sum), &[re, im]) in entries.zip(&values) {
-                let weight = fade(step * i as f64);
-                *sum = [sum[0] + weight * re, sum[1] + weight * im];
-            }
+            interpolate(&chebyshev([from, to], nodes, integral), step, next, &mut values);
+        }
+        for ((i, sum), &[re, im]) in sum.iter_mut().enumerate().skip(next).zip(&values) {
+            let weight = faded(step * i as f64);
+            *sum = [sum[0] + weight * re, sum[1] + weight * im];
         }
         next = end.max(next);
+    }
+}
+
+/// A pair of smooth functions on an interval at Chebyshev's points, the ends among them: place, weight of the barycentric
+/// formula, values.
+fn chebyshev([from, to]: [f64; 2], nodes: usize, mut function: impl FnMut(f64) -> [f64; 2]) -> Vec<[f64; 4]> {
+    let last = nodes - 1;
+    let node = |i: usize| {
+        let x = from + (to - from) * 0.5 * (1.0 - libm::cos(PI * i as f64 / last as f64));
+        let end = if i == 0 || i == last { 0.5 } else { 1.0 };
+        let [a, b] = function(x);
+        [x, if i.is_multiple_of(2) { end } else { -end }, a, b]
+    };
+    (0..=last).map(node).collect()
+}
+
+/// Places that are looked up side by side.
+const LANES: usize = 8;
+
+/// The polynomials through such points at `step` times `first`, `first` + 1, …: Berrut and Trefethen, DOI
+/// 10.1137/S0036144502417715, Eq. 4.2.
+#[multiversion(targets = "simd")]
+fn interpolate(nodes: &[[f64; 4]], step: f64, first: usize, out: &mut [[f64; 2]]) {
+    for (block, out) in out.chunks_mut(LANES).enumerate() {
+        let mut x = [0.0; LANES];
+        for (lane, x) in x.iter_mut().enumerate() {
+            *x = step * (first + LANES * block + lane) as f64;
+        }
+        let mut sums = [[0.0; LANES]; 3];
+        // The formula has no value at a node.
+        let mut met = [[0.0; LANES]; 3];
+        for &[node, weight, a, b] in nodes {
+            for l in 0..LANES {
+                let away = x[l] - node;
+                let (is_node, share) = (away == 0.0, weight / away);
+                sums[0][l] += share;
+                sums[1][l] += share * a;
+                sums[2][l] += share * b;
+                met[0][l] = if is_node { 1.0 } else { met[0][l] };
+                met[1][l] = if is_node { a } else { met[1][l] };
+                met[2][l] = if is_node { b } else { met[2][l] };
+            }
+        }
+        for (l, out) in out.iter_mut().enumerate() {
+            *out = if met[0][l] > 0.0 {
+                [met[1][l], met[2][l]]
+            } else {
+                [sums[1][l] / sums[0][l], sums[2][l] / sums[0][l]]
+            };
+        }
     }
 }
 
@@ -287,6 +297,7 @@ mod tests {
     #[test]
     fn profiles_are_the_integrals() {
         let mut lens = Lens::default();
+        // NA of the condenser, depth, stage, cover glass.
         let cases = [
             (0.95, 0.0, 0.0, 0.0),
             (0.9, 10.0, 0.0, 0.0),
@@ -309,7 +320,7 @@ mod tests {
                 for (i, [a, b]) in list.into_iter().enumerate() {
                     let [c, d] = lens.integral(&pupil, step * i as f64, [0.6, 0.8]);
                     let error = (a - c).abs().max((b - d).abs());
-                    let q = core::f64::consts::TAU * step * i as f64 * pupil.cone_radius();
+                    let q = TAU * step * i as f64 * pupil.cone_radius();
                     if q < FADES_FROM * FAINT {
                         worst = worst.max(error);
                     } else {

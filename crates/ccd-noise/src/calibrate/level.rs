@@ -16,16 +16,6 @@ pub enum Light {
     Photons(f64),
 }
 
-impl Light {
-    pub(super) fn photons(self) -> Option<f64> {
-        if let Self::Photons(amount) = self { Some(amount) } else { None }
-    }
-
-    pub(super) fn relative(self) -> Option<f64> {
-        if let Self::Relative(amount) = self { Some(amount) } else { None }
-    }
-}
-
 /// A point of the photon transfer curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
@@ -45,59 +35,57 @@ pub struct Level {
     pub at_zero: f64,
 }
 
-/// Frames of one size, two or more.
-pub(super) struct Frames<'a> {
-    pub(super) frames: &'a [&'a [u16]],
-    pub(super) width: usize,
-    pub(super) highest: u16,
-}
-
-impl Frames<'_> {
-    pub(super) fn measure(&self, light: Light, shading: Shading) -> Result<Level, Error> {
-        let (count, pixels) = (self.frames.len() as f64, self.frames[0].len() as f64);
-        let (mut at_highest, mut at_zero) = (0, 0);
-        let mut means = Vec::with_capacity(self.frames.len());
-        for frame in self.frames {
-            let (mut sum, mut largest) = (0, 0);
-            for &dn in *frame {
-                sum += u64::from(dn);
-                largest = largest.max(dn);
-                at_highest += usize::from(dn == self.highest);
-                at_zero += usize::from(dn == 0);
-            }
-            require("frames", largest.into(), largest <= self.highest, "from 0 to 2^bit_depth - 1")?;
-            means.push(sum as f64 / pixels);
+/// What two or more frames of one size say, whose highest possible level is `highest`.
+pub(super) fn measure(
+    frames: &[&[u16]],
+    width: usize,
+    highest: u16,
+    light: Light,
+    shading: Shading,
+) -> Result<Level, Error> {
+    let (count, pixels) = (frames.len() as f64, frames[0].len() as f64);
+    let (mut at_highest, mut at_zero) = (0, 0);
+    let mut means = Vec::with_capacity(frames.len());
+    for frame in frames {
+        let (mut sum, mut largest) = (0, 0);
+        for &dn in *frame {
+            sum += u64::from(dn);
+            largest = largest.max(dn);
+            at_highest += usize::from(dn == highest);
+            at_zero += usize::from(dn == 0);
         }
-        // Frame by frame around its own mean, so that a lamp that flickers adds no noise.
-        let mut mean_image = vec![0.0; self.frames[0].len()];
-        let mut squares = vec![0.0; self.frames[0].len()];
-        for (frame, mean) in self.frames.iter().zip(&means) {
-            for ((sum, square), &dn) in mean_image.iter_mut().zip(&mut squares).zip(*frame) {
-                let deviation = f64::from(dn) - mean;
-                *sum += deviation;
-                *square += deviation * deviation;
-            }
-        }
-        let mut variance = 0.0;
-        for (sum, square) in mean_image.iter_mut().zip(&squares) {
-            variance += square - *sum * *sum / count;
-            *sum /= count;
-        }
-        variance /= pixels * (count - 1.0);
-        let spread = match shading {
-            Shading::Kept => mean_image.iter().map(|v| v * v).sum::<f64>() / (pixels - 1.0).max(1.0),
-            Shading::Removed { side_px } => spread_without_shading(&mean_image, self.width, side_px),
-        };
-        Ok(Level {
-            light,
-            frames: self.frames.len(),
-            mean_dn: means.iter().sum::<f64>() / count,
-            variance_dn2: variance,
-            spatial_dn2: spread - variance / count,
-            at_highest: at_highest as f64 / (count * pixels),
-            at_zero: at_zero as f64 / (count * pixels),
-        })
+        require("frames", largest.into(), largest <= highest, "from 0 to 2^bit_depth - 1")?;
+        means.push(sum as f64 / pixels);
     }
+    // Frame by frame around its own mean, so that a lamp that flickers adds no noise.
+    let mut mean_image = vec![0.0; frames[0].len()];
+    let mut squares = vec![0.0; frames[0].len()];
+    for (frame, mean) in frames.iter().zip(&means) {
+        for ((sum, square), &dn) in mean_image.iter_mut().zip(&mut squares).zip(*frame) {
+            let deviation = f64::from(dn) - mean;
+            *sum += deviation;
+            *square += deviation * deviation;
+        }
+    }
+    let mut variance = 0.0;
+    for (sum, square) in mean_image.iter_mut().zip(&squares) {
+        variance += square - *sum * *sum / count;
+        *sum /= count;
+    }
+    variance /= pixels * (count - 1.0);
+    let spread = match shading {
+        Shading::Kept => mean_image.iter().map(|v| v * v).sum::<f64>() / (pixels - 1.0).max(1.0),
+        Shading::Removed { side_px } => spread_without_shading(&mean_image, width, side_px),
+    };
+    Ok(Level {
+        light,
+        frames: frames.len(),
+        mean_dn: means.iter().sum::<f64>() / count,
+        variance_dn2: variance,
+        spatial_dn2: spread - variance / count,
+        at_highest: at_highest as f64 / (count * pixels),
+        at_zero: at_zero as f64 / (count * pixels),
+    })
 }
 
 /// The mean square of what remains of an image of mean 0 after the mean of a square around each pixel is taken away, and
@@ -134,18 +122,6 @@ fn spread_without_shading(image: &[f64], width: usize, side: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn two_frames_give_half_the_variance_of_their_difference() {
-        let (a, b) = ([10, 14, 90, 7_u16], [12, 13, 95, 9_u16]);
-        let level = Frames { frames: &[&a, &b], width: 2, highest: 255 }.measure(Light::Dark, Shading::Kept).unwrap();
-        // Differences 2, -1, 5, 2 about their mean 2.
-        assert!((level.variance_dn2 - 0.5 * (0.0 + 9.0 + 9.0 + 0.0) / 4.0).abs() < 1e-12, "{level:?}");
-        assert!((level.mean_dn - 31.25).abs() < 1e-12);
-        let mean_image = [11.0, 13.5, 92.5, 8.0];
-        let spread: f64 = mean_image.iter().map(|v| (v - 31.25) * (v - 31.25)).sum::<f64>() / 3.0;
-        assert!((level.spatial_dn2 - (spread - level.variance_dn2 / 2.0)).abs() < 1e-9, "{level:?}");
-    }
 
     #[test]
     fn shading_is_removed_as_by_hand() {

@@ -1,13 +1,12 @@
 //! Photon transfer: what a camera is, from its flat frames.
 
 mod level;
-mod line;
 
 pub use level::{Level, Light};
 
-use crate::error::{Error, require};
+use crate::error::{Error, require, within};
 use crate::{CameraParams, ReadNoise};
-use level::Frames;
+use level::measure;
 
 /// Whether flats are taken to be lit evenly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,8 +115,7 @@ impl PhotonTransfer {
     ///
     /// If a field lies outside its range.
     pub fn new(params: &CalibrationParams) -> Result<Self, Error> {
-        let bits = params.bit_depth;
-        require("bit_depth", f64::from(bits), (8..=16).contains(&bits), "from 8 to 16")?;
+        within("bit_depth", params.bit_depth.into(), 8.0..=16.0, "from 8 to 16")?;
         require("fit_to", params.fit_to, params.fit_to > 0.0 && params.fit_to <= 1.0, "above 0 and at most 1")?;
         if let Shading::Removed { side_px } = params.shading {
             let odd = side_px >= 3 && !side_px.is_multiple_of(2);
@@ -154,8 +152,7 @@ impl PhotonTransfer {
             let smaller = side_px < expected[0] && side_px < expected[1];
             require("shading.side_px", side_px as f64, smaller, "below the width and height of the frames")?;
         }
-        let highest = self.highest();
-        let level = Frames { frames, width, highest }.measure(light, self.params.shading)?;
+        let level = measure(frames, width, self.highest(), light, self.params.shading)?;
         if light == Light::Dark && level.at_zero > CUT_OFF {
             return Err(Error::CutOff { share: level.at_zero });
         }
@@ -191,7 +188,7 @@ impl PhotonTransfer {
         let fitted: Vec<&Level> =
             open.iter().copied().filter(|level| above(level) > 0.0 && above(level) <= limit).collect();
         let transfer = fitted.iter().map(|level| (above(level), level.variance_dn2 - dark.variance_dn2));
-        let gain = line::through_origin(transfer);
+        let gain = through_origin(transfer);
         if fitted.is_empty() && open.iter().any(|level| above(level) > 0.0) {
             return Err(Error::TooFew { what: "levels with light below fit_to of saturation", found: 0, needed: 1 });
         }
@@ -199,7 +196,7 @@ impl PhotonTransfer {
             return Err(Error::Alike { above_dark_dn: above(open[open.len() - 1]) });
         }
         let half = 0.5 * if reached { noisiest } else { f64::from(highest) - dark.mean_dn };
-        let photons = amounts(&fitted, dark, Light::photons);
+        let photons = amounts(&fitted, dark, photons);
         let straight = 0.05 * noisiest..=if reached { 0.95 * noisiest } else { above(brightest) };
         open.retain(|level| straight.contains(&above(level)));
         let saturation = if reached {
@@ -214,7 +211,7 @@ impl PhotonTransfer {
             dsnu_e: root(dark.spatial_dn2) / gain,
             prnu: prnu(&fitted, dark, half),
             saturation,
-            quantum_efficiency: photons.map(|points| line::through_origin(points) / gain),
+            quantum_efficiency: photons.map(|points| through_origin(points) / gain),
             linearity_error: linearity_error(&open, dark),
             bit_depth: self.params.bit_depth,
             levels: core::iter::once(dark).chain(flats.iter().copied()).cloned().collect(),
@@ -236,8 +233,13 @@ fn prnu(flats: &[&Level], dark: &Level, half: f64) -> f64 {
 
 /// How far levels of known light, all in photons or all in another unit, are from a straight line.
 fn linearity_error(flats: &[&Level], dark: &Level) -> Option<f64> {
-    let points = amounts(flats, dark, Light::photons).or_else(|| amounts(flats, dark, Light::relative))?;
-    line::largest_deviation(&points)
+    let relative = |light| if let Light::Relative(amount) = light { Some(amount) } else { None };
+    let points = amounts(flats, dark, photons).or_else(|| amounts(flats, dark, relative))?;
+    largest_deviation(&points)
+}
+
+fn photons(light: Light) -> Option<f64> {
+    if let Light::Photons(amount) = light { Some(amount) } else { None }
 }
 
 /// The mean above the dark over the amount of light, if every level has one.
@@ -281,4 +283,33 @@ impl Calibration {
             ..default
         }
     }
+}
+
+/// The slope of the line through the origin with the least sum of squares.
+fn through_origin(points: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+    let [xy, xx] = points.into_iter().fold([0.0; 2], |[xy, xx], (x, y)| [xy + x * y, xx + x * x]);
+    xy / xx
+}
+
+/// The largest deviation, as a share of the line's value, from the line with the least sum of squares of such
+/// deviations, of three points or more.
+fn largest_deviation(points: &[(f64, f64)]) -> Option<f64> {
+    if points.len() < 3 {
+        return None;
+    }
+    // Weights 1/y², by which the sums of squares are of shares.
+    let [mut w, mut wx, mut wy, mut wxx, mut wxy] = [0.0; 5];
+    for &(x, y) in points {
+        let weight = 1.0 / (y * y);
+        w += weight;
+        wx += weight * x;
+        wy += weight * y;
+        wxx += weight * x * x;
+        wxy += weight * x * y;
+    }
+    let slope = (w * wxy - wx * wy) / (w * wxx - wx * wx);
+    let start = (wy - slope * wx) / w;
+    let deviation = |&(x, y): &(f64, f64)| (y / (start + slope * x) - 1.0).abs();
+    let largest = points.iter().map(deviation).fold(0.0, f64::max);
+    slope.is_finite().then_some(largest)
 }

@@ -21,11 +21,13 @@ fn default_colour() -> Colour {
 
 /// Every lamp, sensor and mixing.
 fn all() -> impl Iterator<Item = Colour> {
-    let params = LAMPS.into_iter().flat_map(|lamp| {
-        SENSORS.into_iter().flat_map(move |sensor| {
-            MIXINGS.into_iter().map(move |mixing| ColourParams { lamp, sensor, mixing, ..ColourParams::default() })
-        })
-    });
+    MIXINGS.into_iter().flat_map(all_of)
+}
+
+fn all_of(mixing: Mixing) -> impl Iterator<Item = Colour> {
+    let params = LAMPS
+        .into_iter()
+        .flat_map(move |lamp| SENSORS.map(|sensor| ColourParams { lamp, sensor, mixing, ..ColourParams::default() }));
     params.map(colour)
 }
 
@@ -74,10 +76,10 @@ fn rows(colour: &Colour, planes: &[Vec<f32>; DYES]) -> [Vec<f32>; 3] {
 }
 
 /// The light of a channel, written down as it is defined.
-fn oracle(colour: &Colour, amounts: &Amounts) -> [f64; 3] {
+fn oracle(colour: &Colour, mixing: Mixing, amounts: &Amounts) -> [f64; 3] {
     colour.channels().each_ref().map(|channel| {
         let mean = |f: &dyn Fn(f64) -> f64| channel.nodes.iter().map(|n| n.weight * f(n.wavelength_um)).sum::<f64>();
-        match colour.mixing() {
+        match mixing {
             Mixing::Spectral => mean(&|w| libm::exp10(-absorbance(amounts, w))),
             Mixing::ThreeVectors => libm::exp10(-mean(&|w| absorbance(amounts, w))),
         }
@@ -141,7 +143,7 @@ fn stain_vectors_are_the_published_ones() {
     for (dye, vector, least) in published {
         let ours = colour.stain_vector(dye);
         assert!((ours.iter().map(|v| v * v).sum::<f64>() - 1.0).abs() < 1e-12);
-        assert!(cosine(ours, vector) >= least, "{}: {ours:?}, {}", dye.name(), cosine(ours, vector));
+        assert!(cosine(ours, vector) >= least, "{dye:?}: {ours:?}, {}", cosine(ours, vector));
     }
     let even = colour.stain_vector(Dye::Neutral);
     assert!(even.iter().all(|v| (v - 1.0 / 3.0_f64.sqrt()).abs() < 1e-12));
@@ -202,7 +204,7 @@ fn broad_channels_bend_the_law() {
     };
     for (dye, channel, range) in [(Dye::EosinY, 1, 0.74..0.83), (Dye::LightGreen, 0, 0.85..0.93)] {
         for amount in [0.5, 0.6, 0.75] {
-            assert!(range.contains(&bend(dye, channel, amount)), "{} {amount}", dye.name());
+            assert!(range.contains(&bend(dye, channel, amount)), "{dye:?} {amount}");
         }
         // A thin stain does not bend it.
         assert!(bend(dye, channel, 1e-4) > 0.999);
@@ -247,11 +249,11 @@ fn white_balance_makes_the_empty_slide_grey() {
 #[test]
 fn sums_of_rows_are_the_sums_by_definition() {
     let planes = random_planes(4099, 5);
-    for colour in all() {
+    for (mixing, colour) in MIXINGS.into_iter().flat_map(|mixing| all_of(mixing).map(move |colour| (mixing, colour))) {
         let out = rows(&colour, &planes);
         for i in 0..planes[0].len() {
             let amounts = planes.each_ref().map(|plane| f64::from(plane[i]));
-            let (slow, exact) = (oracle(&colour, &amounts), colour.transmittance(&amounts));
+            let (slow, exact) = (oracle(&colour, mixing, &amounts), colour.transmittance(&amounts));
             for c in 0..3 {
                 assert!((slow[c] - exact[c]).abs() < 1e-14);
                 assert!((f64::from(out[c][i]) - exact[c]).abs() < 1e-5, "{i} {c}: {} {}", out[c][i], exact[c]);

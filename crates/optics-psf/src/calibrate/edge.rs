@@ -31,7 +31,7 @@ pub struct EdgeFit {
     pub difference: f64,
 }
 
-/// σ_xy of the image plane, from a straight edge in a window ("Impulse response", Eq. 13).
+/// σ_xy of the image plane, from a straight edge in a window ("Impulse response", Eq. 13; the paper fits by eye).
 ///
 /// # Errors
 ///
@@ -40,14 +40,10 @@ pub struct EdgeFit {
 /// # Panics
 ///
 /// If the image is not whole rows of `width`.
-///
-/// # Differences from the paper
-///
-/// The paper fits by eye.
 pub fn edge(image: &[f32], width: usize, window: Window) -> Result<EdgeFit, Error> {
     assert!(width > 0 && image.len().is_multiple_of(width), "the image is not whole rows of its width");
     window.check(width, image.len() / width)?;
-    let pixels = window.crop(image, width);
+    let pixels: Vec<f32> = window.crop(image, width).collect();
     let nothing = Error::Nothing { thing: "edge" };
     let angle = lightward(&pixels, window.width).ok_or_else(|| nothing.clone())?;
     let [cx, cy] = [window.width, window.height].map(|side| (side as f64 - 1.0) / 2.0);

@@ -6,15 +6,14 @@
 //!
 //! Images are intensities of any unit, rows of `width` pixels.
 
-mod condenser;
 mod edge;
-mod focus;
 
-pub use condenser::{CondenserFit, condenser};
 pub use edge::{EdgeFit, edge};
-pub use focus::{FocusCurve, Line, focus};
 
-use crate::Error;
+use crate::error::require;
+use crate::grid::fast_length;
+use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
+use crate::{Border, Error, Gaussian, Microscope, MicroscopeParams, Scratch};
 
 /// Part of an image, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,45 +51,53 @@ impl Window {
     }
 
     /// Its pixels, row after row.
-    fn crop(self, image: &[f32], width: usize) -> Vec<f32> {
-        self.rows().flat_map(|y| &image[y * width + self.left..y * width + self.left + self.width]).copied().collect()
-    }
-
-    fn rows(self) -> core::ops::Range<usize> {
-        self.top..self.top + self.height
-    }
-
-    /// The same pixels in a crop of `outer`.
-    fn inside(self, outer: Self) -> Self {
-        Self { left: self.left - outer.left, top: self.top - outer.top, ..self }
+    fn crop(self, image: &[f32], width: usize) -> impl Iterator<Item = f32> {
+        let rows = self.top..self.top + self.height;
+        rows.flat_map(move |y| &image[y * width + self.left..][..self.width]).copied()
     }
 }
 
-/// Height of the images of a stack, which has at least three of one size.
-///
-/// # Panics
-///
-/// As the public functions say.
-fn stack_height(stack: &[&[f32]], width: usize) -> Result<usize, Error> {
-    if stack.len() < 3 {
-        return Err(Error::Count { field: "stack", value: stack.len(), accepted: "three planes or more" });
-    }
-    assert!(width > 0 && stack[0].len().is_multiple_of(width), "an image is not whole rows of its width");
-    assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "planes differ in size");
-    Ok(stack[0].len() / width)
+/// What a window shows of a stack.
+struct Seen {
+    /// The plane with most detail, which is neither the first nor the last.
+    focused: usize,
+    /// The window with a margin, the window in that, and what the focused plane holds there.
+    outer: Window,
+    inner: Window,
+    source: Vec<f32>,
+    /// What each plane holds in the window.
+    targets: Vec<Vec<f32>>,
 }
 
-/// The plane with most detail, which is neither the first nor the last.
-fn sharpest(stack: &[&[f32]], width: usize, window: Window) -> Result<usize, Error> {
-    let detail: Vec<f64> = stack.iter().map(|plane| detail(&window.crop(plane, width), window.width)).collect();
-    if detail.iter().any(|d| !d.is_finite()) || detail.iter().all(|d| *d == 0.0) {
-        return Err(Error::Nothing { thing: "detail" });
+impl Seen {
+    /// # Panics
+    ///
+    /// As the public functions say.
+    fn new(stack: &[&[f32]], width: usize, window: Window, margin: usize) -> Result<Self, Error> {
+        require("stack", stack.len() as f64, stack.len() >= 3, "three planes or more")?;
+        assert!(width > 0 && stack[0].len().is_multiple_of(width), "an image is not whole rows of its width");
+        assert!(stack.iter().all(|plane| plane.len() == stack[0].len()), "planes differ in size");
+        let height = stack[0].len() / width;
+        window.check(width, height)?;
+        let targets: Vec<Vec<f32>> = stack.iter().map(|plane| window.crop(plane, width).collect()).collect();
+        let detail: Vec<f64> = targets.iter().map(|target| detail(target, window.width)).collect();
+        if detail.iter().any(|d| !d.is_finite()) || detail.iter().all(|d| *d == 0.0) {
+            return Err(Error::Nothing { thing: "detail" });
+        }
+        let focused = (0..detail.len()).max_by(|&a, &b| detail[a].total_cmp(&detail[b])).unwrap_or(0);
+        if focused == 0 || focused + 1 == stack.len() {
+            return Err(Error::NoFocusInside { sharpest: focused, planes: stack.len() });
+        }
+        let outer = window.grown(margin, width, height);
+        let inner = Window { left: window.left - outer.left, top: window.top - outer.top, ..window };
+        Ok(Self { focused, outer, inner, source: outer.crop(stack[focused], width).collect(), targets })
     }
-    let best = (0..detail.len()).max_by(|&a, &b| detail[a].total_cmp(&detail[b])).unwrap_or(0);
-    if best == 0 || best + 1 == stack.len() {
-        return Err(Error::NoFocusInside { sharpest: best, planes: stack.len() });
+
+    /// The mean of |a − b| over the window, of an image of what is around it and a plane.
+    fn difference(&self, image: &[f32], plane: usize) -> f64 {
+        let (inner, target) = (self.inner.crop(image, self.outer.width), &self.targets[plane]);
+        inner.zip(target).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / target.len() as f64
     }
-    Ok(best)
 }
 
 /// Squared differences over two pixels, along x and y.
@@ -99,11 +106,6 @@ fn detail(image: &[f32], width: usize) -> f64 {
     let along: f64 = image.chunks_exact(width).flat_map(|row| row.windows(3)).map(|w| square(w[0], w[2])).sum();
     let across: f64 = image.iter().zip(&image[2 * width..]).map(|(a, b)| square(*a, *b)).sum();
     along + across
-}
-
-/// The mean of |a − b|.
-fn mean_difference(a: &[f32], b: &[f32]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / a.len() as f64
 }
 
 /// Where a curve sampled at equal steps is least, in steps, and its value there: a parabola through the lowest
@@ -120,4 +122,187 @@ fn lowest(samples: &[f64]) -> (f64, f64) {
     }
     let shift = 0.5 * (a - c) / bend;
     (best as f64 + shift, b - 0.25 * (a - c) * shift)
+}
+
+/// Widest Gaussian that is tried, and the step between two, pixels.
+const WIDEST_PX: f64 = 16.0;
+const STEP_PX: f64 = 0.2;
+
+/// How far beyond the window the focused plane is looked at: three times the widest.
+const BLUR_MARGIN_PX: usize = 48;
+
+/// Blur against focus offset: the paper's Fig. 10.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FocusCurve {
+    /// The plane in focus: the one with most detail in the window.
+    pub focused: usize,
+    /// For each plane, σ in pixels of the Gaussian that maps the focused plane to it best; 0 for itself.
+    pub sigma_px: Vec<f64>,
+    /// For each plane, the mean of what is left between the two.
+    pub difference: Vec<f64>,
+    /// The line through the planes before the focused one.
+    pub before: Line,
+    /// The line through those after it.
+    pub after: Line,
+}
+
+/// σ against the number of planes from focus, |n|.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Pixels per plane, of the line that best fits.
+    pub slope_px: f64,
+    /// What that line has in focus, pixels.
+    pub intercept_px: f64,
+    /// Pixels per plane, of the line through 0 that best fits: σ = k·n.
+    pub proportional_px: f64,
+}
+
+impl Line {
+    /// Least squares through points (n, σ).
+    ///
+    /// With less than two points there is no slope, and it is that through 0.
+    #[must_use]
+    pub fn through(points: &[[f64; 2]]) -> Self {
+        let count = points.len() as f64;
+        let sum = |f: fn(&[f64; 2]) -> f64| points.iter().map(f).sum::<f64>();
+        let (x, y) = (sum(|p| p[0]), sum(|p| p[1]));
+        let (xx, xy) = (sum(|p| p[0] * p[0]), sum(|p| p[0] * p[1]));
+        let proportional_px = if xx > 0.0 { xy / xx } else { 0.0 };
+        let spread = count * xx - x * x;
+        if spread <= 0.0 {
+            return Self { slope_px: proportional_px, intercept_px: 0.0, proportional_px };
+        }
+        let slope_px = (count * xy - x * y) / spread;
+        Self { slope_px, intercept_px: (y - slope_px * x) / count, proportional_px }
+    }
+}
+
+/// σ against focus offset, from a stack of an object: for each plane the Gaussian is sought that, applied to the
+/// focused plane, which the paper selects by eye, gives the least ∑ |difference| over the window (Fig. 10, Eq. 14), up to
+/// 16 pixels.
+///
+/// # Errors
+///
+/// If there are less than three planes, the window is not inside the images, there is no detail in it, or
+/// the sharpest plane is the first or the last.
+///
+/// # Panics
+///
+/// If the images are not whole rows of `width` or differ in size.
+pub fn focus(stack: &[&[f32]], width: usize, window: Window) -> Result<FocusCurve, Error> {
+    let seen = Seen::new(stack, width, window, BLUR_MARGIN_PX)?;
+    let focused = seen.focused;
+    let mut differences = vec![Vec::new(); stack.len()];
+    let (mut blurred, mut scratch) = (seen.source.clone(), Scratch::new());
+    let mut sigma = 0.0;
+    while sigma <= WIDEST_PX {
+        let gaussian = Gaussian::new(sigma)?;
+        gaussian.blur_into(&seen.source, seen.outer.width, Border::Replicate, &mut blurred, &mut scratch);
+        for (plane, list) in differences.iter_mut().enumerate() {
+            list.push(seen.difference(&blurred, plane));
+        }
+        sigma += STEP_PX;
+    }
+    let (steps, difference): (Vec<f64>, Vec<f64>) = differences.iter().map(|list| lowest(list)).unzip();
+    let sigma_px: Vec<f64> = steps.iter().map(|s| s * STEP_PX).collect();
+    let points =
+        |planes: core::ops::Range<usize>| planes.map(|i| [i.abs_diff(focused) as f64, sigma_px[i]]).collect::<Vec<_>>();
+    let (before, after) = (Line::through(&points(0..focused)), Line::through(&points(focused + 1..stack.len())));
+    Ok(FocusCurve { focused, sigma_px, difference, before, after })
+}
+
+/// Pixels around the window that the transfer functions see.
+const MARGIN_PX: usize = 32;
+
+/// Apertures that are tried, as parts of the objective's: from a tenth on, in steps of a twentieth.
+const FIRST_NA: f64 = 0.1;
+const STEP_NA: f64 = 0.05;
+const TRIED: u32 = 19;
+
+/// What of the focused plane's own transfer counts as noise where it is to be undone.
+const NOISE: f64 = 0.1;
+
+/// The condenser's aperture that explains a stack best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CondenserFit {
+    /// The plane in focus.
+    pub focused: usize,
+    /// The numerical aperture.
+    pub condenser_na: f64,
+    /// Apertures that were tried, and the mean difference each leaves.
+    pub tried: Vec<[f64; 2]>,
+}
+
+/// The condenser's aperture, from a stack of an object taken by moving the stage by `step_um` for each plane through the
+/// immersion medium.
+///
+/// The other planes are computed from the focused one by the ratio of the transfer functions H_A,
+/// and the aperture is sought, from a tenth of the objective's to all of it, for which ∑ |difference| over
+/// the window and all planes is least. All else, the pixel too, is as `microscope` says; absorption alone
+/// counts, so an object that refracts much is no good one.
+///
+/// # Errors
+///
+/// As [`focus`](focus()); if `step_um` is not above 0 and at most 100, or `microscope` not in order.
+///
+/// # Panics
+///
+/// If the images are not whole rows of `width` or differ in size.
+pub fn condenser(
+    stack: &[&[f32]],
+    width: usize,
+    window: Window,
+    step_um: f64,
+    microscope: &MicroscopeParams,
+) -> Result<CondenserFit, Error> {
+    require("step_um", step_um, step_um > 0.0 && step_um <= 100.0, "above 0 and at most 100")?;
+    Microscope::new(microscope)?;
+    let seen = Seen::new(stack, width, window, MARGIN_PX)?;
+    let Seen { focused, outer, source, .. } = &seen;
+
+    // Reflected, so that the seam of the periodic grid has no step.
+    let [wide, high] = [outer.width, outer.height].map(|side| fast_length(2 * side));
+    let plane = LanePlane::new(wide, high, &LanePlans::default());
+    let support = LaneSupport::new(wide, high, 1.0);
+    let (mut scratch, mut spectrum) = (LaneScratch::default(), Vec::new());
+    let reflected = |i: usize, len: usize| Border::Reflect.source(i.cast_signed(), len).unwrap_or(0);
+    let fill = |left: usize, stripe: &mut [Lanes]| {
+        for (y, row) in stripe.iter_mut().enumerate() {
+            let from = &source[reflected(y, outer.height) * outer.width..][..outer.width];
+            for (x, value) in row.as_flattened_mut().iter_mut().enumerate() {
+                *value = if left + x < wide { from[reflected(left + x, outer.width)] } else { 0.0 };
+            }
+        }
+        true
+    };
+    plane.forward(&support, fill, &mut spectrum, &mut scratch);
+    let frequencies: Vec<[[f64; 2]; LANES]> =
+        support.frequencies(wide, high).map(|f| f.map(|f| f.map(|f| f / microscope.pixel_um))).collect();
+
+    let mut tried = Vec::new();
+    for i in 0..TRIED {
+        let condenser_na = microscope.na * (FIRST_NA + STEP_NA * f64::from(i));
+        let candidate = Microscope::new(&MicroscopeParams { condenser_na, ..microscope.clone() })?;
+        let rest = candidate.transfer(0.0, 0.0)?;
+        let mut sum = 0.0;
+        for k in (0..stack.len()).filter(|k| k != focused) {
+            let transfer = candidate.transfer(0.0, step_um * (k as f64 - *focused as f64))?;
+            let mut filtered = spectrum.clone();
+            for (value, frequencies) in filtered.iter_mut().zip(&frequencies) {
+                for (l, &f) in frequencies.iter().enumerate() {
+                    let ([now, _], [then, _]) = (transfer.absorption(f), rest.absorption(f));
+                    #[expect(clippy::cast_possible_truncation, reason = "f32 beside f32 spectra")]
+                    let ratio = (now * then * (1.0 + NOISE * NOISE) / (then * then + NOISE * NOISE)) as f32;
+                    value[0][l] *= ratio * plane.norm();
+                    value[1][l] *= ratio * plane.norm();
+                }
+            }
+            let mut image = vec![0.0; outer.width * outer.height];
+            plane.image_into(&support, &filtered, outer.width, &mut image, &mut scratch);
+            sum += seen.difference(&image, k);
+        }
+        tried.push([condenser_na, sum / (stack.len() - 1) as f64]);
+    }
+    let (steps, _) = lowest(&tried.iter().map(|t| t[1]).collect::<Vec<_>>());
+    Ok(CondenserFit { focused: *focused, condenser_na: microscope.na * (FIRST_NA + STEP_NA * steps), tried })
 }

@@ -186,7 +186,7 @@ fn stacks_that_cannot_be_measured_are_refused() {
     let planes = slices(&planes);
     let end = calibrate::focus(&planes, PIXELS, WINDOW).unwrap_err();
     assert_eq!(end, Error::NoFocusInside { sharpest: 0, planes: 4 });
-    assert!(matches!(calibrate::focus(&planes[..2], PIXELS, WINDOW), Err(Error::Count { field: "stack", .. })));
+    assert!(matches!(calibrate::focus(&planes[..2], PIXELS, WINDOW), Err(Error::OutOfRange { field: "stack", .. })));
     let outside = Window { left: 100, ..WINDOW };
     assert!(matches!(calibrate::focus(&planes, PIXELS, outside), Err(Error::Window { .. })));
     assert!(matches!(calibrate::edge(planes[0], PIXELS, Window { width: 2, ..WINDOW }), Err(Error::Window { .. })));

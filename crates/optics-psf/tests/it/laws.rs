@@ -9,7 +9,7 @@ const WIDTHS: [f64; 7] = [0.0, 0.05, 0.2, 0.5, 0.9, 3.6, 20.0];
 const BORDERS: [Border; 3] = [Border::Zero, Border::Reflect, Border::Replicate];
 
 fn direct(sigma_px: f64) -> Gaussian {
-    Gaussian::with_method(sigma_px, Method::Direct).unwrap()
+    Gaussian::truncated(sigma_px, Method::Direct, 1e-7).unwrap()
 }
 
 fn noise(len: usize) -> Vec<f32> {
@@ -73,7 +73,7 @@ fn in_focus_nothing_happens() {
 fn a_constant_survives() {
     for sigma in WIDTHS {
         for method in [Method::Direct, Method::Decimated, Method::Auto] {
-            let gaussian = Gaussian::with_method(sigma, method).unwrap();
+            let gaussian = Gaussian::truncated(sigma, method, 1e-7).unwrap();
             for border in [Border::Reflect, Border::Replicate] {
                 let blurred = gaussian.blur(&vec![0.7; 61 * 47], 61, border);
                 let error = largest_difference(&blurred, &vec![0.7; 61 * 47]);
@@ -89,7 +89,7 @@ fn the_sum_is_conserved() {
     let image = noise(61 * 47);
     for sigma in WIDTHS {
         for method in [Method::Direct, Method::Decimated, Method::Auto] {
-            let gaussian = Gaussian::with_method(sigma, method).unwrap();
+            let gaussian = Gaussian::truncated(sigma, method, 1e-7).unwrap();
             let spread = sum(&gaussian.spread(&image, 61).0) / sum(&image) - 1.0;
             assert!(spread.abs() < 1e-6, "{sigma}, {method:?}: {spread}");
         }
@@ -126,7 +126,7 @@ fn the_impulse_response_has_the_variance_asked_for() {
 #[test]
 fn decimated_keeps_the_variance_at_every_phase() {
     for sigma in [2.81, 3.6, 5.0, 12.0, 20.0, 33.3] {
-        let gaussian = Gaussian::with_method(sigma, Method::Decimated).unwrap();
+        let gaussian = Gaussian::truncated(sigma, Method::Decimated, 1e-7).unwrap();
         for (x, y) in (0..17).map(|i| (i, 16 - i)) {
             let [variance, mean] = response(&gaussian, x, y);
             let error = variance / (sigma * sigma) - 1.0;
@@ -195,7 +195,7 @@ fn a_shifted_object_gives_the_shifted_blur() {
     for (x, y) in [(31, 30), (77, 41), (203, 50), (330, 33)] {
         let exact = direct(4.0);
         assert_eq!(blurred(&exact, x, y), blurred(&exact, 30, 30));
-        let near = Gaussian::with_method(5.0, Method::Decimated).unwrap();
+        let near = Gaussian::truncated(5.0, Method::Decimated, 1e-7).unwrap();
         let error = largest_difference(&blurred(&near, x, y), &blurred(&near, 30, 30));
         assert!(error < 2e-4, "at {x}, {y}: {error}");
     }
@@ -245,7 +245,7 @@ fn decimated_agrees_with_direct() {
         [(Method::Decimated, 1e-3, [2.81, 3.3, 5.7, 8.0]), (Method::Auto, 2e-4, [3.5, 6.0, 7.2, 20.0])]
     {
         for sigma in widths {
-            let fast = Gaussian::with_method(sigma, method).unwrap();
+            let fast = Gaussian::truncated(sigma, method, 1e-7).unwrap();
             for border in BORDERS {
                 for (i, image) in images.iter().enumerate() {
                     let mut blurred = vec![0.0; image.len()];
@@ -272,7 +272,7 @@ fn no_image_errs_more_than_decimation_may() {
         (Method::Auto, 3.5, 2e-4),
         (Method::Auto, 7.2, 2e-4),
     ] {
-        let fast = Gaussian::with_method(sigma, method).unwrap();
+        let fast = Gaussian::truncated(sigma, method, 1e-7).unwrap();
         // How much each pixel of a row errs by if every other one is as bad for it as it can be.
         let mut worst = vec![0.0; width];
         for x in 0..width {
@@ -291,11 +291,10 @@ fn no_image_errs_more_than_decimation_may() {
 fn narrow_kernels_are_never_decimated() {
     let image = noise(100 * 80);
     for (method, sigma) in [(Method::Decimated, 2.79), (Method::Auto, 3.46)] {
-        let gaussian = Gaussian::with_method(sigma, method).unwrap();
+        let gaussian = Gaussian::truncated(sigma, method, 1e-7).unwrap();
         let exact = direct(sigma).blur(&image, 100, Border::Reflect);
         assert_eq!(gaussian.blur(&image, 100, Border::Reflect), exact);
     }
-    assert_eq!(Gaussian::new(9.0).unwrap(), Gaussian::with_method(9.0, Method::default()).unwrap());
 }
 
 #[test]
@@ -337,6 +336,17 @@ fn a_truncated_kernel_errs_by_its_tail() {
                 let error = f64::from(largest_difference(&blur(&short), &blur(&exact)));
                 // The worst image there is would err by 5.2 times that along each axis.
                 assert!(error < 5.0 * lost_tail, "{sigma}, {lost_tail}: {error}");
+            }
+        }
+    }
+    // Decimated kernels are truncated likewise.
+    for lost_tail in [1e-4, 1e-3, 1e-2] {
+        for sigma in [3.5, 5.1, 8.0] {
+            let short = Gaussian::truncated(sigma, Method::Auto, lost_tail).unwrap();
+            for image in &images {
+                let blur = |gaussian: &Gaussian| gaussian.blur(image, width, Border::Reflect);
+                let error = f64::from(largest_difference(&blur(&short), &blur(&direct(sigma))));
+                assert!(error < 5.0 * lost_tail + 2e-4, "{sigma}, {lost_tail}: {error}");
             }
         }
     }

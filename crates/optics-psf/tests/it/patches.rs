@@ -4,8 +4,8 @@
 
 use crate::support::{SIDE, absorbing, array, double, relative, shifted, single, soft_disk, worst};
 use optics_psf::{
-    Abbe, AbbeParams, BrightField, BrightFieldParams, Defocused, Error, Factor, Focus, LEAST_LIGHT, Lattice, Layer,
-    Light, Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, Zernike,
+    Abbe, AbbeParams, BrightField, BrightFieldParams, Error, Factor, Focus, LEAST_LIGHT, Lattice, Layer, Light,
+    Microscope, MicroscopeParams, Padding, Patch, PatchImager, PatchScratch, Source, Zernike,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -427,27 +427,6 @@ fn light_outside_the_picture_is_left_out() {
     light.picture_into(&mut out);
     assert_eq!(out, vec![1.0; 64 * 64]);
     Light::new(imager.microscope(), 0, 0).picture_into(&mut []);
-}
-
-#[test]
-fn whole_slabs_on_the_objects_lattice_agree_with_patches_on_the_cameras() {
-    let imager = imager(&MicroscopeParams { condenser_na: 0.6, ..MicroscopeParams::default() });
-    let disk = soft_disk(3.0, 0.5, 0.12);
-    let thing = Thing::tile(&disk, 5.0);
-    assert_eq!(imager.focus(5.0, 0.0).unwrap().lattice(), Lattice::Camera);
-    let params = BrightFieldParams {
-        width: SIDE,
-        height: SIDE,
-        padding: Padding::Clear { px: 128 },
-        depths_um: vec![5.0],
-        defocused: Defocused::OnObject,
-        ..BrightFieldParams::default()
-    };
-    let whole = BrightField::new(imager.microscope(), &params).unwrap();
-    let mut specimen = whole.specimen();
-    whole.set_transmittance(&mut specimen, 0, &thing.transmittance);
-    let expected = double(&whole.image(&mut specimen, 0));
-    assert!(relative(&seen(&imager, &[thing], SIDE / 2), &expected) < 1e-3);
 }
 
 #[test]
