@@ -6,7 +6,6 @@ use multiversion::multiversion;
 
 use crate::error::Cause;
 use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
-use crate::rendition::Srgb;
 use crate::scene::{Scene, SceneCamera, SceneLight};
 use crate::truth::{Mask, Run};
 
@@ -183,7 +182,6 @@ impl Detector {
             (None, _) => {}
             (Some(jpeg), 1) => jpeg.frame(grey, width),
             (Some(jpeg), _) => {
-                #[expect(clippy::cast_possible_truncation, reason = "JPEG is for 8 bits")]
                 let mut rgb: Vec<u8> = grey.iter().map(|level| *level as u8).collect();
                 jpeg.rgb(&mut rgb, width);
                 grey.iter_mut().zip(&rgb).for_each(|(level, byte)| *level = u16::from(*byte));
@@ -193,7 +191,7 @@ impl Detector {
 
     fn develop(&self, levels: &[Vec<u16>], grey: &mut [u16]) {
         match &self.srgb {
-            Some(srgb) => srgb.levels(levels, grey),
+            Some(srgb) => srgb.render(levels, grey, |value| (value + 0.5).min(srgb.largest) as u16),
             None => interleave(levels, grey),
         }
     }
@@ -215,7 +213,7 @@ impl Detector {
             channel.camera.mean_dn_into(electrons, means);
         }
         match &self.srgb {
-            Some(srgb) => srgb.means(means, out),
+            Some(srgb) => srgb.render(means, out, |value| value),
             None => interleave(means, out),
         }
     }
@@ -330,6 +328,62 @@ pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2
         }
     }
     sums.iter().sum()
+}
+
+/// Steps of the tone curve's table: between two of them it is straight to a twentieth of an 8-bit grey level.
+const STEPS: usize = 4096;
+
+/// From balanced, linear grey levels of three channels to colours as microscope cameras show them: sRGB primaries and tone curve
+/// (IEC 61966-2-1).
+struct Srgb {
+    matrix: [[f32; 3]; 3],
+    inner: f32,
+    largest: f32,
+    /// The curve at even steps from 0 to 1, in grey levels, and once more its end.
+    curve: Vec<f32>,
+}
+
+impl Srgb {
+    /// `matrix` leads from the channels to linear sRGB; grey levels come with `inner_bits` and leave with `bits`.
+    fn new(matrix: &[[f64; 3]; 3], inner_bits: u32, bits: u32) -> Self {
+        let levels = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
+        let largest = levels(bits);
+        let curve =
+            (0..=STEPS + 1).map(|step| (largest * encoded((step as f64 / STEPS as f64).min(1.0))) as f32).collect();
+        Self {
+            matrix: matrix.map(|row| row.map(|v| v as f32)),
+            inner: (1.0 / levels(inner_bits)) as f32,
+            largest: largest as f32,
+            curve,
+        }
+    }
+
+    /// Writes colours side by side.
+    fn render<T: Copy + Into<f32>, U>(&self, channels: &[Vec<T>], out: &mut [U], store: impl Fn(f32) -> U) {
+        let [r, g, b] = channels else { return };
+        for (((out, &r), &g), &b) in out.chunks_exact_mut(3).zip(r).zip(g).zip(b) {
+            for (out, value) in out.iter_mut().zip(self.convert([r.into(), g.into(), b.into()])) {
+                *out = store(value);
+            }
+        }
+    }
+
+    /// Between 0 and the largest grey level.
+    #[inline(always)]
+    fn convert(&self, levels: [f32; 3]) -> [f32; 3] {
+        self.matrix.map(|row| {
+            let linear = self.inner * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
+            let at = linear.clamp(0.0, 1.0) * STEPS as f32;
+            let step = at as usize;
+            let (low, high) = (self.curve[step], self.curve[step + 1]);
+            low + (at - step as f32) * (high - low)
+        })
+    }
+}
+
+/// The tone curve, 0 to 1.
+fn encoded(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

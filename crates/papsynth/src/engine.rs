@@ -100,13 +100,13 @@ impl Engine {
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |cause| E::from(Error::Image { index, cause });
-        let mut rendering = self.rendering(scene, threads).map_err(fail)?;
-        for plane in 0..rendering.planes() {
-            sink(rendering.plane(plane).map_err(fail)?)?;
-        }
-        let (finished, desk) = rendering.finish().map_err(fail)?;
-        self.desks().push(desk);
-        Ok(finished)
+        self.at_desk(|desk| {
+            let mut rendering = self.rendering(scene, threads, desk).map_err(fail)?;
+            for plane in 0..rendering.planes() {
+                sink(rendering.plane(plane, desk).map_err(fail)?)?;
+            }
+            rendering.finish(desk).map_err(fail)
+        })
     }
 
     pub(crate) fn model(&self) -> &Model {
@@ -117,15 +117,16 @@ impl Engine {
         &self.lenses
     }
 
-    /// A scene on its way, in the memory of finished ones.
-    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, Cause> {
-        let desk = self.desks().pop().unwrap_or_default();
+    pub(crate) fn rendering(&self, scene: Scene, threads: Threads, desk: &mut Desk) -> Result<Rendering, Cause> {
         Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
     }
 
-    /// Takes the memory of a scene back.
-    pub(crate) fn give_back(&self, rendering: Rendering) {
-        self.desks().push(rendering.into_desk());
+    /// Works in the memory of finished images, and leaves it to the next one.
+    pub(crate) fn at_desk<T>(&self, work: impl FnOnce(&mut Desk) -> T) -> T {
+        let mut desk = self.desks().pop().unwrap_or_default();
+        let made = work(&mut desk);
+        self.desks().push(desk);
+        made
     }
 
     fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {

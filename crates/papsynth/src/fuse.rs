@@ -45,9 +45,7 @@ pub(crate) fn correlate(
     for (y, shared) in shared.chunks_exact_mut(row).enumerate() {
         let rows: [usize; 5] = core::array::from_fn(|k| mirrored(y, k as i64 - 2, height) * row);
         for (x, value) in shared.iter_mut().enumerate() {
-            #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "steps from -2 to 2")]
-            let of_row = |step: i64| noise[rows[(step + 2) as usize] + x];
-            *value = down.at(of_row);
+            *value = down.at(|step| noise[rows[(step + 2) as usize] + x]);
         }
     }
     // To first order this changes the correlation along the diagonals alone.
@@ -66,9 +64,7 @@ pub(crate) fn correlate(
             let norm = (alone * alone + rest * rest + 2.0 * alone * rest * centre).sqrt();
             let value =
                 clipped.rest(top - expected[at]) * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the grey levels")]
-            let level = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
-            *grey = level;
+            *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
 }
@@ -98,7 +94,6 @@ impl Clipped {
 
     /// The part of noise that is left so many levels below the largest.
     fn rest(&self, below: f32) -> f32 {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index, clamped")]
         let step = (below.max(0.0) * self.per_level) as usize;
         self.rest[step.min(Self::STEPS)]
     }

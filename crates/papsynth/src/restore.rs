@@ -53,7 +53,7 @@ impl Feathered {
             slab.clear();
             slab.resize((to - from) * view.width, 0.0);
             for tile in near {
-                lay(&mut slab, view.width, from, Tile::as_ref(tile), |row, shares| {
+                lay(&mut slab, view.width, [0, from as i64], tile, |row, shares| {
                     row.iter_mut().zip(shares).filter(|(_, s)| **s >= COVERED).for_each(|(pixel, _)| *pixel = 1.0);
                 });
             }

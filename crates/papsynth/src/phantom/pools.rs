@@ -168,8 +168,8 @@ impl Pool {
 /// Positions are kept in 2⁻¹⁶ texels: whole numbers wrap without rounding.
 const ONE: u32 = 1 << 16;
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wraps on purpose")]
 fn fixed(texels: f64) -> u32 {
+    // The cast to 32 bits wraps on purpose.
     (texels * f64::from(ONE)).floor() as i64 as u32
 }
 

@@ -16,19 +16,7 @@ pub(crate) struct Tile {
     pub(crate) values: Vec<f32>,
 }
 
-/// A tile whose pixels belong to someone else.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TileRef<'a> {
-    pub(crate) origin: [i64; 2],
-    pub(crate) width: usize,
-    pub(crate) values: &'a [f32],
-}
-
 impl Tile {
-    pub(crate) fn as_ref(&self) -> TileRef<'_> {
-        TileRef { origin: self.origin, width: self.width, values: &self.values }
-    }
-
     /// A tile of zeros that holds all these points and `margin` pixels round them.
     pub(crate) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
@@ -39,7 +27,6 @@ impl Tile {
                 high[axis] = high[axis].max(point[axis]);
             }
         }
-        #[expect(clippy::cast_possible_truncation, reason = "places on a slide are far below 2⁶³ pixels")]
         let bound = |axis: usize| {
             let first = (low[axis] - margin).floor() as i64;
             let last = (high[axis] + margin).ceil() as i64;
@@ -61,7 +48,7 @@ impl Tile {
         let length = |axis: usize| usize::try_from(end[axis].min(high[axis]) - origin[axis]).unwrap_or(0).max(1);
         let (width, height) = (length(0), length(1));
         let mut part = Self { origin, width, values: vec![0.0; width * height] };
-        lay_at(&mut part.values, width, origin, self.as_ref(), |row, values| row.copy_from_slice(values));
+        lay(&mut part.values, width, origin, &self, |row, values| row.copy_from_slice(values));
         part
     }
 
@@ -236,7 +223,7 @@ impl Tile {
 
     /// Gives every stretch of this tile that another one meets, with what of the other lies there.
     pub(crate) fn meet(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
-        lay_at(&mut self.values, self.width, self.origin, other.as_ref(), blend);
+        lay(&mut self.values, self.width, self.origin, other, blend);
     }
 }
 
@@ -382,26 +369,14 @@ fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
     Cow::Owned(left)
 }
 
-/// Lays the rows of a tile over rows of an image that is `width` wide, as far as they meet. `image` starts at row `first`;
-/// `blend` gets a stretch of the image and what of the tile lies over it.
+/// Lays the rows of a tile over those of an image that is `width` wide and whose first pixel is pixel `origin`, as far as they
+/// meet: `blend` gets a stretch of the image and what of the tile lies over it.
 #[inline(always)]
 pub(crate) fn lay(
     image: &mut [f32],
     width: usize,
-    first: usize,
-    tile: TileRef<'_>,
-    mut blend: impl FnMut(&mut [f32], &[f32]),
-) {
-    lay_at(image, width, [0, first as i64], tile, |row, values| blend(row, values));
-}
-
-/// The same where the first pixel of `image` is pixel `origin`.
-#[inline(always)]
-pub(crate) fn lay_at(
-    image: &mut [f32],
-    width: usize,
     origin: [i64; 2],
-    tile: TileRef<'_>,
+    tile: &Tile,
     mut blend: impl FnMut(&mut [f32], &[f32]),
 ) {
     let [left, top] = [tile.origin[0] - origin[0], tile.origin[1] - origin[1]];
@@ -583,7 +558,7 @@ mod tests {
             let tile = Tile { origin: [x, y], width, values };
             // Rows 2 to 7 of an image of eight columns.
             let mut image = vec![0.5; 48];
-            lay(&mut image, 8, 2, tile.as_ref(), |row, values| {
+            lay(&mut image, 8, [0, 2], &tile, |row, values| {
                 row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value);
             });
             for (index, pixel) in image.iter().enumerate() {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use optics_psf::{Abbe, AbbeParams, Factor, Lattice, Layer, Microscope, Source, fast_length};
 
+use super::Slide;
 use super::canvas::{Canvas, Mixer, Window};
-use super::lenses::Lens;
-use super::passage::Slide;
+use super::lights::Lens;
 use crate::error::Cause;
 use crate::scene::{SceneMicroscope, View};
 
@@ -51,7 +51,6 @@ fn layers(slide: Slide<'_>, slab_um: f64, (mixer, light): (&Mixer, usize), frame
         let tiles = phantom.pieces.iter().map(|piece| &piece.absorbance);
         let Some(window) = Window::around(tiles, 1) else { continue };
         mixer.compose(&phantom.pieces, window, &mut canvas);
-        #[expect(clippy::cast_possible_truncation, reason = "depths are at most a few thousand slabs")]
         let slab = libm::round(object.depth_um / slab_um) as i64;
         let amplitudes = slabs.entry(slab).or_insert_with(|| vec![[1.0, 0.0]; frame.width * frame.height]);
         let transmittance = canvas.transmittance[light].chunks_exact(window.width);

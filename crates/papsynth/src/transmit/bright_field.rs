@@ -1,18 +1,17 @@
 //! Partially coherent bright field: what each object lets through, filtered by the microscope's transfer functions, and
 //! the product over all objects.
 
+use core::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
 use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
 use portable_numerics::elementary::exp10_from;
 
-use super::abbe;
 use super::canvas::{Canvas, Mixer, Window, add};
-use super::lenses::Lenses;
-use super::lights::{ColouredLight, Group, groups};
+use super::lights::{ColouredLight, Group, Lenses, groups};
 use super::overlap::{Meets, Overlaps};
-use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
+use super::{FocusAt, Light, Passage, Slide, abbe};
 use crate::detect::sum_over;
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
@@ -22,9 +21,6 @@ use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
 use crate::threads::{self, Threads};
 use crate::truth::{COVERED, Mask, Run};
 
-/// Objects whose factors are in memory at one time, when several threads make them.
-const CHUNK: usize = 64;
-
 /// Share of the further spread that lies beyond its ends and is left out.
 const LOST_TAIL: f64 = 1e-5;
 
@@ -32,7 +28,8 @@ const LOST_TAIL: f64 = 1e-5;
 pub(crate) struct BrightFieldPath {
     view: View,
     optics: SceneMicroscope,
-    further: Option<Gaussian>,
+    /// The further spread of finished light, if there is any.
+    pub(super) further: Option<Gaussian>,
     restoration: Option<Gaussian>,
     groups: Vec<Group>,
     /// Where colours mix, if the light has any.
@@ -79,8 +76,11 @@ impl BrightFieldPath {
     ) -> Result<Self, Cause> {
         let scene = slide.scene;
         let groups = groups(slide, optics, lenses, threads)?;
-        let further = further(optics, scene.view.pixel_um)?;
-        let restores = scene.restoration.restore != Restore::Off && any_imaged(slide.phantoms);
+        let further = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
+        let further = (optics.extra_blur_um > 0.0).then(further).transpose();
+        let further = further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
+        let imaged = slide.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
+        let restores = scene.restoration.restore != Restore::Off && imaged;
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
         let restoration = restores.then(feather).transpose()?;
         Ok(Self {
@@ -107,10 +107,6 @@ impl BrightFieldPath {
     pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         let View { width, height, .. } = self.view;
         let Light { channels, lights, pictures, .. } = light;
-        for channel in channels.iter_mut() {
-            channel.clear();
-            channel.resize(width * height, 0.0);
-        }
         let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
         for group in &self.groups {
             lights.resize_with(group.lights.len(), optics_psf::Light::default);
@@ -121,8 +117,17 @@ impl BrightFieldPath {
             let absorbances = self.pass_group(slide, focus, group, lights, &mut passage.floored)?;
             let exact = self.optics.imaging == Imaging::Abbe;
             if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
+                // Light that was carried from slab to slab takes the place of products.
                 passage.floored = 0;
-                self.replace(slide, stage_um, group, lights)?;
+                let indices: Vec<usize> = (0..lights.len()).collect();
+                let images = threads::map(self.threads, &indices, |&light| {
+                    let ColouredLight { lens, shift_um, .. } = &group.lights[light];
+                    abbe::image(slide, &self.optics, lens, (&group.mixer, light), stage_um - shift_um)
+                });
+                for (light, image) in lights.iter_mut().zip(images) {
+                    light.clear();
+                    light.multiply(&image?, [0, 0]);
+                }
             }
             for (light, picture) in lights.iter().zip(pictures.iter_mut()) {
                 picture.resize(width * height, 0.0);
@@ -142,26 +147,6 @@ impl BrightFieldPath {
             }
         }
         Ok(passage)
-    }
-
-    /// Puts light that was carried from slab to slab in the place of products.
-    fn replace(
-        &self,
-        slide: Slide<'_>,
-        stage_um: f64,
-        group: &Group,
-        lights: &mut [optics_psf::Light],
-    ) -> Result<(), Cause> {
-        let indices: Vec<usize> = (0..lights.len()).collect();
-        let images = threads::map(self.threads, &indices, |&light| {
-            let ColouredLight { lens, shift_um, .. } = &group.lights[light];
-            abbe::image(slide, &self.optics, lens, (&group.mixer, light), stage_um - shift_um)
-        });
-        for (light, image) in lights.iter_mut().zip(images) {
-            light.clear();
-            light.multiply(&image?, [0, 0]);
-        }
-        Ok(())
     }
 
     /// How widely an object is blurred in a plane, as the standard deviation of its cone of light, px.
@@ -184,66 +169,50 @@ impl BrightFieldPath {
         floored: &mut usize,
     ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
-        let indices: Vec<usize> = (0..slide.phantoms.len()).collect();
-        // One thread multiplies a patch while it is still in the cache.
-        let chunk = match self.threads {
-            Threads::One => 1,
-            Threads::All => CHUNK,
-        };
-        for chunk in indices.chunks(chunk) {
-            let passed = threads::map(self.threads, chunk, |&index| self.image(slide, index, focus, group));
-            for (&index, passed) in chunk.iter().zip(passed) {
-                let Some(passed) = passed? else {
-                    for absorbances in &mut absorbances {
-                        absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
-                    }
-                    continue;
-                };
-                let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
-                let factors = passed.bench.factors.iter().zip(&passed.absorbances);
-                for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
-                    light.multiply(factor, at_px);
-                    *floored += factor.floored;
-                    absorbances.extend(own);
+        let image = |index: usize| self.image(slide, index, focus, group);
+        threads::each(self.threads, slide.phantoms.len(), image, |index, passed: Result<_, Cause>| {
+            let Some(passed) = passed? else {
+                for absorbances in &mut absorbances {
+                    absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
                 }
-                self.spare().push(passed.bench);
+                return Ok(());
+            };
+            let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
+            let factors = passed.bench.factors.iter().zip(&passed.absorbances);
+            for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
+                light.multiply(factor, at_px);
+                *floored += factor.floored;
+                absorbances.extend(own);
             }
-        }
+            self.spare().push(passed.bench);
+            Ok::<_, Cause>(())
+        })?;
         Ok(absorbances)
     }
 
-    /// Gives the light of each band of rows: B·(s + (1 − s)·∏), s the stray light.
-    pub(super) fn spread(&self, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
-        let Light { empty_log10, channels, empty, bands, scratch, .. } = light;
-        let (width, height) = (self.view.width, self.view.height);
-        bands.resize(channels.len(), Vec::new());
-        let reach = self.further.as_ref().map_or(0, Gaussian::radius);
-        let mut lit = 0;
-        for first in (0..height).step_by(BAND) {
-            let end = (first + BAND).min(height);
-            let needed = (end + reach).min(height);
-            if lit < needed {
-                let rows = lit * width..needed * width;
-                empty.clear();
-                empty.resize(rows.len(), 0.0);
-                exp10_from(&empty_log10[rows.clone()], empty);
-                for channel in channels.iter_mut() {
-                    illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
-                }
-                lit = needed;
-            }
-            for (whole, band) in channels.iter().zip(bands.iter_mut()) {
-                band.resize((end - first) * width, 0.0);
-                match &self.further {
-                    Some(gaussian) => {
-                        gaussian.blur_rows_into(whole, width, Border::Reflect, first, band, scratch);
-                    }
-                    None => band.copy_from_slice(&whole[first * width..end * width]),
-                }
-            }
-            let mut spread: Vec<&mut [f32]> = bands.iter_mut().map(Vec::as_mut_slice).collect();
-            visit(Band { first, sharp: &[], spread: &mut spread });
+    /// Makes of what objects let through light, in some rows: B·(s + (1 − s)·∏), s the stray light.
+    pub(super) fn illuminate(
+        &self,
+        channels: &mut [Vec<f32>],
+        rows: Range<usize>,
+        empty_log10: &[f32],
+        empty: &mut Vec<f32>,
+    ) {
+        empty.clear();
+        empty.resize(rows.len(), 0.0);
+        exp10_from(&empty_log10[rows.clone()], empty);
+        for channel in channels {
+            illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
         }
+    }
+
+    /// Pixels by which an object of that depth is spread where the stage stands.
+    pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Cause> {
+        let mut widest = 0;
+        for light in self.groups.iter().flat_map(|group| &group.lights) {
+            widest = widest.max(light.lens.imager.margin_px(depth_um, stage_um - light.shift_um)?);
+        }
+        Ok(widest)
     }
 
     /// How deep an object lies and how far the stage has travelled.
@@ -330,17 +299,6 @@ impl BrightFieldPath {
     }
 }
 
-/// The further spread of finished light, if there is any.
-pub(super) fn further(optics: &SceneMicroscope, pixel_um: f64) -> Result<Option<Gaussian>, Cause> {
-    let gaussian = || Gaussian::truncated(optics.extra_blur_um / pixel_um, Method::Direct, LOST_TAIL);
-    let further = (optics.extra_blur_um > 0.0).then(gaussian).transpose();
-    further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))
-}
-
-fn any_imaged(phantoms: &[Phantom]) -> bool {
-    phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged)
-}
-
 /// 1 where a tile is covered, 0 elsewhere.
 fn binary(coverage: &Tile) -> Tile {
     let values = coverage.values.iter().map(|share| if *share >= COVERED { 1.0 } else { 0.0 }).collect();
@@ -367,7 +325,6 @@ fn add_light(channel: &mut [f32], light: &[f32], weight: f32) {
     channel.iter_mut().zip(light).for_each(|(channel, light)| *channel += weight * light);
 }
 
-/// Makes of what objects let through light: B·(s + (1 − s)·T).
 #[multiversion(targets = "simd")]
 fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));

@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use portable_numerics::elementary::exp10_from;
 
 use crate::phantom::piece::{Phantom, Piece};
-use crate::phantom::tile::{Tile, lay_at};
+use crate::phantom::tile::{Tile, lay};
 use crate::truth::{COVERED, Part};
 
 /// How dyes become absorbance.
@@ -59,10 +59,6 @@ impl Window {
         };
         inside(0, self.width, width) && inside(1, self.height, height)
     }
-
-    fn samples(self) -> usize {
-        self.width * self.height
-    }
 }
 
 impl Mixer {
@@ -110,7 +106,7 @@ impl Mixer {
 
     /// Lets light through the pieces of an object.
     pub(super) fn compose(&self, pieces: &[Piece], window: Window, canvas: &mut Canvas) {
-        let samples = window.samples();
+        let samples = window.width * window.height;
         let Canvas { transmittance, phase_rad, amounts, zeros } = canvas;
         transmittance.resize(self.channels(), Vec::new());
         match self {
@@ -163,7 +159,7 @@ fn clear(values: &mut Vec<f32>, samples: usize) {
 /// Adds a tile, so many times as strong, to a rectangle.
 #[multiversion(targets = "simd")]
 pub(super) fn add(values: &mut [f32], window: Window, tile: &Tile, strength: f32) {
-    lay_at(values, window.width, window.origin, tile.as_ref(), |row, tile| {
+    lay(values, window.width, window.origin, tile, |row, tile| {
         row.iter_mut().zip(tile).for_each(|(value, tile)| *value += strength * tile);
     });
 }

@@ -1,12 +1,11 @@
 //! The lights of which a picture is made: one, those of three channels, or many single wavelengths.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use optics_psf::{MicroscopeParams, Zernike};
+use optics_psf::{Microscope, MicroscopeParams, PatchImager, Zernike};
 
+use super::Slide;
 use super::canvas::Mixer;
-use super::lenses::{Lens, Lenses};
-use super::passage::Slide;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
@@ -99,3 +98,39 @@ pub(super) fn groups(
 /// The two wavelengths between which the chromatic shift is told, µm.
 const GREEN_UM: f64 = 0.55;
 const RED_UM: f64 = 0.65;
+
+/// Microscopes that are remembered: a colour image needs three, one of single wavelengths sixteen.
+const REMEMBERED: usize = 20;
+
+/// All microscopes of an engine.
+#[derive(Debug, Default)]
+pub(crate) struct Lenses {
+    known: Mutex<Vec<Arc<Lens>>>,
+}
+
+/// One microscope in the light of one channel.
+#[derive(Debug)]
+pub(crate) struct Lens {
+    params: MicroscopeParams,
+    pub(crate) imager: PatchImager,
+}
+
+impl Lenses {
+    /// The microscope of these parameters.
+    pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, Cause> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let lens = match known.iter().position(|lens| lens.params == *params) {
+            Some(at) => known.remove(at),
+            None => {
+                let imager = PatchImager::new(&Microscope::new(params)?);
+                Arc::new(Lens { params: params.clone(), imager })
+            }
+        };
+        if known.len() == REMEMBERED {
+            known.remove(0);
+        }
+        // Those used last stand last.
+        known.push(Arc::clone(&lens));
+        Ok(lens)
+    }
+}

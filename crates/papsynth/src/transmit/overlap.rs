@@ -13,7 +13,7 @@ use optics_psf::{Gaussian, Method, Scratch};
 use super::canvas::{Window, add};
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
-use crate::phantom::tile::{Tile, TileRef, lay};
+use crate::phantom::tile::{Tile, lay};
 use crate::threads::{self, Threads};
 
 /// Absorbance below which an object changes no colour behind it.
@@ -40,9 +40,9 @@ struct Overlapping {
 
 /// An object's amounts of dye, and what they let through.
 struct Stained {
-    window: Window,
-    amounts: [Vec<f32>; DYES],
-    transmittance: [Vec<f32>; 3],
+    /// Without pixels where there is none of a dye.
+    amounts: [Tile; DYES],
+    transmittance: [Tile; 3],
 }
 
 /// Which objects are looked at.
@@ -102,6 +102,7 @@ impl Overlaps {
             return Ok(());
         }
         let pixels = self.width * self.height;
+        let whole = Window { origin: [0, 0], width: self.width, height: self.height };
         let mut layers = vec![0.0_f32; pixels];
         let mut totals: [Vec<f32>; DYES] = core::array::from_fn(|_| vec![0.0; pixels]);
         let mut products: [Vec<f32>; 3] = core::array::from_fn(|_| vec![1.0; pixels]);
@@ -110,14 +111,13 @@ impl Overlaps {
         });
         for stained in stained {
             let stained = stained?;
-            let tile = |values| TileRef { origin: stained.window.origin, width: stained.window.width, values };
-            for (total, amounts) in totals.iter_mut().zip(&stained.amounts).filter(|(_, amounts)| !amounts.is_empty()) {
-                sum(total, self.width, tile(amounts));
+            for (total, amounts) in totals.iter_mut().zip(&stained.amounts) {
+                add(total, whole, amounts, 1.0);
             }
             for (product, transmittance) in products.iter_mut().zip(&stained.transmittance) {
-                multiply(product, self.width, tile(transmittance));
+                multiply(product, self.width, transmittance);
             }
-            count(&mut layers, self.width, tile(&stained.transmittance[1]));
+            count(&mut layers, self.width, &stained.transmittance[1]);
         }
         let [h, e, l, o, n] = &totals;
         let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; self.width]);
@@ -148,17 +148,19 @@ impl Overlapping {
         };
         let window = Window::around(pieces.iter(), 1).expect("what overlaps has pixels");
         let samples = window.width * window.height;
-        let mut amounts: [Vec<f32>; DYES] = Default::default();
+        let blank = |samples| Tile { origin: window.origin, width: window.width, values: vec![0.0; samples] };
+        let mut amounts: [Tile; DYES] = core::array::from_fn(|_| blank(0));
         for (dye, amounts) in amounts.iter_mut().enumerate() {
             for (piece, tile) in phantom.pieces.iter().zip(pieces).filter(|(piece, _)| piece.dyes[dye] > 0.0) {
-                amounts.resize(samples, 0.0);
-                add(amounts, window, tile, piece.dyes[dye] as f32);
+                amounts.values.resize(samples, 0.0);
+                add(&mut amounts.values, window, tile, piece.dyes[dye] as f32);
             }
         }
-        let mut transmittance: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; samples]);
-        let ([h, e, l, o, n], [r, g, b]) = (&amounts, &mut transmittance);
-        colour.transmittance_into([h, e, l, o, n], [r, g, b]);
-        Ok(Stained { window, amounts, transmittance })
+        let mut transmittance: [Tile; 3] = core::array::from_fn(|_| blank(samples));
+        let [r, g, b] = &mut transmittance;
+        let light = [&mut r.values[..], &mut g.values, &mut b.values];
+        colour.transmittance_into(amounts.each_ref().map(|amounts| &amounts.values[..]), light);
+        Ok(Stained { amounts, transmittance })
     }
 }
 
@@ -185,19 +187,14 @@ fn spread(gaussian: &Gaussian, tile: &Tile) -> Tile {
 }
 
 #[multiversion(targets = "simd")]
-fn sum(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value));
-}
-
-#[multiversion(targets = "simd")]
-fn multiply(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
+fn multiply(image: &mut [f32], width: usize, tile: &Tile) {
+    lay(image, width, [0, 0], tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
 }
 
 /// Counts what is not empty.
 #[multiversion(targets = "simd")]
-fn count(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| {
+fn count(image: &mut [f32], width: usize, tile: &Tile) {
+    lay(image, width, [0, 0], tile, |row, values| {
         row.iter_mut().zip(values).for_each(|(layers, value)| *layers += if *value < 1.0 { 1.0 } else { 0.0 });
     });
 }

@@ -123,7 +123,6 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
         let strength = GRANULE * random::between(0.3, 1.5, rng);
         let reach = (3.0 * sigma).ceil();
-        #[expect(clippy::cast_possible_truncation, reason = "a few pixels round a place in a tile")]
         let span = |at: f64| ((at - reach) as i64).max(0)..(at + reach) as i64 + 1;
         let fall = |away: f64| libm::exp(-away * away / (2.0 * sigma * sigma));
         across.clear();

@@ -259,7 +259,6 @@ impl Strip {
 
 /// The whole numbers between two others, of those below a count.
 fn whole(low: f64, high: f64, count: usize) -> Range<usize> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to pixels of a tile")]
     let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
     clamped(low.ceil())..clamped(high.floor() + 1.0)
 }
