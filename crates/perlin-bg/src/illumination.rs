@@ -86,7 +86,8 @@ impl Shade {
                     rows: parabola(height, 0.0, y2, tilt[1]),
                     join: Join::Sum,
                 };
-                let lowest = f64::from(shade.lowest());
+                let smallest = |part: &[f32]| part.iter().copied().fold(f32::INFINITY, f32::min);
+                let lowest = f64::from(smallest(&shade.columns) + smallest(&shade.rows));
                 if lowest > 0.0 { Ok(shade) } else { Err(Error::DarkBowl { x2, y2, tilt, lowest }) }
             }
         }
@@ -100,31 +101,14 @@ impl Shade {
         self.rows.len()
     }
 
-    /// The smallest value in the field of view.
-    pub(crate) fn lowest(&self) -> f32 {
-        let smallest = |part: &[f32]| part.iter().copied().fold(f32::INFINITY, f32::min);
-        self.join.of(smallest(&self.columns), smallest(&self.rows))
-    }
-
     /// Part of a row of the field of view.
     pub(crate) fn row_into(&self, row: &mut [f32], first_column: usize, number: usize) {
         let from_row = self.rows[number];
         let columns = &self.columns[first_column..first_column + row.len()];
         // One loop a shape, so that the choice stands outside it.
         match self.join {
-            Join::Smaller => fill(row, columns, |column| Join::Smaller.of(column, from_row)),
-            Join::Sum => fill(row, columns, |column| Join::Sum.of(column, from_row)),
-        }
-    }
-}
-
-impl Join {
-    #[inline(always)]
-    fn of(self, column: f32, row: f32) -> f32 {
-        match self {
-            Self::Smaller if column < row => column,
-            Self::Smaller => row,
-            Self::Sum => column + row,
+            Join::Smaller => fill(row, columns, |column| if column < from_row { column } else { from_row }),
+            Join::Sum => fill(row, columns, |column| column + from_row),
         }
     }
 }
