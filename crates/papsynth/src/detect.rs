@@ -147,32 +147,39 @@ impl Detector {
         let mut expose = |channel: &Channel, electrons: &[f32], key, levels: &mut [u16]| {
             channel.camera.expose_window_marking(electrons, width, origin, key, levels, saturated);
         };
-        if let ([channel], [electrons]) = (&self.channels[..], electrons) {
-            expose(channel, electrons, keys[0], grey);
-            return;
+        match (&self.channels[..], electrons) {
+            ([channel], [electrons]) => expose(channel, electrons, keys[0], grey),
+            _ => self.develop(electrons.iter().map(|rows| &**rows), keys, levels, grey, expose),
         }
-        levels.resize(self.channels.len(), Vec::new());
-        for (((channel, electrons), key), levels) in
-            self.channels.iter().zip(electrons).zip(keys).zip(levels.iter_mut())
-        {
-            levels.resize(electrons.len(), 0);
-            expose(channel, electrons, *key, levels);
-        }
-        self.develop(levels, grey);
     }
 
     /// What can be done with a whole frame alone: charge that crosses rows.
     pub(crate) fn finish(&self, width: usize, keys: &[u64], grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
             let Developing { levels, saturated, frame, .. } = developing;
-            levels.resize(self.channels.len(), Vec::new());
-            for (((channel, electrons), key), levels) in
-                self.channels.iter().zip(frame).zip(keys).zip(levels.iter_mut())
-            {
-                levels.resize(electrons.len(), 0);
-                channel.camera.expose_frame(electrons, width, *key, levels, saturated);
-            }
-            self.develop(levels, grey);
+            self.develop(frame.iter().map(|rows| &rows[..]), keys, levels, grey, |channel, electrons, key, levels| {
+                channel.camera.expose_frame(electrons, width, key, levels, saturated);
+            });
+        }
+    }
+
+    /// Grey levels of all channels, side by side. `levels` is memory for those of each.
+    fn develop<'a>(
+        &self,
+        electrons: impl Iterator<Item = &'a [f32]>,
+        keys: &[u64],
+        levels: &mut Vec<Vec<u16>>,
+        grey: &mut [u16],
+        mut expose: impl FnMut(&Channel, &[f32], u64, &mut [u16]),
+    ) {
+        levels.resize(self.channels.len(), Vec::new());
+        for (((channel, electrons), key), levels) in self.channels.iter().zip(electrons).zip(keys).zip(&mut *levels) {
+            levels.resize(electrons.len(), 0);
+            expose(channel, electrons, *key, levels);
+        }
+        match &self.srgb {
+            Some(srgb) => srgb.render(levels, grey, |value| (value + 0.5).min(srgb.largest) as u16),
+            None => interleave(levels, grey),
         }
     }
 
@@ -186,13 +193,6 @@ impl Detector {
                 jpeg.rgb(&mut rgb, width);
                 grey.iter_mut().zip(&rgb).for_each(|(level, byte)| *level = u16::from(*byte));
             }
-        }
-    }
-
-    fn develop(&self, levels: &[Vec<u16>], grey: &mut [u16]) {
-        match &self.srgb {
-            Some(srgb) => srgb.render(levels, grey, |value| (value + 0.5).min(srgb.largest) as u16),
-            None => interleave(levels, grey),
         }
     }
 

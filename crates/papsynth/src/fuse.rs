@@ -193,47 +193,59 @@ mod tests {
     use crate::key::Key;
     use crate::random;
 
+    const WIDTH: usize = 320;
+
+    /// What is left of a camera's noise of a standard deviation, in levels of the first number of bits, on what was expected; and its
+    /// variance.
+    fn fused(expected: impl Fn(usize) -> f32, sd: f64, skew: f64, bits: [u32; 2]) -> (Vec<f64>, f64) {
+        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
+        let mut expected: Vec<f32> = (0..WIDTH * 300).map(expected).collect();
+        let noisy = |e: &f32| (f64::from(*e) + 0.5 + sd * random::normal(&mut rng)) as u16;
+        let mut grey: Vec<u16> = expected.iter().map(noisy).collect();
+        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: skew };
+        correlate(&mut grey, &mut expected, WIDTH, 1, &fusion, bits);
+        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
+        let variance = product(&noise, 0);
+        (noise, variance)
+    }
+
+    /// Mean product of noise and that so many pixels on.
+    fn product(noise: &[f64], step: usize) -> f64 {
+        let pairs = (0..noise.len() - step).filter(|i| step + 1 >= WIDTH || i % WIDTH + step < WIDTH);
+        let products: Vec<f64> = pairs.map(|i| noise[i] * noise[i + step]).collect();
+        products.iter().sum::<f64>() / products.len() as f64
+    }
+
     #[test]
     fn neighbours_share_as_much_noise_as_asked_and_its_variance_stays() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
-        let mut expected = vec![2000.0_f32; width * height];
-        let mut grey: Vec<u16> =
-            (0..width * height).map(|_| (2000.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
-        let noise: Vec<f64> = grey.iter().map(|g| f64::from(*g) - 2000.0).collect();
-        let product = |step: usize| {
-            let pairs = (0..noise.len() - step).filter(|i| step + 1 >= width || i % width + step < width);
-            let products: Vec<f64> = pairs.map(|i| noise[i] * noise[i + step]).collect();
-            products.iter().sum::<f64>() / products.len() as f64
-        };
-        let variance = product(0);
+        let (noise, variance) = fused(|_| 2000.0, 30.0, 0.02, [12, 12]);
         // Some 10⁵ pixels: a standard error of .003 for each.
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-        assert!((product(1) / variance - 0.2).abs() < 0.012, "{}", product(1) / variance);
-        assert!((product(width) / variance - 0.4).abs() < 0.012, "{}", product(width) / variance);
-        assert!((product(2) / variance - SECOND[0]).abs() < 0.012, "{}", product(2) / variance);
-        let skew = 0.5 * (product(width + 1) - product(width - 1)) / variance;
+        for (step, wanted) in [(1, 0.2), (WIDTH, 0.4), (2, SECOND[0])] {
+            let found = product(&noise, step) / variance;
+            assert!((found - wanted).abs() < 0.012, "{step}: {found}");
+        }
+        let skew = 0.5 * (product(&noise, WIDTH + 1) - product(&noise, WIDTH - 1)) / variance;
         assert!((skew - 0.02).abs() < 0.008, "{skew}");
     }
 
     #[test]
     fn where_there_is_structure_noise_is_the_cameras() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "noise");
-        // Waves of 1900 levels in noise of 15.
-        let mut expected: Vec<f32> =
-            (0..width * height).map(|i| 2000.0 + 1900.0 * libm::sin((i % width) as f64 * 0.7) as f32).collect();
-        let mut grey: Vec<u16> =
-            expected.iter().map(|e| (f64::from(*e) + 0.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
-        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
-        let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
-        let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64;
+        // Waves of 1900 levels.
+        let waves = |i| 2000.0 + 1900.0 * libm::sin((i % WIDTH) as f64 * 0.7) as f32;
+        let (noise, variance) = fused(waves, 30.0, 0.02, [12, 12]);
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-        assert!((down / variance).abs() < 0.03, "{}", down / variance);
+        let down = product(&noise, WIDTH) / variance;
+        assert!(down.abs() < 0.03, "{down}");
+    }
+
+    #[test]
+    fn faint_noise_is_shared_too() {
+        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
+        let (noise, variance) = fused(|_| 200.25 * 257.0, 0.9 * 257.0, 0.0, [16, 8]);
+        assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
+        let down = product(&noise, WIDTH) / variance;
+        assert!((down - 0.4).abs() < 0.03, "{down}");
     }
 
     #[test]
@@ -246,22 +258,5 @@ mod tests {
             assert!((deviation_below(most) - sd).abs() < 0.01, "{most}: {sd}");
         }
         assert!((deviation_below(6.0) - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn faint_noise_is_shared_too() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 6, index: 0 }.stream("test", 0, "noise");
-        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
-        let mut expected = vec![200.25 * 257.0_f32; width * height];
-        let mut grey: Vec<u16> =
-            expected.iter().map(|e| (f64::from(*e) + 0.9 * 257.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.0 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [16, 8]);
-        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
-        let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
-        let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64 / variance;
-        assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
-        assert!((down - 0.4).abs() < 0.03, "{down}");
     }
 }

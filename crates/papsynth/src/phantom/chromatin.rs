@@ -187,20 +187,13 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
             depth[y as usize * width + x as usize]
         }
     };
-    let relax = |depth: &mut Vec<f64>, x: i64, y: i64, neighbours: [(i64, i64, f64); 4]| {
-        let at = y as usize * width + x as usize;
-        for (dx, dy, step) in neighbours {
-            depth[at] = depth[at].min(get(depth, x + dx, y + dy) + step);
-        }
-    };
-    for y in 0..height as i64 {
-        for x in 0..width as i64 {
-            relax(&mut depth, x, y, [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, DIAGONAL), (1, -1, DIAGONAL)]);
-        }
-    }
-    for y in (0..height as i64).rev() {
-        for x in (0..width as i64).rev() {
-            relax(&mut depth, x, y, [(1, 0, 1.0), (0, 1, 1.0), (1, 1, DIAGONAL), (-1, 1, DIAGONAL)]);
+    for sign in [-1, 1] {
+        for at in 0..mask.len() {
+            let at = if sign < 0 { at } else { mask.len() - 1 - at };
+            let (x, y) = ((at % width) as i64, (at / width) as i64);
+            for (dx, dy, step) in [(1, 0, 1.0), (0, 1, 1.0), (1, 1, DIAGONAL), (-1, 1, DIAGONAL)] {
+                depth[at] = depth[at].min(get(&depth, x + sign * dx, y + sign * dy) + step);
+            }
         }
     }
     let deepest = depth.iter().fold(1.0_f64, |a, b| a.max(*b));

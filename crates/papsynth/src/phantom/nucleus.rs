@@ -98,16 +98,7 @@ pub(super) fn make(
     for _ in 0..nucleus.nucleoli {
         add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
     }
-    Ok(Piece {
-        part: Part::Nucleus,
-        absorbance,
-        coverage,
-        cover_step: 1,
-        area_px: area(&outline),
-        imaged,
-        dyes: nucleus.dyes,
-        phase_rad: 0.0,
-    })
+    Ok(Piece { part: Part::Nucleus, imaged, ..Piece::whole(absorbance, coverage, area(&outline), nucleus.dyes) })
 }
 
 /// Makes a part of a texture's variance coarse.
@@ -163,9 +154,8 @@ fn add_nucleolus(
     let share = random::between(0.0, 0.6, rng);
     let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
     let mut cover = absorbance.blank();
-    cover.cover(
-        &wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>(),
-    );
+    let round = wobbled_circle(radius, 0.08, 0.08, rng);
+    cover.cover(&round.iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
     for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
         *value += cover * (NUCLEOLUS * strength) as f32;
     }

@@ -32,6 +32,12 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// One that is no part of anything else, and does not refract.
+    pub(super) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
+        let (part, imaged) = (Part::Whole, false);
+        Self { part, absorbance, coverage, cover_step: 1, area_px, imaged, dyes, phase_rad: 0.0 }
+    }
+
     /// The share of each of the camera's pixels that its outline covers, with `n` grid points along a pixel.
     pub(crate) fn cover_of_pixels(&self, n: usize) -> Cow<'_, Tile> {
         match n / self.cover_step {
@@ -53,17 +59,7 @@ pub(crate) struct Phantom {
 impl Phantom {
     /// A phantom without parts of its own.
     pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
-        let piece = Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        };
-        Self { pieces: vec![piece], traits: Vec::new() }
+        Self { pieces: vec![Piece::whole(absorbance, coverage, area_px, dyes)], traits: Vec::new() }
     }
 
     /// The same, through which light comes late.
@@ -77,16 +73,7 @@ impl Phantom {
     /// The same with something in it that other dyes stain: it counts as part of the whole.
     pub(crate) fn stained(mut self, absorbance: Tile, dyes: Amounts) -> Self {
         let coverage = Tile { origin: absorbance.origin, width: 1, values: vec![0.0] };
-        self.pieces.push(Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px: 0.0,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        });
+        self.pieces.push(Piece::whole(absorbance, coverage, 0.0, dyes));
         self
     }
 }

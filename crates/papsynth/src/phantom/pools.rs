@@ -218,32 +218,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_look_reads_the_field_and_wraps() {
-        let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE) as f32).collect();
-        let pool = Pool::new(values);
-        let look = Look { origin: [510.25, 3.0], step: [1.0, 1.0] };
-        let mut seen = [0.0; 4];
-        pool.row_into(&mut seen, &look, [0.0, 0.0], &mut [0.0; SIDE + 1]);
-        assert_eq!(seen[0], 510.25);
-        assert_eq!(seen[1], 511.0 + 0.25 * (0.0 - 511.0), "between the last column and the first");
-        assert_eq!(seen[2], 0.25);
-        assert!((pool.quantile(0.5) - 256.0).abs() < 8.0);
-    }
-
-    #[test]
-    fn a_mirrored_look_reads_backwards_and_rows_follow_each_other() {
-        let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE + 1000 * (i / SIDE)) as f32).collect();
-        let pool = Pool::new(values);
-        let look = Look { origin: [1.5, 2.0], step: [-0.5, 0.25] };
-        let mut seen = [0.0; 3];
-        pool.row_into(&mut seen, &look, [1.0, 2.0], &mut [0.0; SIDE + 1]);
-        assert_eq!(seen, [2501.0, 2500.5, 2500.0]);
-    }
-
-    #[test]
     fn a_row_is_the_field_at_each_pixel_however_long_it_is() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
         let pool = Pool::new((0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect());
+        assert!((pool.quantile(0.25) - 0.25).abs() < 0.03);
         for (texel_px, times) in [(0.3, 1), (1.0, 4), (1.17, 1), (4.0, 1)] {
             for length in [1, 2, 60, 511, 512, 1400].repeat(times) {
                 let look = Look::new(texel_px, &mut rng);

@@ -305,13 +305,7 @@ pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, body: &CellBody, p
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn disc(centre: Point, radius: f64) -> Vec<Point> {
-        (0..200)
-            .map(|i| core::f64::consts::TAU * f64::from(i) / 200.0)
-            .map(|angle| [centre[0] + radius * libm::cos(angle), centre[1] + radius * libm::sin(angle)])
-            .collect()
-    }
+    use crate::phantom::tile::tests::disc;
 
     #[test]
     fn a_rim_thins_by_the_mean_of_the_cover_around() {

@@ -200,16 +200,8 @@ fn finish(
     let area_px = coverage.sum() * (step * step) as f64;
     let absorbance = absorbance.refined(step);
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(LEAST_ABSORBANCE);
-    let cytoplasm = Piece {
-        part: Part::Cytoplasm,
-        absorbance,
-        coverage,
-        cover_step: step,
-        area_px,
-        imaged: false,
-        dyes: body.dyes,
-        phase_rad,
-    };
+    let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
+    let cytoplasm = Piece { part: Part::Cytoplasm, cover_step: step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 
