@@ -24,8 +24,8 @@ const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1
 /// The camera of a scene.
 pub(crate) struct Detector {
     channels: Vec<Channel>,
-    /// Bits of the grey levels that are handed over.
-    bits: u32,
+    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
+    pub(crate) bits: u32,
     /// How colours are made of the channels, if they are.
     srgb: Option<Srgb>,
     jpeg: Option<Jpeg>,
@@ -112,11 +112,6 @@ impl Detector {
                 Ok(Self { channels, bits: handed_over, srgb, jpeg })
             }
         }
-    }
-
-    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
-    pub(crate) fn bits(&self) -> u32 {
-        self.bits
     }
 
     /// Light as a fraction of full scale becomes mean electrons.
@@ -218,14 +213,11 @@ impl Detector {
         }
     }
 
-    /// The grey level of a channel expected from a number of electrons.
-    pub(crate) fn expected_dn(&self, channel: usize, electrons: f64) -> f64 {
-        self.channels[channel].camera.expected_dn(electrons)
-    }
-
-    /// Standard deviation of the grey level of a pixel that expects this many electrons.
-    pub(crate) fn noise_dn(&self, channel: usize, electrons: f64) -> f64 {
-        self.channels[channel].camera.noise_dn(electrons)
+    /// How far a pixel of so many mean electrons stands out from what it would be with more light, relative to its noise.
+    pub(crate) fn contrast(&self, channel: usize, electrons: f64, without: f64) -> f64 {
+        let camera = &self.channels[channel].camera;
+        let noise_dn = camera.noise_dn(electrons).max(f64::MIN_POSITIVE);
+        (camera.expected_dn(without) - camera.expected_dn(electrons)) / noise_dn
     }
 }
 

@@ -27,7 +27,6 @@ pub struct Inputs {
 /// Makes images of one recipe and one model.
 #[derive(Debug)]
 pub struct Engine {
-    recipe: Recipe,
     model: Model,
     weight_map: Option<WeightMap>,
     studio: Studio,
@@ -51,7 +50,6 @@ impl Engine {
         let watch = Watch(inputs.profile.clone());
         let studio = Studio::new(recipe, model, watch).map_err(Error::Model)?;
         Ok(Self {
-            recipe: recipe.clone(),
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
             studio,
@@ -63,7 +61,7 @@ impl Engine {
     /// The recipe of this engine.
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
-        &self.recipe
+        &self.studio.recipe
     }
 
     /// Draws what lies on the slide.
@@ -71,7 +69,7 @@ impl Engine {
     /// # Errors
     /// If the layout has no room for what is asked.
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
-        self.studio.watch.time(Stage::Scene, || scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key))
+        self.studio.watch.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
     /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.

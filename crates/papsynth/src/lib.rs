@@ -19,7 +19,6 @@ mod phantom;
 pub mod profile;
 pub mod recipe;
 mod render;
-mod restore;
 pub mod scene;
 pub mod slide;
 mod threads;

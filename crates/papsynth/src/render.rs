@@ -1,15 +1,16 @@
 //! One scene on its way to an image: phantoms, masks, planes, truth.
 
+use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
 use crate::error::Cause;
 use crate::frame::{Finished, Plane};
 use crate::fuse;
-use crate::phantom::{self, Phantom, Studio};
+use crate::phantom::tile::lay;
+use crate::phantom::{self, Phantom, Piece, Studio};
 use crate::profile::{Stage, Watch};
 use crate::recipe::Restore;
-use crate::restore::{Feathered, restore};
 use crate::scene::{Body, Object, Scene, View};
 use crate::threads::{self, Threads};
 use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Slide};
@@ -29,13 +30,9 @@ pub(crate) struct Desk {
 pub(crate) struct Rendering {
     scene: Scene,
     phantoms: Vec<Phantom>,
-    /// Complete masks of every piece of every phantom.
-    masks: Vec<Vec<Mask>>,
-    /// The number of pixels that each would have without the image's border.
-    covered: Vec<Vec<u64>>,
     path: LightPath,
     /// The feathered mask C′ of the nuclei whose texture was taken from images, if any are to be restored.
-    feathered: Option<Feathered>,
+    feathered: Option<Vec<f32>>,
     detector: Detector,
     /// How detectable each piece is, plane by plane.
     detectability: Vec<Vec<f64>>,
@@ -64,15 +61,23 @@ impl Rendering {
             let moved = scene.objects.iter().zip(phantoms).map(|(object, phantom)| phantom.on_slide(object, view, n));
             phantoms = moved.collect();
         }
-        let (masks, covered) = watch.time(Stage::Masks, || masks(&scene, &phantoms, threads));
-        let slide = Slide { scene: &scene, phantoms: &phantoms, masks: &masks };
+        watch.time(Stage::Masks, || {
+            let (view, n) = (scene.view, scene.oversampling());
+            let mask = |piece: &Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);
+            let masks = threads::map(threads, &phantoms, |phantom| phantom.pieces.iter().map(mask).collect::<Vec<_>>());
+            let pieces = phantoms.iter_mut().flat_map(|phantom| &mut phantom.pieces);
+            for (piece, mask) in pieces.zip(masks.into_iter().flatten()) {
+                (piece.mask, piece.covered) = mask;
+            }
+        });
+        let slide = Slide { scene: &scene, phantoms: &phantoms };
         let path = watch.time(Stage::Light, || {
             desk.light.prepare(&scene)?;
             LightPath::new(slide, lenses, threads)
         })?;
-        let feathered = Feathered::new(&scene, &phantoms)?;
+        let feathered = feathered(&scene, &phantoms)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, masks, covered, path, feathered, detector, detectability: Vec::new(), watch })
+        Ok(Self { scene, phantoms, path, feathered, detector, detectability: Vec::new(), watch })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -94,7 +99,7 @@ impl Rendering {
         plane.noise_free.resize(samples, 0.0);
         let keys = self.camera_keys(stage_um);
         // Of every mask the runs that are still to come, and the electrons so far, channel by channel.
-        let mut runs: Vec<&[Run]> = self.masks.iter().flatten().map(Mask::runs).collect();
+        let mut runs: Vec<&[Run]> = self.pieces().map(|piece| piece.mask.runs()).collect();
         let mut electrons = vec![vec![0.0; runs.len()]; channels];
         let late = scene.restoration.restore == Restore::AfterDetection;
         self.watch.time(Stage::Camera, || {
@@ -120,12 +125,12 @@ impl Rendering {
                     }
                 }
                 if let (true, Some(feathered)) = (late, &self.feathered) {
-                    self.restore_finished(feathered, at, sharp, grey, noise_free, developing);
+                    self.restore_finished(&feathered[at..], sharp, grey, noise_free, developing);
                 }
             });
             self.detector.finish(view.width, &keys, &mut plane.grey, developing);
             if let Some(fusion) = &scene.fusion {
-                let bits = [self.detector.bits(), scene.camera.bits];
+                let bits = [self.detector.bits, scene.camera.bits];
                 fuse::correlate(&mut plane.grey, &mut plane.noise_free, view.width, channels, fusion, bits);
             }
             self.detector.compress(view.width, &mut plane.grey);
@@ -136,7 +141,11 @@ impl Rendering {
     }
 
     fn slide(&self) -> Slide<'_> {
-        Slide { scene: &self.scene, phantoms: &self.phantoms, masks: &self.masks }
+        Slide { scene: &self.scene, phantoms: &self.phantoms }
+    }
+
+    fn pieces(&self) -> impl Iterator<Item = &Piece> {
+        self.phantoms.iter().flat_map(|phantom| &phantom.pieces)
     }
 
     /// The keys of a plane's noise, one for each channel. They go by where the stage stands, to a millionth of a micrometre, so that
@@ -154,25 +163,17 @@ impl Rendering {
     /// level over its mask and Ā its mean absorbance there, both as they are in this plane. `electrons` are summed over
     /// the masks; both come channel by channel.
     fn detectabilities(&self, absorbances: &[Vec<f64>], electrons: &[Vec<f64>]) -> Vec<f64> {
-        let mut best = vec![f64::NEG_INFINITY; self.masks.iter().map(Vec::len).sum()];
+        let mut best = vec![f64::NEG_INFINITY; self.pieces().count()];
         for (channel, (absorbances, electrons)) in absorbances.iter().zip(electrons).enumerate() {
-            let pieces = self.masks.iter().flatten().zip(absorbances).zip(electrons);
-            for (best, ((mask, absorbance), sum)) in best.iter_mut().zip(pieces) {
-                *best = best.max(self.detectability(channel, mask, *absorbance, *sum));
+            for (((best, piece), absorbance), sum) in best.iter_mut().zip(self.pieces()).zip(absorbances).zip(electrons)
+            {
+                let area = piece.mask.area();
+                let mean = sum / area as f64;
+                let contrast = || self.detector.contrast(channel, mean, mean * libm::exp10(*absorbance));
+                *best = best.max(if area == 0 { 0.0 } else { contrast() });
             }
         }
         best
-    }
-
-    fn detectability(&self, channel: usize, mask: &Mask, absorbance: f64, electrons: f64) -> f64 {
-        let area = mask.area();
-        if area == 0 {
-            return 0.0;
-        }
-        let mean = electrons / area as f64;
-        let without = mean * libm::exp10(absorbance);
-        let dn = |electrons| self.detector.expected_dn(channel, electrons);
-        (dn(without) - dn(mean)) / self.detector.noise_dn(channel, mean).max(f64::MIN_POSITIVE)
     }
 
     /// The all-in-focus image and the truth.
@@ -230,49 +231,41 @@ impl Rendering {
         Ok(all_in_focus)
     }
 
-    /// Eq. 15 on light, for rows that start at pixel `first`, where the light of restored nuclei comes apart.
+    /// Eq. 15 on light, for rows that start at pixel `first`, where the light of restored nuclei comes apart:
+    /// I′ = I_sharp · C′ + I_spread · (1 − C′).
+    ///
+    /// # Differences from the paper
+    /// Eq. 15 as printed mixes the phantom image I_p, an absorbance, with the intensity I_f. What is restored here is the
+    /// light 10^(I_b − I_p) before the spread in the image plane, in the same unit as what it replaces.
     fn restore_light(&self, first: usize, sharp: &[f32], spread: &mut [&mut [f32]]) {
         let (Some(feathered), [spread]) = (&self.feathered, spread) else { return };
-        if sharp.is_empty() {
-            return;
-        }
-        for (span, shares) in feathered.within(first, spread.len()) {
-            restore(&mut spread[span.clone()], &sharp[span], shares);
+        for ((spread, sharp), share) in spread.iter_mut().zip(sharp).zip(&feathered[first..]) {
+            *spread += share * (sharp - *spread);
         }
     }
 
-    /// Eq. 15 on finished grey levels of rows that start at pixel `first`: restored nuclei carry no noise of this camera.
+    /// Eq. 15 on finished grey levels of rows: restored nuclei carry no noise of this camera.
     fn restore_finished(
         &self,
-        feathered: &Feathered,
-        first: usize,
+        shares: &[f32],
         sharp: &[f32],
         grey: &mut [u16],
         noise_free: &mut [f32],
         developing: &mut Developing,
     ) {
+        // As a camera without noise shows them. Without sharp light they were restored on their way here.
+        let mut clean = noise_free.to_vec();
+        if !sharp.is_empty() {
+            let mut electrons = sharp.to_vec();
+            self.detector.electrons(0, &mut electrons);
+            self.detector.mean_dn_into(&[&mut electrons], &mut clean, developing);
+        }
         let channels = self.scene.channels();
-        let (mut electrons, mut clean) = (Vec::new(), Vec::new());
-        for (span, shares) in feathered.within(first, grey.len() / channels) {
-            let levels = span.start * channels..span.end * channels;
-            // As a camera without noise shows them.
-            clean.resize(levels.len(), 0.0);
-            if sharp.is_empty() {
-                // They were restored on their way here.
-                clean.copy_from_slice(&noise_free[levels.clone()]);
-            } else {
-                electrons.clear();
-                electrons.extend_from_slice(&sharp[span]);
-                self.detector.electrons(0, &mut electrons);
-                self.detector.mean_dn_into(&[&mut electrons], &mut clean, developing);
-            }
-            let shares = shares.iter().flat_map(|share| core::iter::repeat_n(*share, channels));
-            let seen = grey[levels.clone()].iter_mut().zip(&mut noise_free[levels]);
-            for (((grey, noise_free), clean), share) in seen.zip(&clean).zip(shares) {
-                let blend = |seen: f32| seen + share * (clean - seen);
-                *noise_free = blend(*noise_free);
-                *grey = (blend(f32::from(*grey)) + 0.5) as u16;
-            }
+        let shares = shares.iter().flat_map(|share| core::iter::repeat_n(*share, channels));
+        for (((grey, noise_free), clean), share) in grey.iter_mut().zip(noise_free).zip(&clean).zip(shares) {
+            let blend = |seen: f32| seen + share * (clean - seen);
+            *noise_free = blend(*noise_free);
+            *grey = (blend(f32::from(*grey)) + 0.5) as u16;
         }
     }
 
@@ -288,11 +281,10 @@ impl Rendering {
         desk.ids.resize(width * height, 0);
         let mut objects = Vec::new();
         let mut number = 0;
-        let phantoms = self.scene.objects.iter().zip(&self.phantoms);
-        for ((object, phantom), (masks, covered)) in phantoms.zip(self.masks.iter().zip(&self.covered)) {
-            for ((piece, mask), covered) in phantom.pieces.iter().zip(masks).zip(covered) {
-                if !mask.is_empty() {
-                    objects.push(self.row(object, phantom, piece, mask, *covered, number));
+        for (object, phantom) in self.scene.objects.iter().zip(&self.phantoms) {
+            for piece in &phantom.pieces {
+                if !piece.mask.is_empty() {
+                    objects.push(self.row(object, phantom, piece, &piece.mask, piece.covered, number));
                 }
                 number += 1;
             }
@@ -319,7 +311,7 @@ impl Rendering {
         &self,
         object: &Object,
         phantom: &Phantom,
-        piece: &phantom::Piece,
+        piece: &Piece,
         mask: &Mask,
         covered: u64,
         number: usize,
@@ -363,16 +355,29 @@ impl Rendering {
     }
 }
 
-/// The complete masks of all pieces, and how many pixels each covers when those outside the image count too.
-fn masks(scene: &Scene, phantoms: &[Phantom], threads: Threads) -> (Vec<Vec<Mask>>, Vec<Vec<u64>>) {
-    let (view, n) = (scene.view, scene.oversampling());
-    let mask = |piece: &phantom::Piece| mask_of(piece, n, [0; 2], [view.width, view.height]);
-    let both = threads::map(threads, phantoms, |phantom| phantom.pieces.iter().map(mask).unzip());
-    both.into_iter().unzip()
+/// C′ = C ∗ G_σ, C being 1 on nuclei whose texture was taken from images and 0 elsewhere (Eq. 16). What was imaged once is not
+/// blurred again. Nothing if there are no such nuclei, or none is to be restored.
+fn feathered(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Vec<f32>>, Cause> {
+    let (View { width, height, pixel_um }, n) = (scene.view, scene.oversampling());
+    let imaged = || phantoms.iter().flat_map(|phantom| &phantom.pieces).filter(|piece| piece.imaged);
+    if scene.restoration.restore == Restore::Off || imaged().next().is_none() {
+        return Ok(None);
+    }
+    let mut mask = vec![0.0; width * height];
+    for piece in imaged() {
+        lay(&mut mask, width, [0, 0], &piece.cover_of_pixels(n), |row, shares| {
+            row.iter_mut().zip(shares).filter(|(_, s)| **s >= COVERED).for_each(|(pixel, _)| *pixel = 1.0);
+        });
+    }
+    let feather = Gaussian::new(scene.restoration.feather_um / pixel_um)?;
+    let mut shares = vec![0.0; mask.len()];
+    // Eq. 16: C ∗ G_σ.
+    feather.blur_rows_into(&mask, width, Border::Reflect, 0, &mut shares, &mut Scratch::default());
+    Ok(Some(shares))
 }
 
 /// The mask of a piece in an image of that size, which begins `origin_px` before the scene's; and its pixels inside and outside.
-fn mask_of(piece: &phantom::Piece, n: usize, origin_px: [i64; 2], [width, height]: [usize; 2]) -> (Mask, u64) {
+fn mask_of(piece: &Piece, n: usize, origin_px: [i64; 2], [width, height]: [usize; 2]) -> (Mask, u64) {
     let cover = piece.cover_of_pixels(n);
     let at = [0, 1].map(|axis| cover.origin[axis] + origin_px[axis]);
     let inside = |share: f32| share >= COVERED;

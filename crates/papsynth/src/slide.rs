@@ -106,7 +106,7 @@ impl<'a> Slide<'a> {
         let (population, mut empty) = Population::new(recipe, engine.model(), key).map_err(Error::Layout)?;
         empty.slide = number;
         empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
-        let nothing = transmit::Slide { scene: &empty, phantoms: &[], masks: &[] };
+        let nothing = transmit::Slide { scene: &empty, phantoms: &[] };
         let path = LightPath::new(nothing, engine.lenses(), Threads::One).map_err(Error::Layout)?;
         let border_px = path.picture_reach_px() as i64;
         let reach_px = recipe.scan.reach_um / empty.view.pixel_um;

@@ -5,8 +5,7 @@ use std::borrow::Cow;
 use dye_spectra::Amounts;
 
 use super::tile::Tile;
-use crate::truth::part::Part;
-use crate::truth::traits::Trait;
+use crate::truth::{Mask, Part, Trait};
 
 /// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.
 pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
@@ -29,13 +28,26 @@ pub(crate) struct Piece {
     pub(crate) dyes: Amounts,
     /// How late light comes, radians, where its absorbance is 1.
     pub(crate) phase_rad: f64,
+    /// Its complete mask in the image, once that is known, and the number of pixels it would have without the image's border.
+    pub(crate) mask: Mask,
+    pub(crate) covered: u64,
 }
 
 impl Piece {
     /// One that is no part of anything else, and does not refract.
     pub(super) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
-        let (part, imaged) = (Part::Whole, false);
-        Self { part, absorbance, coverage, cover_step: 1, area_px, imaged, dyes, phase_rad: 0.0 }
+        Self {
+            part: Part::Whole,
+            absorbance,
+            coverage,
+            cover_step: 1,
+            area_px,
+            imaged: false,
+            dyes,
+            phase_rad: 0.0,
+            mask: Mask::default(),
+            covered: 0,
+        }
     }
 
     /// The share of each of the camera's pixels that its outline covers, with `n` grid points along a pixel.

@@ -6,7 +6,6 @@ use optics_psf::{Abbe, AbbeParams, Factor, Lattice, Layer, Microscope, Source, f
 
 use super::Slide;
 use super::canvas::{Canvas, Mixer, Window};
-use super::lights::Lens;
 use crate::error::Cause;
 use crate::scene::{SceneMicroscope, View};
 
@@ -17,12 +16,11 @@ const DIFFRACTION_UM: f64 = 3.0;
 pub(super) fn image(
     slide: Slide<'_>,
     optics: &SceneMicroscope,
-    lens: &Lens,
+    microscope: &Microscope,
     light: (&Mixer, usize),
     stage_um: f64,
 ) -> Result<Factor, Cause> {
     let View { width, height, pixel_um } = slide.scene.grid();
-    let microscope = lens.imager.microscope();
     // Light that leaves on one side comes back on the other: so far apart that it does not reach the picture.
     let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
     let size = [width, height].map(|side| fast_length(side + 2 * margin));

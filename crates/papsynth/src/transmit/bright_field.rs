@@ -10,12 +10,12 @@ use portable_numerics::elementary::exp10_from;
 
 use super::canvas::{Canvas, Mixer, Window, add};
 use super::lights::{ColouredLight, Group, Lenses, groups};
-use super::overlap::{Meets, Overlaps};
+use super::overlap::Overlaps;
 use super::{FocusAt, Light, Passage, Slide, abbe};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Tile;
+use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
 use crate::threads::{self, Threads};
@@ -95,8 +95,8 @@ impl BrightFieldPath {
             overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. }).then(|| {
                 let view = scene.view;
                 // What overlaps beyond the border of a frame is not known in it.
-                let meets = if scene.frame.is_some() { Meets::All } else { Meets::Some };
-                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), meets, threads)
+                let all = scene.frame.is_some();
+                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), all, threads)
             }),
             groups,
             spare: Mutex::default(),
@@ -112,7 +112,7 @@ impl BrightFieldPath {
             lights.resize_with(group.lights.len(), optics_psf::Light::default);
             pictures.resize(group.lights.len(), Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
-                light.reset(of.lens.imager.microscope(), width, height);
+                light.reset(of.imager.microscope(), width, height);
             }
             let absorbances = self.pass_group(slide, focus, group, lights, &mut passage.floored)?;
             let exact = self.optics.imaging == Imaging::Abbe;
@@ -121,8 +121,8 @@ impl BrightFieldPath {
                 passage.floored = 0;
                 let indices: Vec<usize> = (0..lights.len()).collect();
                 let images = threads::map(self.threads, &indices, |&light| {
-                    let ColouredLight { lens, shift_um, .. } = &group.lights[light];
-                    abbe::image(slide, &self.optics, lens, (&group.mixer, light), stage_um - shift_um)
+                    let ColouredLight { imager, shift_um, .. } = &group.lights[light];
+                    abbe::image(slide, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
                 });
                 for (light, image) in lights.iter_mut().zip(images) {
                     light.clear();
@@ -153,7 +153,7 @@ impl BrightFieldPath {
     fn blur_px(&self, slide: Slide<'_>, index: usize, focus: FocusAt, group: &Group) -> f64 {
         let (FocusAt::Stage(plane_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
         let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
-        let microscope = light.lens.imager.microscope();
+        let microscope = light.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
         microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
     }
@@ -210,7 +210,7 @@ impl BrightFieldPath {
     pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Cause> {
         let mut widest = 0;
         for light in self.groups.iter().flat_map(|group| &group.lights) {
-            widest = widest.max(light.lens.imager.margin_px(depth_um, stage_um - light.shift_um)?);
+            widest = widest.max(light.imager.margin_px(depth_um, stage_um - light.shift_um)?);
         }
         Ok(widest)
     }
@@ -228,7 +228,7 @@ impl BrightFieldPath {
         let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
         let of_light = |light: &ColouredLight| {
             let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
-            light.lens.imager.focus(depth_um, stage_um)
+            light.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
         let n = self.optics.oversampling as usize;
@@ -256,7 +256,7 @@ impl BrightFieldPath {
         factors.resize_with(group.lights.len(), Factor::default);
         let lights = group.lights.iter().zip(&mut loaded.patches);
         for (factor, (focus, (light, patch))) in factors.iter_mut().zip(focuses.iter().zip(lights)) {
-            let imager = &light.lens.imager;
+            let imager = &light.imager;
             imager.expose(patch, focus, scratch, factor);
             if !loaded.restored.is_empty() {
                 let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
@@ -267,8 +267,8 @@ impl BrightFieldPath {
         }
         drop(kept);
         let absorbances = factors.iter().enumerate().map(|(light, factor)| {
-            let of_piece = |(mask, share): (&Mask, &f64)| share * mean_absorbance(mask, factor, window, n);
-            slide.masks[index].iter().zip(&group.shares[index][light]).map(of_piece).collect()
+            let of_piece = |(piece, share): (&Piece, &f64)| share * mean_absorbance(&piece.mask, factor, window, n);
+            phantom.pieces.iter().zip(&group.shares[index][light]).map(of_piece).collect()
         });
         let absorbances = absorbances.collect();
         Ok(Some(Passed { bench, window, absorbances }))
@@ -280,7 +280,7 @@ impl BrightFieldPath {
         loaded.patches.resize_with(group.lights.len(), Patch::default);
         let lights = group.lights.iter().zip(&canvas.transmittance);
         for ((light, transmittance), patch) in lights.zip(&mut loaded.patches) {
-            light.lens.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
+            light.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
         }
         loaded.restored.clear();
         let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);

@@ -13,7 +13,6 @@ use crate::phantom::piece::Piece;
 use crate::phantom::tile::Tile;
 use crate::scene::SceneLight;
 use crate::threads::{self, Threads};
-use crate::truth::Mask;
 
 /// Spread below which a Gaussian changes nothing that 16 bits could show, px.
 const SHARP_PX: f64 = 0.03;
@@ -85,8 +84,8 @@ impl GaussianPath {
                 }
             };
             let gaussian = self.blur(off_um)?;
-            let pieces = slide.phantoms[index].pieces.iter().zip(&slide.masks[index]);
-            Ok(pieces.map(|(piece, mask)| self.blur_piece(piece, mask, gaussian.as_ref())).collect::<Vec<_>>())
+            let pieces = slide.phantoms[index].pieces.iter();
+            Ok(pieces.map(|piece| self.blur_piece(piece, gaussian.as_ref())).collect::<Vec<_>>())
         };
         // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects whatever thread made them.
         threads::each(self.threads, slide.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
@@ -103,7 +102,7 @@ impl GaussianPath {
         Ok(Passage { absorbances: vec![absorbances], floored: 0 })
     }
 
-    fn blur_piece<'a>(&self, piece: &'a Piece, mask: &Mask, gaussian: Option<&Gaussian>) -> Blurred<'a> {
+    fn blur_piece<'a>(&self, piece: &'a Piece, gaussian: Option<&Gaussian>) -> Blurred<'a> {
         let tile = &piece.absorbance;
         let strength = dye_spectra::absorbance(&piece.dyes, self.wavelength_um) as f32;
         let margin = gaussian.map_or(0, Gaussian::radius);
@@ -123,7 +122,7 @@ impl GaussianPath {
                 Cow::Owned(Tile { origin, width, values })
             }
         };
-        let mean = sum_over(mask.runs(), &tile.values, width, origin) / (mask.area() as f64).max(1.0);
+        let mean = sum_over(piece.mask.runs(), &tile.values, width, origin) / (piece.mask.area() as f64).max(1.0);
         Blurred { tile: Some(tile), mean, strength }
     }
 

@@ -21,14 +21,14 @@ pub(super) struct Group {
 
 /// Light of one wavelength or of the band of one channel.
 pub(super) struct ColouredLight {
-    pub(super) lens: Arc<Lens>,
+    pub(super) imager: Arc<PatchImager>,
     /// Travel of the stage that this light needs beyond the others', µm.
     pub(super) shift_um: f64,
     /// Its share in each channel of the picture.
     pub(super) weights: Vec<f64>,
 }
 
-/// The lights of a scene, each with its lens.
+/// The lights of a scene, each with its microscope.
 pub(super) fn groups(
     slide: Slide<'_>,
     optics: &SceneMicroscope,
@@ -61,18 +61,16 @@ pub(super) fn groups(
     };
     match scene.light {
         SceneLight::Monochrome { wavelength_um, bandwidth_um } => {
-            let lens = lenses.get(&params(wavelength_um, bandwidth_um))?;
-            Ok(vec![group(
-                Mixer::Monochrome(wavelength_um),
-                vec![ColouredLight { lens, shift_um: 0.0, weights: vec![1.0] }],
-            )])
+            let imager = lenses.get(&params(wavelength_um, bandwidth_um))?;
+            let light = ColouredLight { imager, shift_um: 0.0, weights: vec![1.0] };
+            Ok(vec![group(Mixer::Monochrome(wavelength_um), vec![light])])
         }
         SceneLight::Colour { chromatic_um, mixing, lamp_k, .. } => {
             let colour = crate::detect::colour(lamp_k, mixing)?;
             let light = |wavelength_um: f64, bandwidth_um: f64, weights: Vec<f64>| {
-                let lens = lenses.get(&params(wavelength_um, bandwidth_um))?;
+                let imager = lenses.get(&params(wavelength_um, bandwidth_um))?;
                 let shift_um = chromatic_um * (wavelength_um - GREEN_UM) / (RED_UM - GREEN_UM);
-                Ok(ColouredLight { lens, shift_um, weights })
+                Ok(ColouredLight { imager, shift_um, weights })
             };
             let channels = colour.channels();
             if mixing == Mixing::PerWavelength {
@@ -102,35 +100,25 @@ const RED_UM: f64 = 0.65;
 /// Microscopes that are remembered: a colour image needs three, one of single wavelengths sixteen.
 const REMEMBERED: usize = 20;
 
-/// All microscopes of an engine.
+/// Microscopes that an engine met before, with everything that was computed for them.
 #[derive(Debug, Default)]
 pub(crate) struct Lenses {
-    known: Mutex<Vec<Arc<Lens>>>,
-}
-
-/// One microscope in the light of one channel.
-#[derive(Debug)]
-pub(crate) struct Lens {
-    params: MicroscopeParams,
-    pub(crate) imager: PatchImager,
+    known: Mutex<Vec<Arc<PatchImager>>>,
 }
 
 impl Lenses {
     /// The microscope of these parameters.
-    pub(crate) fn get(&self, params: &MicroscopeParams) -> Result<Arc<Lens>, Cause> {
+    fn get(&self, params: &MicroscopeParams) -> Result<Arc<PatchImager>, Cause> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let lens = match known.iter().position(|lens| lens.params == *params) {
+        let imager = match known.iter().position(|imager| imager.microscope().params() == params) {
             Some(at) => known.remove(at),
-            None => {
-                let imager = PatchImager::new(&Microscope::new(params)?);
-                Arc::new(Lens { params: params.clone(), imager })
-            }
+            None => Arc::new(PatchImager::new(&Microscope::new(params)?)),
         };
         if known.len() == REMEMBERED {
             known.remove(0);
         }
         // Those used last stand last.
-        known.push(Arc::clone(&lens));
-        Ok(lens)
+        known.push(Arc::clone(&imager));
+        Ok(imager)
     }
 }

@@ -16,10 +16,9 @@ use portable_numerics::elementary::exp10_from;
 use rand_core::Rng;
 
 use crate::error::Cause;
-use crate::phantom::piece::Phantom;
+use crate::phantom::Phantom;
 use crate::scene::{Scene, SceneIllumination, SceneOptics, View};
 use crate::threads::Threads;
-use crate::truth::Mask;
 
 use bright_field::BrightFieldPath;
 use gaussian::GaussianPath;
@@ -37,12 +36,11 @@ pub(crate) enum FocusAt {
     Everywhere,
 }
 
-/// What is imaged: a scene, its phantoms, and the complete masks of their pieces.
+/// What is imaged: a scene and its phantoms.
 #[derive(Clone, Copy)]
 pub(crate) struct Slide<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) phantoms: &'a [Phantom],
-    pub(crate) masks: &'a [Vec<Mask>],
 }
 
 /// Rows of the light of one channel of a plane, as fractions of full scale.

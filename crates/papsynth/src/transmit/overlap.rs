@@ -45,30 +45,22 @@ struct Stained {
     transmittance: [Tile; 3],
 }
 
-/// Which objects are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meets {
-    /// Those whose boxes meet another's.
-    Some,
-    /// All that are stained.
-    All,
-}
-
 impl Overlaps {
+    /// Of objects whose boxes meet another's or, if so told, of all that are stained.
     pub(super) fn new(
         phantoms: &[Phantom],
         width: usize,
         height: usize,
         n: usize,
-        which: Meets,
+        all: bool,
         threads: Threads,
     ) -> Self {
         let boxes: Vec<Option<Window>> =
-            phantoms.iter().map(|phantom| stained(phantom, width, height, n, which)).collect();
+            phantoms.iter().map(|phantom| stained(phantom, width, height, n, all)).collect();
         // Sorted by their left edges, only neighbours can meet.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
         order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
-        let mut meets: Vec<bool> = boxes.iter().map(|b| which == Meets::All && b.is_some()).collect();
+        let mut meets: Vec<bool> = boxes.iter().map(|b| all && b.is_some()).collect();
         for (at, &i) in order.iter().enumerate() {
             let Some(a) = boxes[i] else { continue };
             for &j in &order[at + 1..] {
@@ -165,13 +157,13 @@ impl Overlapping {
 }
 
 /// The camera's pixels over which an object is stained enough to matter.
-fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, which: Meets) -> Option<Window> {
+fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, all: bool) -> Option<Window> {
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
     let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
-    (which == Meets::All || window.meets(width * n, height * n, 0)).then_some(Window {
+    (all || window.meets(width * n, height * n, 0)).then_some(Window {
         origin: window.origin.map(|at| at / n as i64),
         width: window.width / n,
         height: window.height / n,
