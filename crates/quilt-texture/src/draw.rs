@@ -112,7 +112,7 @@ pub(crate) fn below_exp(u: f64, x: f64) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use portable_numerics::random::below;
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -146,6 +146,15 @@ mod tests {
         best.1
     }
 
+    /// Pearson's test of two rows of counts of as many draws.
+    pub(crate) fn assert_same_distribution(counts: &[[f64; 2]]) {
+        let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
+        let (chi_square, freedom) = (terms.clone().sum::<f64>(), terms.count() as f64 - 1.0);
+        assert!(freedom >= 2.0);
+        // The mean of the distribution and four standard deviations, a little more than 0.1 %.
+        assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{chi_square} of {freedom}");
+    }
+
     #[test]
     fn outcome_equals_that_of_tries_one_by_one() {
         const DRAWS: usize = 50_000;
@@ -170,11 +179,7 @@ mod tests {
                 let slow = slow(&costs, &weights, enough, least, tries, &mut rng);
                 counts[slow.unwrap_or(2 * LANES)][1] += 1.0;
             }
-            let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
-            let (chi_square, freedom) = (terms.clone().sum::<f64>(), terms.count() as f64 - 1.0);
-            assert!(freedom >= 2.0);
-            // The mean of the distribution and four standard deviations.
-            assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{enough} {tries}: {chi_square}, {freedom}");
+            assert_same_distribution(&counts);
         }
     }
 

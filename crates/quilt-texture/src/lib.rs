@@ -3,7 +3,6 @@
 
 mod candidates;
 mod canvas;
-mod distance;
 mod draw;
 mod error;
 #[cfg(feature = "image")]
@@ -11,14 +10,12 @@ mod interop;
 mod params;
 mod quilter;
 mod scan;
-mod seam;
 mod source;
 mod spectral;
-mod texture;
 
+pub use canvas::{Origin, Texture};
 pub use error::Error;
 pub use params::{Acceptance, CentreBias, QuiltParams, Seam, Search};
 pub use quilter::Quilter;
 pub use rand_core::Rng;
 pub use source::Source;
-pub use texture::{Origin, Texture};
