@@ -50,7 +50,10 @@ pub(crate) fn correlate(
     }
     // To first order this changes the correlation along the diagonals alone.
     let skew = (0.5 * fusion.noise_skew) as f32;
-    let clipped = Clipped::new(PLANE_NOISE * variance.sqrt());
+    // What is left of noise so many steps below the largest grey level, when planes are clipped there before they are fused.
+    let per_level = (STEPS as f64 / (REACH * (PLANE_NOISE * variance.sqrt()).max(1e-6))) as f32;
+    let remaining: [f32; STEPS + 1] =
+        core::array::from_fn(|step| deviation_below(REACH * step as f64 / STEPS as f64) as f32);
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let [above, below] = [-1, 1].map(|step| mirrored(y, step, height) * row);
         for (i, grey) in grey.iter_mut().enumerate() {
@@ -62,8 +65,8 @@ pub(crate) fn correlate(
             let rest = 1.0 - alone;
             // The pixel's own noise is a part of what it shares, so that variances do not simply add.
             let norm = (alone * alone + rest * rest + 2.0 * alone * rest * centre).sqrt();
-            let value =
-                clipped.rest(top - expected[at]) * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
+            let step = ((top - expected[at]).max(0.0) * per_level) as usize;
+            let value = remaining[step.min(STEPS)] * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
             *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
@@ -76,28 +79,9 @@ const HALF_ALONE: f64 = 15.0;
 /// Noise of a plane, relative to that of the picture it is fused to: fitted to how noise falls just below the largest grey level.
 const PLANE_NOISE: f64 = 2.0;
 
-/// What is left of noise when planes are clipped at the largest grey level before they are fused.
-struct Clipped {
-    per_level: f32,
-    rest: [f32; Self::STEPS + 1],
-}
-
-impl Clipped {
-    /// Steps of the table, and how far it reaches, in standard deviations.
-    const STEPS: usize = 64;
-    const REACH: f64 = 4.0;
-
-    fn new(plane_noise: f64) -> Self {
-        let rest = core::array::from_fn(|step| deviation_below(Self::REACH * step as f64 / Self::STEPS as f64) as f32);
-        Self { per_level: (Self::STEPS as f64 / (Self::REACH * plane_noise.max(1e-6))) as f32, rest }
-    }
-
-    /// The part of noise that is left so many levels below the largest.
-    fn rest(&self, below: f32) -> f32 {
-        let step = (below.max(0.0) * self.per_level) as usize;
-        self.rest[step.min(Self::STEPS)]
-    }
-}
+/// Steps of the table of what is left of clipped noise, and how far it reaches, in standard deviations.
+const STEPS: usize = 64;
+const REACH: f64 = 4.0;
 
 /// Standard deviation of the lesser of a normal deviate and `most`.
 fn deviation_below(most: f64) -> f64 {

@@ -4,8 +4,8 @@ use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
+use crate::engine::{Finished, Plane};
 use crate::error::Cause;
-use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::tile::lay;
 use crate::phantom::{self, Phantom, Piece, Studio};

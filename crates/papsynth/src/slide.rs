@@ -103,11 +103,11 @@ impl<'a> Slide<'a> {
             return Err(fail("optics.imaging", "\"abbe\" images whole fields; slides know \"product\"".to_owned()));
         }
         let key = Key { seed, index: number };
-        let (population, mut empty) = Population::new(recipe, engine.model(), key).map_err(Error::Layout)?;
+        let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
         empty.slide = number;
         empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
         let nothing = transmit::Slide { scene: &empty, phantoms: &[] };
-        let path = LightPath::new(nothing, engine.lenses(), Threads::One).map_err(Error::Layout)?;
+        let path = LightPath::new(nothing, &engine.lenses, Threads::One).map_err(Error::Layout)?;
         let border_px = path.picture_reach_px() as i64;
         let reach_px = recipe.scan.reach_um / empty.view.pixel_um;
         let most = (BEYOND - 1) as f64 * PLOT_PX as f64;

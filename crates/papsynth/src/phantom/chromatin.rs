@@ -23,7 +23,8 @@ const MEASURED_SIGMA_UM: f64 = 0.225;
 #[derive(Debug)]
 pub(crate) struct Donors {
     sources: Vec<Source>,
-    pixel_um: f64,
+    /// Size of their pixels, µm.
+    pub(crate) pixel_um: f64,
     /// Whether they were taken from images.
     pub(crate) imaged: bool,
     /// Factor from a standard deviation as imaged to one in the object plane.
@@ -75,24 +76,13 @@ impl Donors {
             choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
         let quilter = Quilter::new(&chosen, params)?;
         let grid = Grid::new(coverage, pixel_um / self.pixel_um);
-        let texture = quilter.synthesise(&grid.mask, grid.width, rng);
-        let mut pixels = grid.sample(&texture.pixels, coverage);
-        standardise(&mut pixels, &coverage.values);
-        Ok(pixels)
+        Ok(grid.sample(&quilter.synthesise(&grid.mask, grid.width, rng).pixels, coverage))
     }
 
     /// A texture for a nucleus that is a field of its own.
     pub(crate) fn field(&self, coverage: &Tile, pixel_um: f64, rng: &mut Stream) -> Vec<f32> {
         let grid = Grid::new(coverage, pixel_um / MADE_PIXEL_UM);
-        let texture = self.field.texture(&grid.mask, grid.width, rng);
-        let mut pixels = grid.sample(&texture, coverage);
-        standardise(&mut pixels, &coverage.values);
-        pixels
-    }
-
-    /// Size of the donors' pixels, µm.
-    pub(crate) fn pixel_um(&self) -> f64 {
-        self.pixel_um
+        grid.sample(&self.field.texture(&grid.mask, grid.width, rng), coverage)
     }
 }
 
@@ -269,27 +259,23 @@ impl Grid {
         Self { mask, width, ratio }
     }
 
-    /// The texture on the image's grid, by linear interpolation.
+    /// The texture on the image's grid, by linear interpolation, with mean 0 and variance 1 over the covered pixels.
     fn sample(&self, texture: &[f32], coverage: &Tile) -> Vec<f32> {
-        if self.ratio == 1.0 {
-            return texture.to_vec();
-        }
         let height = texture.len() / self.width;
-        let mut out = Vec::with_capacity(coverage.values.len());
-        for y in 0..coverage.height() {
-            for x in 0..coverage.width {
-                let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
-                let (x0, y0) =
-                    (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
-                let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
-                let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
-                let at = |x: usize, y: usize| texture[y * self.width + x];
-                let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
-                let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
-                out.push(upper + fy * (lower - upper));
-            }
+        let at = |x: usize, y: usize| texture[y * self.width + x];
+        let mut pixels = if self.ratio == 1.0 { texture.to_vec() } else { Vec::with_capacity(coverage.values.len()) };
+        for place in pixels.len()..coverage.values.len() {
+            let (x, y) = (place % coverage.width, place / coverage.width);
+            let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
+            let (x0, y0) = (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
+            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
+            let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
+            let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
+            let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
+            pixels.push(upper + fy * (lower - upper));
         }
-        out
+        standardise(&mut pixels, &coverage.values);
+        pixels
     }
 }
 

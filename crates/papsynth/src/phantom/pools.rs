@@ -24,9 +24,8 @@ const GRAIN_LENGTH: f64 = 1.6;
 /// What makes pools: plans and spectra, the same for every image.
 #[derive(Debug)]
 pub(crate) struct PoolMaker {
-    clouds: SpectralField,
-    flecks: SpectralField,
-    grain: SpectralField,
+    /// Of clouds, flecks and grain.
+    fields: [SpectralField; 3],
 }
 
 /// The fields of one image. All have mean 0, variance 1 and repeat after [`SIDE`] texels. Each is made when a cell
@@ -35,9 +34,7 @@ pub(crate) struct PoolMaker {
 pub(crate) struct Pools<'a> {
     maker: &'a PoolMaker,
     key: Key,
-    clouds: OnceLock<Pool>,
-    flecks: OnceLock<Pool>,
-    grain: OnceLock<Pool>,
+    drawn: [OnceLock<Pool>; 3],
 }
 
 /// A field that repeats.
@@ -68,39 +65,40 @@ const BETWEEN: f64 = 0.211_324_865_405_187_1;
 
 impl PoolMaker {
     pub(crate) fn new() -> Self {
-        let maker = |spectrum| {
+        let spectra = [
+            Spectrum::Gaussian { sigma_px: CLOUD_SIGMA },
+            Spectrum::BROWNIAN,
+            Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH },
+        ];
+        let fields = spectra.map(|spectrum| {
             let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
             SpectralField::new(&params).expect("pools of this size can be planned")
-        };
-        Self {
-            clouds: maker(Spectrum::Gaussian { sigma_px: CLOUD_SIGMA }),
-            flecks: maker(Spectrum::BROWNIAN),
-            grain: maker(Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH }),
-        }
+        });
+        Self { fields }
     }
 
     /// The pools of an image.
     pub(crate) fn make(&self, key: Key) -> Pools<'_> {
-        let (clouds, flecks, grain) = Default::default();
-        Pools { maker: self, key, clouds, flecks, grain }
+        Pools { maker: self, key, drawn: Default::default() }
     }
 }
 
 impl Pools<'_> {
     pub(crate) fn clouds(&self) -> &Pool {
-        self.clouds.get_or_init(|| self.draw(&self.maker.clouds, "pool.clouds"))
+        self.pool(0, "pool.clouds")
     }
 
     pub(crate) fn flecks(&self) -> &Pool {
-        self.flecks.get_or_init(|| self.draw(&self.maker.flecks, "pool.flecks"))
+        self.pool(1, "pool.flecks")
     }
 
     pub(crate) fn grain(&self) -> &Pool {
-        self.grain.get_or_init(|| self.draw(&self.maker.grain, "pool.grain"))
+        self.pool(2, "pool.grain")
     }
 
-    fn draw(&self, field: &SpectralField, purpose: &str) -> Pool {
-        Pool::new(field.draw(&mut self.key.stream("field", 0, purpose)))
+    fn pool(&self, which: usize, purpose: &str) -> &Pool {
+        self.drawn[which]
+            .get_or_init(|| Pool::new(self.maker.fields[which].draw(&mut self.key.stream("field", 0, purpose))))
     }
 }
 

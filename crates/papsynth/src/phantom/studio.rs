@@ -114,7 +114,7 @@ impl ClassStudio {
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
         let donors = Donors::new(name, &class.nucleus, &nucleus)?;
-        let quilt = quilt(recipe, class, donors.pixel_um());
+        let quilt = quilt(recipe, class, donors.pixel_um);
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
     }
 }

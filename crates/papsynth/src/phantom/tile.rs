@@ -1,5 +1,6 @@
 //! Small images at a place of the large one, and exact coverage of polygons.
 
+use core::ops::Range;
 use std::borrow::Cow;
 
 use ab_glyph_rasterizer::{Rasterizer, point};
@@ -94,33 +95,24 @@ impl Tile {
 
     /// The sum of its values where another tile's, whose pixels are `step` times as wide, are at least so high.
     pub(crate) fn sum_where(&self, other: &Self, step: usize, least: f32) -> f64 {
-        let side = step as i64;
-        let low = [0, 1].map(|axis| self.origin[axis].max(side * other.origin[axis]));
-        let other_size = [other.width, other.height()].map(|length| length as i64);
-        let size = [self.width, self.height()].map(|length| length as i64);
-        let end = |axis: usize| {
-            (self.origin[axis] + size[axis]).min(side * (other.origin[axis] + other_size[axis])).max(low[axis])
-        };
-        let place = |at: i64, origin: i64| usize::try_from(at - origin).unwrap_or(0);
-        let columns = place(end(0), low[0]);
-        if columns == 0 {
+        let start = other.origin.map(|at| at * step as i64);
+        let (columns, others) = shared(self.origin[0], self.width, start[0], other.width * step);
+        let (rows, other_rows) = shared(self.origin[1], self.height(), start[1], other.height() * step);
+        if columns.is_empty() {
             return 0.0;
         }
-        // Pixels of the other tile that the columns begin and end in, and how far into the first.
-        let first = low[0].div_euclid(side);
-        let (from, skip) = (place(first, other.origin[0]), place(low[0], side * first));
-        let count = (skip + columns).div_ceil(step);
-        let mut line = vec![0.0; count * step];
+        // Pixels of the other tile that the columns begin and end in.
+        let wide = others.start / step..others.end.div_ceil(step);
+        let mut line = vec![0.0; wide.len() * step];
         let mut known = None;
         let mut sum = 0.0;
-        for y in low[1]..end(1) {
-            let row = place(y.div_euclid(side), other.origin[1]);
-            if known != Some(row) {
-                repeat_each(&mut line, &other.values[row * other.width + from..][..count], step);
-                known = Some(row);
+        for (y, other_y) in rows.zip(other_rows) {
+            let row = other_y / step;
+            if known.replace(row) != Some(row) {
+                repeat_each(&mut line, &other.values[row * other.width..][wide.clone()], step);
             }
-            let values = &self.values[place(y, self.origin[1]) * self.width + place(low[0], self.origin[0])..];
-            sum += sum_where(&values[..columns], &line[skip..], least);
+            let values = &self.values[y * self.width..][columns.clone()];
+            sum += sum_where(values, &line[others.start - wide.start * step..], least);
         }
         sum
     }
@@ -366,18 +358,23 @@ pub(crate) fn lay(
     tile: &Tile,
     mut blend: impl FnMut(&mut [f32], &[f32]),
 ) {
-    let [left, top] = [tile.origin[0] - origin[0], tile.origin[1] - origin[1]];
-    let column = |x: i64| usize::try_from(x).unwrap_or(0).min(tile.width);
-    let (from, to) = (column(-left), column(width as i64 - left));
-    if from >= to {
+    let (columns, own) = shared(origin[0], width, tile.origin[0], tile.width);
+    if columns.is_empty() {
         return;
     }
-    let x = usize::try_from(left).unwrap_or(0);
-    let hidden = usize::try_from(-top).unwrap_or(0);
-    let rows = image.chunks_exact_mut(width).skip(usize::try_from(top).unwrap_or(0));
-    for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(hidden)) {
-        blend(&mut row[x..x + to - from], &values[from..to]);
+    let (rows, own_rows) = shared(origin[1], image.len() / width, tile.origin[1], tile.height());
+    let rows = image.chunks_exact_mut(width).skip(rows.start);
+    for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(own_rows.start)) {
+        blend(&mut row[columns.clone()], &values[own.clone()]);
     }
+}
+
+/// What two stretches of pixels, told by their first pixels and lengths, have in common: as each counts it.
+fn shared(first: i64, length: usize, other: i64, other_length: usize) -> (Range<usize>, Range<usize>) {
+    let low = first.max(other);
+    let high = (first + length as i64).min(other + other_length as i64).max(low);
+    let from = |first: i64| (low - first) as usize..(high - first) as usize;
+    (from(first), from(other))
 }
 
 /// A polygon as many times as large about a point.

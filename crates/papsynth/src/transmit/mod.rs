@@ -3,7 +3,6 @@
 //! Two ways lead there, as the scene's optics say: [`bright_field`], partially coherent bright field, object by object;
 //! [`gaussian`], the paper's Gaussians on the absorbance. Both give the light of a plane in bands of rows.
 
-mod abbe;
 mod bright_field;
 mod canvas;
 mod gaussian;
