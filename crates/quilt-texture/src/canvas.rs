@@ -22,6 +22,18 @@ pub struct Origin {
     pub pixel: usize,
 }
 
+#[cfg(feature = "image")]
+impl From<Texture> for image::ImageBuffer<image::Luma<f32>, Vec<f32>> {
+    /// # Panics
+    ///
+    /// If `width` was changed so that it no longer divides the number of pixels.
+    fn from(texture: Texture) -> Self {
+        let [width, height] = [texture.width, texture.pixels.len() / texture.width]
+            .map(|side| u32::try_from(side).expect("sides are far below 2^32"));
+        Self::from_raw(width, height, texture.pixels).expect("whole rows")
+    }
+}
+
 /// The texture while it is being stitched: whole patches, cut to size at the end.
 pub(crate) struct Canvas {
     patch: usize,
@@ -170,21 +182,16 @@ impl Canvas {
                     let d = self.pixels[i] - source.pixels[place + y * source.stride() + x];
                     if self.wanted[i] && self.origins[i].is_some() { d * d } else { 0.0 }
                 };
-                let strip = || (0..patch).flat_map(|along| (0..overlap).map(move |across| (along, across)));
-                if left {
+                for (_, turned) in [(left, false), (above, true)].into_iter().filter(|(meets, _)| *meets) {
+                    let place = |along, across| if turned { (along, across) } else { (across, along) };
+                    let strip = (0..patch).flat_map(|along| (0..overlap).map(move |across| place(along, across)));
                     joint.errors.clear();
-                    joint.errors.extend(strip().map(|(y, x)| error(x, y)));
+                    joint.errors.extend(strip.map(|(x, y)| error(x, y)));
                     min_cut(&mut joint.errors, overlap, &mut joint.path);
-                    for (y, &cut) in joint.path.iter().enumerate() {
-                        weights[y * patch..][..cut].fill(0.0);
-                    }
-                }
-                if above {
-                    joint.errors.clear();
-                    joint.errors.extend(strip().map(|(x, y)| error(x, y)));
-                    min_cut(&mut joint.errors, overlap, &mut joint.path);
-                    for (x, &cut) in joint.path.iter().enumerate() {
-                        (0..cut).for_each(|y| weights[y * patch + x] = 0.0);
+                    for (along, &cut) in joint.path.iter().enumerate() {
+                        for (x, y) in (0..cut).map(|across| place(along, across)) {
+                            weights[y * patch + x] = 0.0;
+                        }
                     }
                 }
                 if feather_px > 0 {

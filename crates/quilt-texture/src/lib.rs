@@ -1,12 +1,9 @@
 #![doc = include_str!("../README.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-mod candidates;
 mod canvas;
 mod draw;
 mod error;
-#[cfg(feature = "image")]
-mod interop;
 mod params;
 mod quilter;
 mod scan;

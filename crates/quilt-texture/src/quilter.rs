@@ -1,10 +1,9 @@
 use portable_numerics::random::{below, uniform};
 use rand_core::Rng;
 
-use crate::candidates::Candidates;
 use crate::canvas::{Canvas, Texture};
 use crate::draw::{below_exp, exp_below, outcome_of_tries, slots_between};
-use crate::scan::{Laid, Template, Tolerance, scan};
+use crate::scan::{Candidates, Laid, Template, Tolerance, scan};
 use crate::source::{COVERED, LANES, centrality};
 use crate::spectral::Spectral;
 use crate::{Acceptance, CentreBias, Error, QuiltParams, Search, Source};

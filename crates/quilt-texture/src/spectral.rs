@@ -1,8 +1,7 @@
 use num_complex::Complex64;
 use portable_numerics::fourier::{ComplexPlane, PlaneScratch};
 
-use crate::candidates::Candidates;
-use crate::scan::Template;
+use crate::scan::{Candidates, Template};
 use crate::source::LANES;
 use crate::{QuiltParams, Source};
 

@@ -4,15 +4,13 @@
 
 mod error;
 mod field;
-#[cfg(feature = "noise")]
-mod interop;
 mod params;
 mod spectrum;
 
 pub use error::Error;
-pub use field::SpectralField;
 #[cfg(feature = "noise")]
-pub use interop::DrawnField;
+pub use field::DrawnField;
+pub use field::SpectralField;
 pub use params::{FieldParams, Padding};
 pub use rand_core::Rng;
 pub use spectrum::Spectrum;

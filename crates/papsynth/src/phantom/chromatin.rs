@@ -25,7 +25,6 @@ pub(crate) struct Donors {
     sources: Vec<Source>,
     /// Size of their pixels, µm.
     pub(crate) pixel_um: f64,
-    /// Whether they were taken from images.
     pub(crate) imaged: bool,
     /// Factor from a standard deviation as imaged to one in the object plane.
     pub(crate) sharpening: f64,

@@ -33,7 +33,6 @@ const WRINKLE: f64 = 0.075;
 /// Part of the softened edge that may be cut off.
 const EDGE_LOST: f64 = 1e-3;
 
-/// Makes the nucleus of a cell.
 pub(super) fn make(
     studio: &Studio,
     class: &ClassStudio,

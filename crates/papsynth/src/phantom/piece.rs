@@ -13,7 +13,6 @@ pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
 /// A part of an object, in its own tile.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    /// Which part it is.
     pub(crate) part: Part,
     /// What it absorbs along the light's path when it is in focus, decadic.
     pub(crate) absorbance: Tile,

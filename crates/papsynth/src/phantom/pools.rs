@@ -77,7 +77,6 @@ impl PoolMaker {
         Self { fields }
     }
 
-    /// The pools of an image.
     pub(crate) fn make(&self, key: Key) -> Pools<'_> {
         Pools { maker: self, key, drawn: Default::default() }
     }

@@ -18,7 +18,6 @@ use crate::profile::Watch;
 use crate::random;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
 
-/// Everything that phantoms are made with.
 #[derive(Debug)]
 pub(crate) struct Studio {
     pub(crate) recipe: Recipe,
@@ -62,10 +61,15 @@ impl Studio {
         for name in recipe.cells.keys() {
             classes.insert(name.clone(), ClassStudio::new(name, model.class(name)?, recipe)?);
         }
+        let cloth = match recipe.cytoplasm.sheet {
+            Sheet::Flat => None,
+            Sheet::Verlet => Some(ClothParams::paper()),
+            Sheet::Xpbd => Some(ClothParams::default()),
+        };
         Ok(Self {
             recipe: recipe.clone(),
             classes,
-            cloth: cloth(recipe),
+            cloth: cloth.map(|params| Cloth::new(&params).expect("the cloths that ship are valid")),
             cytoskeletons: Cytoskeletons::new(),
             pools: PoolMaker::new(),
             watch,
@@ -90,15 +94,6 @@ impl Cytoskeletons {
         });
         Ok(self.skeleton.grow_from(torus, outline, rng)?)
     }
-}
-
-fn cloth(recipe: &Recipe) -> Option<Cloth> {
-    let params = match recipe.cytoplasm.sheet {
-        Sheet::Flat => return None,
-        Sheet::Verlet => ClothParams::paper(),
-        Sheet::Xpbd => ClothParams::default(),
-    };
-    Some(Cloth::new(&params).expect("the cloths that ship are valid"))
 }
 
 impl ClassStudio {

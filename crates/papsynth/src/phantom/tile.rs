@@ -292,7 +292,6 @@ fn repeat_each(fine: &mut [f32], row: &[f32], n: usize) {
     }
 }
 
-/// Each value of a row `N` times.
 #[multiversion(targets = "simd")]
 fn repeat<const N: usize>(fine: &mut [f32], row: &[f32]) {
     fine.as_chunks_mut::<N>().0.iter_mut().zip(row).for_each(|(fine, value)| *fine = [*value; N]);

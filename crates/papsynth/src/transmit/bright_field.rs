@@ -21,7 +21,7 @@ use crate::error::Cause;
 use crate::phantom::tile::Tile;
 use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
-use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
+use crate::scene::{SceneLight, SceneMicroscope, View};
 use crate::threads::{self, Threads};
 use crate::truth::{COVERED, Mask, Run};
 
@@ -219,19 +219,19 @@ impl BrightFieldPath {
         Ok(widest)
     }
 
-    /// How deep an object lies and how far the stage has travelled.
-    fn place(scene: &Scene, depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
-        match focus {
-            FocusAt::Everywhere => [0.0, 0.0],
-            FocusAt::Stage(plane_um) => [depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
-        }
-    }
-
     /// Images an object; nothing if none of its light reaches the picture.
     fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, Cause> {
         let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
+        // How deep it lies and how far the stage has travelled.
+        let place = |light: &ColouredLight| match at {
+            FocusAt::Everywhere => (0.0, 0.0),
+            FocusAt::Stage(plane_um) => {
+                let depth_um = object.depth_um;
+                (depth_um, slide.scene.seen_at_um(plane_um, depth_um) - light.shift_um)
+            }
+        };
         let of_light = |light: &ColouredLight| {
-            let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
+            let (depth_um, stage_um) = place(light);
             light.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
@@ -263,7 +263,7 @@ impl BrightFieldPath {
             let imager = &light.imager;
             imager.expose(patch, focus, scratch, factor);
             if !loaded.restored.is_empty() {
-                let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
+                let (depth_um, stage_um) = place(light);
                 let focus = imager.refocus(depth_um, stage_um)?;
                 imager.expose(patch, &focus, scratch, again);
                 restore(factor, again, &loaded.restored, window, n);
@@ -278,7 +278,6 @@ impl BrightFieldPath {
         Ok(Some(Passed { bench, window, absorbances }))
     }
 
-    /// Makes an object ready to be imaged.
     fn load(&self, phantom: &Phantom, group: &Group, window: Window, canvas: &mut Canvas, loaded: &mut Loaded) {
         group.mixer.compose(&phantom.pieces, window, canvas);
         loaded.patches.resize_with(group.lights.len(), Patch::default);

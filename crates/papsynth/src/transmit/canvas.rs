@@ -2,6 +2,7 @@
 
 use dye_spectra::{Amounts, Colour, DYES};
 use multiversion::multiversion;
+use optics_psf::{Gaussian, Scratch};
 use portable_numerics::elementary::exp10_from;
 
 use crate::phantom::piece::{Phantom, Piece};
@@ -24,7 +25,6 @@ pub(super) struct Window {
     pub(super) height: usize,
 }
 
-/// An object on its rectangle.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     /// Light that comes through, 0 to 1, channel by channel.
@@ -162,4 +162,13 @@ pub(super) fn add(values: &mut [f32], window: Window, tile: &Tile, strength: f32
     lay(values, window.width, window.origin, tile, |row, tile| {
         row.iter_mut().zip(tile).for_each(|(value, tile)| *value += strength * tile);
     });
+}
+
+/// A tile that is blurred and as much larger, in memory of another one.
+pub(super) fn blurred(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32>, scratch: &mut Scratch) -> Tile {
+    let margin = gaussian.radius();
+    let width = tile.width + 2 * margin;
+    values.resize(width * (tile.height() + 2 * margin), 0.0);
+    gaussian.spread_into(&tile.values, tile.width, &mut values, scratch);
+    Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
 }

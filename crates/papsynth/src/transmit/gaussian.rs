@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::canvas::{Window, add};
+use super::canvas::{Window, add, blurred};
 use super::{FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
@@ -114,12 +114,11 @@ impl GaussianPath {
         let tile = match gaussian {
             None => Cow::Borrowed(tile),
             Some(gaussian) => {
-                let mut values = self.spare().tiles.pop().unwrap_or_default();
+                let values = self.spare().tiles.pop().unwrap_or_default();
                 let mut scratch = self.spare().scratches.pop().unwrap_or_default();
-                values.resize(width * height, 0.0);
-                gaussian.spread_into(&tile.values, tile.width, &mut values, &mut scratch);
+                let tile = blurred(tile, gaussian, values, &mut scratch);
                 self.spare().scratches.push(scratch);
-                Cow::Owned(Tile { origin, width, values })
+                Cow::Owned(tile)
             }
         };
         let mean = sum_over(piece.mask.runs(), &tile.values, width, origin) / (piece.mask.area() as f64).max(1.0);

@@ -10,7 +10,7 @@ use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::canvas::{Window, add};
+use super::canvas::{Window, add, blurred};
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, lay};
@@ -130,11 +130,12 @@ impl Overlaps {
 
 impl Overlapping {
     fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, Cause> {
-        let blurred;
+        let spread;
         let pieces = if blur_px > SHARP_PX {
             let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL)?;
-            blurred = self.pieces.iter().map(|tile| spread(&gaussian, tile)).collect::<Vec<_>>();
-            &blurred
+            let tiles = self.pieces.iter().map(|tile| blurred(tile, &gaussian, Vec::new(), &mut Scratch::default()));
+            spread = tiles.collect::<Vec<_>>();
+            &spread
         } else {
             &self.pieces
         };
@@ -168,14 +169,6 @@ fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, all: bool) 
         width: window.width / n,
         height: window.height / n,
     })
-}
-
-fn spread(gaussian: &Gaussian, tile: &Tile) -> Tile {
-    let margin = gaussian.radius();
-    let width = tile.width + 2 * margin;
-    let mut values = vec![0.0; width * (tile.height() + 2 * margin)];
-    gaussian.spread_into(&tile.values, tile.width, &mut values, &mut Scratch::default());
-    Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
 }
 
 #[multiversion(targets = "simd")]

@@ -48,18 +48,6 @@ fn bound_is_the_sum_of_amplitudes() {
 }
 
 #[test]
-fn variance_is_the_sum_of_squared_amplitudes() {
-    let noise = fractal(4, 0.5);
-    let mut image = vec![0.0; 2048 * 2048];
-    noise.add_into(&mut image, 2048, &Window::with_cell_px(16.0), 1.0);
-    let count = image.len() as f64;
-    let variance = image.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>() / count;
-    let expected = 0.0462 * (1.0 + 0.25 + 1.0 / 16.0 + 1.0 / 64.0);
-    // 128 x 128 cells of the coarsest layer: standard error about 1.2 %; bound 4 standard errors.
-    assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
-}
-
-#[test]
 fn the_spectrum_falls_as_persistence_says() {
     // Structure function E|n(x + d) - n(x)|² of noise with power f^-(2H+2) grows as d^2H within its octaves.
     let growth = |persistence: f64| {

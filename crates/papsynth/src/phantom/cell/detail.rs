@@ -84,7 +84,6 @@ fn covered(row: &[f32]) -> Option<(usize, usize)> {
     Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
 }
 
-/// The third level of detail.
 pub(super) fn add_cytoskeleton(
     studio: &Studio,
     absorbance: &mut Tile,

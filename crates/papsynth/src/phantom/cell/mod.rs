@@ -125,7 +125,6 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
     }
 }
 
-/// Presses the sheets of all cells.
 fn crumple(
     studio: &Studio,
     scene: &Scene,

@@ -24,7 +24,6 @@ const TAPER: f64 = 0.3;
 const SLOPE: f64 = 0.30;
 const SLOPE_WIDTH: f64 = 4.0;
 
-/// Adds a cell's wrinkles to its thickness.
 pub(super) fn add(
     thickness: &mut Tile,
     coverage: &Tile,
@@ -34,8 +33,8 @@ pub(super) fn add(
     rng: &mut Stream,
 ) {
     let step = STEP_UM / pixel_um;
-    let rim =
-        if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round(outline, step)) } else { Vec::new() };
+    let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
+    let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     let mut canvas = vec![0.0; thickness.values.len()];
     for _ in 0..detail.wrinkles {
@@ -64,11 +63,6 @@ pub(super) fn add(
 fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
     let mut walk = Walk::new(0.45, rng);
     (0..count).map(|_| (0.9 + walk.next(rng)).clamp(0.0, 2.5)).collect()
-}
-
-/// How many steps it takes to go round.
-fn steps_round(outline: &[Point], step: f64) -> usize {
-    random::count(fsd_shape::perimeter(outline) / step).max(8)
 }
 
 /// A stretch of the rim, moved inwards. `fine` is the outline step by step.
