@@ -148,6 +148,14 @@ impl Rendering {
         self.phantoms.iter().flat_map(|phantom| &phantom.pieces)
     }
 
+    /// All pieces, numbered, with what they belong to.
+    fn parts(&self) -> impl Iterator<Item = (usize, (&Object, &Phantom, &Piece))> {
+        let objects = self.scene.objects.iter().zip(&self.phantoms);
+        objects
+            .flat_map(|(object, phantom)| phantom.pieces.iter().map(move |piece| (object, phantom, piece)))
+            .enumerate()
+    }
+
     /// The keys of a plane's noise, one for each channel. They go by where the stage stands, to a millionth of a micrometre, so that
     /// other planes before it make no difference.
     fn camera_keys(&self, stage_um: f64) -> Vec<u64> {
@@ -196,21 +204,17 @@ impl Rendering {
         self.watch.time(Stage::Truth, || {
             let origin_px = self.scene.frame.map_or([0; 2], |frame| frame.origin_px);
             let n = self.scene.oversampling();
+            let corner = origin_px.map(|at| at as f64 * self.scene.view.pixel_um);
             let mut rows = Vec::new();
-            let mut number = 0;
-            for (object, phantom) in self.scene.objects.iter().zip(&self.phantoms) {
-                let own = within(self.scene.place_um(object)) && !object.body.kind().is_layer();
-                for piece in &phantom.pieces {
-                    if own {
-                        let (mask, covered) = mask_of(piece, n, origin_px, size_px.map(|side| side as usize));
-                        if !mask.is_empty() {
-                            let mut row = self.row(object, phantom, piece, &mask, covered, number);
-                            let corner = origin_px.map(|at| at as f64 * self.scene.view.pixel_um);
-                            row.centre_um = [0, 1].map(|axis| row.centre_um[axis] + corner[axis]);
-                            rows.push(row);
-                        }
-                    }
-                    number += 1;
+            for (number, part @ (object, _, piece)) in self.parts() {
+                if object.body.kind().is_layer() || !within(self.scene.place_um(object)) {
+                    continue;
+                }
+                let (mask, covered) = mask_of(piece, n, origin_px, size_px.map(|side| side as usize));
+                if !mask.is_empty() {
+                    let mut row = self.row(number, part, &mask, covered);
+                    row.centre_um = [0, 1].map(|axis| row.centre_um[axis] + corner[axis]);
+                    rows.push(row);
                 }
             }
             (self.truth(desk), rows)
@@ -279,17 +283,9 @@ impl Rendering {
     fn truth(&self, desk: &mut Desk) -> Truth {
         let View { width, height, .. } = self.scene.view;
         desk.ids.resize(width * height, 0);
-        let mut objects = Vec::new();
-        let mut number = 0;
-        for (object, phantom) in self.scene.objects.iter().zip(&self.phantoms) {
-            for piece in &phantom.pieces {
-                if !piece.mask.is_empty() {
-                    objects.push(self.row(object, phantom, piece, &piece.mask, piece.covered, number));
-                }
-                number += 1;
-            }
-        }
-        let mut objects = with_layers(objects);
+        let seen = self.parts().filter(|(_, (.., piece))| !piece.mask.is_empty());
+        let rows = seen.map(|(number, part)| self.row(number, part, &part.2.mask, part.2.covered));
+        let mut objects = with_layers(rows.collect());
         if self.scene.frame.is_some() {
             // What nobody counts hides nothing on a slide.
             objects.retain(|object| !object.kind.is_layer());
@@ -306,15 +302,13 @@ impl Rendering {
         Truth { width, height, objects }
     }
 
-    /// What is known of a piece, the `number`th of all, that covers so many pixels inside and outside the image.
+    /// What is known of a piece that covers so many pixels inside and outside the image.
     fn row(
         &self,
-        object: &Object,
-        phantom: &Phantom,
-        piece: &Piece,
+        number: usize,
+        (object, phantom, piece): (&Object, &Phantom, &Piece),
         mask: &Mask,
         covered: u64,
-        number: usize,
     ) -> ObjectTruth {
         let grid_um = self.scene.grid().pixel_um;
         let kind = object.body.kind();
