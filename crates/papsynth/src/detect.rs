@@ -88,7 +88,16 @@ pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
 impl Detector {
     pub(crate) fn new(scene: &Scene) -> Result<Self, Cause> {
         let camera = scene.camera;
-        let jpeg = (camera.jpeg_quality > 0).then(|| jpeg(&camera)).transpose()?;
+        let params = JpegParams {
+            quality: camera.jpeg_quality,
+            subsampling: match camera.jpeg_subsampling {
+                Subsampling::Full => ccd_noise::Subsampling::Full,
+                Subsampling::Columns => ccd_noise::Subsampling::Columns,
+                Subsampling::Squares => ccd_noise::Subsampling::Squares,
+            },
+            bit_depth: camera.bits,
+        };
+        let jpeg = (camera.jpeg_quality > 0).then(|| Jpeg::new(&params)).transpose()?;
         // What is fused is rounded once more afterwards.
         let unfused = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
         match scene.light {
@@ -266,19 +275,6 @@ impl Channel {
         let full_scale_e = range_dn / (1.0 - glare) * camera.electrons_per_dn();
         Ok(Self { camera, full_scale_e, glare })
     }
-}
-
-fn jpeg(camera: &SceneCamera) -> Result<Jpeg, Cause> {
-    let params = JpegParams {
-        quality: camera.jpeg_quality,
-        subsampling: match camera.jpeg_subsampling {
-            Subsampling::Full => ccd_noise::Subsampling::Full,
-            Subsampling::Columns => ccd_noise::Subsampling::Columns,
-            Subsampling::Squares => ccd_noise::Subsampling::Squares,
-        },
-        bit_depth: camera.bits,
-    };
-    Ok(Jpeg::new(&params)?)
 }
 
 /// Values of several channels, side by side.

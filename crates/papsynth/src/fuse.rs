@@ -29,15 +29,15 @@ pub(crate) fn correlate(
     // Rounding adds noise that neighbours do not share.
     let diluted = 1.0 + ROUNDING / variance.max(ROUNDING);
     let correlation = fusion.noise_correlation.map(|asked| (asked * diluted).min(MOST));
-    let [across, down] = [0, 1].map(|axis| Kernel::of(correlation[axis], SECOND[axis]));
+    let [across, down] = [0, 1].map(|axis| kernel(correlation[axis], SECOND[axis]));
     let structure = structure(expected, width, channels);
     let half = (HALF_ALONE * variance) as f32;
-    let centre = across.centre * down.centre;
+    let centre = across[0] * down[0];
     let mut noise = own.clone();
     for (noise, line) in noise.chunks_exact_mut(row).zip(own.chunks_exact(row)) {
         for (i, value) in noise.iter_mut().enumerate() {
             let (x, channel) = (i / channels, i % channels);
-            *value = across.at(|step| line[mirrored(x, step, width) * channels + channel]);
+            *value = filtered(across, |step| line[mirrored(x, step, width) * channels + channel]);
         }
     }
     let height = noise.len() / row;
@@ -45,7 +45,7 @@ pub(crate) fn correlate(
     for (y, shared) in shared.chunks_exact_mut(row).enumerate() {
         let rows: [usize; 5] = core::array::from_fn(|k| mirrored(y, k as i64 - 2, height) * row);
         for (x, value) in shared.iter_mut().enumerate() {
-            *value = down.at(|step| noise[rows[(step + 2) as usize] + x]);
+            *value = filtered(down, |step| noise[rows[(step + 2) as usize] + x]);
         }
     }
     // To first order this changes the correlation along the diagonals alone.
@@ -142,33 +142,25 @@ fn mirrored(at: usize, step: i64, count: usize) -> usize {
 /// Correlation of noise two pixels apart, across and down: measured on pictures of extended focus.
 const SECOND: [f64; 2] = [-0.025, 0.01];
 
-/// A symmetric filter of five values (b, a, 1, a, b) over the root of the sum of their squares.
-struct Kernel {
-    centre: f32,
-    first: f32,
-    second: f32,
+/// The symmetric filter of five values (b, a, 1, a, b) over the root of the sum of their squares that leaves neighbours a
+/// correlation: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b². Its values from the middle on.
+fn kernel(correlation: f64, second: f64) -> [f32; 3] {
+    /// Steps of the fixed-point iteration: a fraction of a per mille is left after far fewer.
+    const STEPS: usize = 60;
+    let second = if correlation > 0.0 { second } else { 0.0 };
+    let (mut a, mut b) = (0.0_f64, 0.0_f64);
+    for _ in 0..STEPS {
+        let n = 1.0 + 2.0 * a * a + 2.0 * b * b;
+        let next = (correlation * n / (2.0 * (1.0 + b)), 0.5 * (second * n - a * a));
+        a += 0.5 * (next.0 - a);
+        b += 0.5 * (next.1 - b);
+    }
+    let norm = 1.0 / (1.0 + 2.0 * a * a + 2.0 * b * b).sqrt();
+    [norm as f32, (norm * a) as f32, (norm * b) as f32]
 }
 
-impl Kernel {
-    /// The filter that leaves neighbours a correlation: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
-    fn of(correlation: f64, second: f64) -> Self {
-        /// Steps of the fixed-point iteration: a fraction of a per mille is left after far fewer.
-        const STEPS: usize = 60;
-        let second = if correlation > 0.0 { second } else { 0.0 };
-        let (mut a, mut b) = (0.0_f64, 0.0_f64);
-        for _ in 0..STEPS {
-            let n = 1.0 + 2.0 * a * a + 2.0 * b * b;
-            let next = (correlation * n / (2.0 * (1.0 + b)), 0.5 * (second * n - a * a));
-            a += 0.5 * (next.0 - a);
-            b += 0.5 * (next.1 - b);
-        }
-        let norm = 1.0 / (1.0 + 2.0 * a * a + 2.0 * b * b).sqrt();
-        Self { centre: norm as f32, first: (norm * a) as f32, second: (norm * b) as f32 }
-    }
-
-    fn at(&self, value: impl Fn(i64) -> f32) -> f32 {
-        self.centre * value(0) + self.first * (value(-1) + value(1)) + self.second * (value(-2) + value(2))
-    }
+fn filtered([centre, first, second]: [f32; 3], value: impl Fn(i64) -> f32) -> f32 {
+    centre * value(0) + first * (value(-1) + value(1)) + second * (value(-2) + value(2))
 }
 
 #[cfg(test)]

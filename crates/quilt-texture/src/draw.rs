@@ -22,7 +22,7 @@ pub(crate) fn outcome_of_tries<R: Rng + ?Sized>(
     // with probability 1 - (1 - x)ⁿ.
     #[expect(clippy::cast_precision_loss, reason = "far below 2^53 tries")]
     let least_of_tries = -libm::expm1(libm::log1p(-uniform(rng)) / tries as f64);
-    let mut left = least_of_tries * sum(weights);
+    let mut left = least_of_tries * level(costs, weights, f32::NEG_INFINITY, f32::INFINITY).0;
     // All that are good enough count as one level, and so do all of one cost: which of them was
     // tried first is a matter of their weights alone.
     let (mut above, mut to) = (f32::NEG_INFINITY, enough);
@@ -76,17 +76,6 @@ fn level(costs: &[f32], weights: &[f32], above: f32, to: f32) -> (f64, f32) {
         }
     }
     (sums.iter().map(|&s: &f32| f64::from(s)).sum(), next.into_iter().fold(f32::INFINITY, f32::min))
-}
-
-#[multiversion(targets = "simd")]
-fn sum(weights: &[f32]) -> f64 {
-    let mut sums = [0.0; LANES];
-    for block in weights.as_chunks::<LANES>().0 {
-        for lane in 0..LANES {
-            sums[lane] += block[lane];
-        }
-    }
-    sums.iter().map(|&s: &f32| f64::from(s)).sum()
 }
 
 /// Replaces each x by exp(least - x), `least` the smallest.

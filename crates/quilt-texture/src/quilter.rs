@@ -284,14 +284,19 @@ impl<'a> Quilter<'a> {
         [shift(left, false), shift(above, true)]
     }
 
-    fn candidate_of_slot(&self, mut slot: usize) -> Candidate {
+    fn candidate_of_slot(&self, slot: usize) -> Candidate {
+        let (donor, slot) = self.donor_of(slot, |candidates| candidates.slots);
+        Candidate { donor, place: self.donors[donor].candidates.place_of_slot(slot) }
+    }
+
+    /// The donor of something that is numbered through all of them, and its number there.
+    fn donor_of(&self, mut number: usize, count: impl Fn(&Candidates) -> usize) -> (usize, usize) {
         let mut donor = 0;
-        while slot >= self.donors[donor].candidates.slots {
-            slot -= self.donors[donor].candidates.slots;
+        while number >= count(&self.donors[donor].candidates) {
+            number -= count(&self.donors[donor].candidates);
             donor += 1;
         }
-        let place = self.donors[donor].candidates.place_of_slot(slot);
-        Candidate { donor, place }
+        (donor, number)
     }
 
     /// A random candidate, with probability in proportion to exp(-strength · Δ²).
@@ -314,14 +319,8 @@ impl<'a> Quilter<'a> {
     }
 
     fn any<R: Rng + ?Sized>(&self, rng: &mut R) -> Candidate {
-        let mut n = below(self.places, rng);
-        let mut donor = 0;
-        while n >= self.donors[donor].candidates.places.len() {
-            n -= self.donors[donor].candidates.places.len();
-            donor += 1;
-        }
-        let place = self.donors[donor].candidates.places[n];
-        Candidate { donor, place }
+        let (donor, n) = self.donor_of(below(self.places, rng), |candidates| candidates.places.len());
+        Candidate { donor, place: self.donors[donor].candidates.places[n] }
     }
 }
 
