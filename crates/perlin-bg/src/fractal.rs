@@ -151,23 +151,5 @@ impl FractalRows<'_> {
     }
 }
 
-/// [`Fractal::at`]: positions in cells of the coarsest layer, values within [`Fractal::amplitude_bound`].
-///
-/// ```
-/// use noise::{Add, Constant, NoiseFn};
-/// use perlin_bg::{Fractal, FractalParams};
-///
-/// let clouds = Fractal::new(&FractalParams::default(), 1)?;
-/// let brighter = Add::new(clouds.clone(), Constant::new(0.5));
-/// assert_eq!(brighter.get([3.4, 1.2]), f64::from(clouds.at(3.4, 1.2)) + 0.5);
-/// # Ok::<(), perlin_bg::Error>(())
-/// ```
-#[cfg(feature = "noise")]
-impl noise::NoiseFn<f64, 2> for Fractal {
-    fn get(&self, [x, y]: [f64; 2]) -> f64 {
-        self.at(x, y).into()
-    }
-}
-
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,8 @@ mod background;
 mod error;
 mod fractal;
 mod illumination;
+#[cfg(feature = "noise")]
+mod interop;
 mod kernel;
 mod perlin;
 mod rows;

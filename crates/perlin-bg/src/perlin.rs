@@ -119,22 +119,5 @@ impl Perlin {
     }
 }
 
-/// [`Perlin::at`]: positions in lattice cells, values within ±√2/2.
-///
-/// ```
-/// use noise::{NoiseFn, ScalePoint};
-/// use perlin_bg::{Perlin, PerlinParams};
-///
-/// let noise = ScalePoint::new(Perlin::new(&PerlinParams::default(), 1)?).set_scale(1.0 / 16.0);
-/// assert_eq!(noise.get([32.0, 48.0]), 0.0); // a lattice point
-/// # Ok::<(), perlin_bg::Error>(())
-/// ```
-#[cfg(feature = "noise")]
-impl noise::NoiseFn<f64, 2> for Perlin {
-    fn get(&self, [x, y]: [f64; 2]) -> f64 {
-        self.at(x, y).into()
-    }
-}
-
 #[cfg(test)]
 mod tests;

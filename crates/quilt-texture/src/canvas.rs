@@ -22,18 +22,6 @@ pub struct Origin {
     pub pixel: usize,
 }
 
-#[cfg(feature = "image")]
-impl From<Texture> for image::ImageBuffer<image::Luma<f32>, Vec<f32>> {
-    /// # Panics
-    ///
-    /// If `width` was changed so that it no longer divides the number of pixels.
-    fn from(texture: Texture) -> Self {
-        let [width, height] = [texture.width, texture.pixels.len() / texture.width]
-            .map(|side| u32::try_from(side).expect("sides are far below 2^32"));
-        Self::from_raw(width, height, texture.pixels).expect("whole rows")
-    }
-}
-
 /// The texture while it is being stitched: whole patches, cut to size at the end.
 pub(crate) struct Canvas {
     patch: usize,

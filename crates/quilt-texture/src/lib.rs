@@ -4,6 +4,8 @@
 mod canvas;
 mod draw;
 mod error;
+#[cfg(feature = "image")]
+mod interop;
 mod params;
 mod quilter;
 mod scan;

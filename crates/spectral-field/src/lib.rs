@@ -4,13 +4,15 @@
 
 mod error;
 mod field;
+#[cfg(feature = "noise")]
+mod interop;
 mod params;
 mod spectrum;
 
 pub use error::Error;
-#[cfg(feature = "noise")]
-pub use field::DrawnField;
 pub use field::SpectralField;
+#[cfg(feature = "noise")]
+pub use interop::DrawnField;
 pub use params::{FieldParams, Padding};
 pub use rand_core::Rng;
 pub use spectrum::Spectrum;
