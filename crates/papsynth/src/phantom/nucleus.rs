@@ -2,17 +2,17 @@
 
 use optics_psf::{Border, Gaussian, Method};
 
+use super::cell::Cell;
 use super::chromatin::standardise;
 use super::form;
 use super::piece::Piece;
-use super::studio::{ClassStudio, Studio};
+use super::studio::ClassStudio;
 use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
 use crate::error::Cause;
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::cell::{CellBody, NucleusBody};
-use crate::scene::field::{Object, Scene};
+use crate::scene::NucleusBody;
 use crate::truth::part::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
@@ -33,17 +33,12 @@ const WRINKLE: f64 = 0.075;
 /// Part of the softened edge that may be cut off.
 const EDGE_LOST: f64 = 1e-3;
 
-pub(super) fn make(
-    studio: &Studio,
-    class: &ClassStudio,
-    scene: &Scene,
-    object: &Object,
-    body: &CellBody,
-) -> Result<Piece, Cause> {
+pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause> {
+    let Cell { studio, scene, object, body, .. } = *cell;
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
     let cell_centre = scene.grid().to_px(object.centre_um);
-    let mut shape_rng = scene.stream("cell", object, "nucleus.shape");
+    let mut shape_rng = cell.stream("nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
     let drawn = class.nucleus.draw(radius_px, &mut shape_rng)?;
     let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
@@ -61,7 +56,7 @@ pub(super) fn make(
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
     inner.cover(&grown(&outline, centre, shrink));
 
-    let mut rng = scene.stream("cell", object, "nucleus.texture");
+    let mut rng = cell.stream("nucleus.texture");
     let mut texture = match studio.recipe.nucleus.chromatin {
         Chromatin::Quilt => {
             let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
@@ -71,7 +66,7 @@ pub(super) fn make(
     };
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
-        let own = &mut scene.stream("cell", object, "nucleus.clumps");
+        let own = &mut cell.stream("nucleus.clumps");
         clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own);
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
@@ -93,7 +88,7 @@ pub(super) fn make(
         let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
-    let mut own = scene.stream("cell", object, "nucleoli");
+    let mut own = cell.stream("nucleoli");
     for _ in 0..nucleus.nucleoli {
         add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
     }

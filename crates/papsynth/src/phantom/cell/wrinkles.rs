@@ -5,10 +5,10 @@ use core::ops::Range;
 use multiversion::multiversion;
 use portable_numerics::elementary::exp_f32;
 
-use super::super::tile::{Point, Tile};
+use super::Cell;
 use crate::key::Stream;
+use crate::phantom::tile::{Point, Tile};
 use crate::random;
-use crate::scene::cell::CellDetail;
 
 /// Distance of the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
@@ -24,14 +24,8 @@ const TAPER: f64 = 0.3;
 const SLOPE: f64 = 0.30;
 const SLOPE_WIDTH: f64 = 4.0;
 
-pub(super) fn add(
-    thickness: &mut Tile,
-    coverage: &Tile,
-    outline: &[Point],
-    detail: &CellDetail,
-    pixel_um: f64,
-    rng: &mut Stream,
-) {
+pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell: &Cell<'_>) {
+    let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
     let step = STEP_UM / pixel_um;
     let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
     let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
