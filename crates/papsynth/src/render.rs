@@ -30,6 +30,7 @@ pub(crate) struct Desk {
 pub(crate) struct Rendering {
     scene: Scene,
     phantoms: Vec<Phantom>,
+    threads: Threads,
     path: LightPath,
     /// The feathered mask C′ of the nuclei whose texture was taken from images, if any are to be restored.
     feathered: Option<Vec<f32>>,
@@ -70,14 +71,13 @@ impl Rendering {
                 (piece.mask, piece.covered) = mask;
             }
         });
-        let slide = Slide { scene: &scene, phantoms: &phantoms };
         let path = watch.time(Stage::Light, || {
             desk.light.prepare(&scene)?;
-            LightPath::new(slide, lenses, threads)
+            LightPath::new(Slide { scene: &scene, phantoms: &phantoms, threads }, lenses)
         })?;
         let feathered = feathered(&scene, &phantoms)?;
         let detector = Detector::new(&scene)?;
-        Ok(Self { scene, phantoms, path, feathered, detector, detectability: Vec::new(), watch })
+        Ok(Self { scene, phantoms, threads, path, feathered, detector, detectability: Vec::new(), watch })
     }
 
     pub(crate) fn planes(&self) -> usize {
@@ -141,7 +141,7 @@ impl Rendering {
     }
 
     fn slide(&self) -> Slide<'_> {
-        Slide { scene: &self.scene, phantoms: &self.phantoms }
+        Slide { scene: &self.scene, phantoms: &self.phantoms, threads: self.threads }
     }
 
     fn pieces(&self) -> impl Iterator<Item = &Piece> {

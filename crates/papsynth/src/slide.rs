@@ -106,8 +106,8 @@ impl<'a> Slide<'a> {
         let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
         empty.slide = number;
         empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
-        let nothing = transmit::Slide { scene: &empty, phantoms: &[] };
-        let path = LightPath::new(nothing, &engine.lenses, Threads::One).map_err(Error::Layout)?;
+        let nothing = transmit::Slide { scene: &empty, phantoms: &[], threads: Threads::One };
+        let path = LightPath::new(nothing, &engine.lenses).map_err(Error::Layout)?;
         let border_px = path.picture_reach_px() as i64;
         let reach_px = recipe.scan.reach_um / empty.view.pixel_um;
         let most = (BEYOND - 1) as f64 * PLOT_PX as f64;

@@ -33,7 +33,7 @@ pub(crate) fn make<'a>(
     objects: &[&'a Object],
 ) -> Result<Vec<Phantom>, Cause> {
     let cell = |object: &&'a Object| match &object.body {
-        Body::Cell(body) => Some(Cell { studio, scene, pools, object: *object, body }),
+        Body::Cell(body) => Some(Cell { studio, scene, pools, object, body }),
         _ => None,
     };
     let cells: Vec<Cell<'_>> = objects.iter().filter_map(cell).collect();

@@ -22,7 +22,7 @@ use crate::phantom::tile::Tile;
 use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
 use crate::scene::{SceneLight, SceneMicroscope, View};
-use crate::threads::{self, Threads};
+use crate::threads;
 use crate::truth::{COVERED, Mask, Run};
 
 /// Share of the further spread that lies beyond its ends and is left out.
@@ -30,7 +30,6 @@ const LOST_TAIL: f64 = 1e-5;
 
 /// What all planes of one scene share.
 pub(crate) struct BrightFieldPath {
-    view: View,
     optics: SceneMicroscope,
     /// The further spread of finished light, if there is any.
     pub(super) further: Option<Gaussian>,
@@ -38,7 +37,6 @@ pub(crate) struct BrightFieldPath {
     groups: Vec<Group>,
     /// Where colours mix, if the light has any.
     overlaps: Option<Overlaps>,
-    threads: Threads,
     /// What each object lets through, where several planes share it.
     kept: Option<Vec<Mutex<Option<Loaded>>>>,
     spare: Mutex<Vec<Bench>>,
@@ -72,14 +70,9 @@ struct Passed {
 }
 
 impl BrightFieldPath {
-    pub(super) fn new(
-        slide: Slide<'_>,
-        optics: &SceneMicroscope,
-        lenses: &Lenses,
-        threads: Threads,
-    ) -> Result<Self, Cause> {
+    pub(super) fn new(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses) -> Result<Self, Cause> {
         let scene = slide.scene;
-        let groups = groups(slide, optics, lenses, threads)?;
+        let groups = groups(slide, optics, lenses)?;
         let further = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
         let further = (optics.extra_blur_um > 0.0).then(further).transpose();
         let further = further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
@@ -88,20 +81,14 @@ impl BrightFieldPath {
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
         let restoration = restores.then(feather).transpose()?;
         Ok(Self {
-            view: scene.view,
             optics: *optics,
             further,
             restoration,
-            threads,
             // Light of many single wavelengths would need too much memory.
             kept: (scene.planes_um.len() > 1 && groups.len() == 1)
                 .then(|| slide.phantoms.iter().map(|_| Mutex::default()).collect()),
-            overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. }).then(|| {
-                let view = scene.view;
-                // What overlaps beyond the border of a frame is not known in it.
-                let all = scene.frame.is_some();
-                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), all, threads)
-            }),
+            overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. })
+                .then(|| Overlaps::new(slide)),
             groups,
             spare: Mutex::default(),
         })
@@ -109,7 +96,7 @@ impl BrightFieldPath {
 
     /// The channels of `light` become what the objects let through.
     pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
-        let View { width, height, .. } = self.view;
+        let View { width, height, .. } = slide.scene.view;
         let Light { channels, lights, pictures, .. } = light;
         let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
         for group in &self.groups {
@@ -124,7 +111,7 @@ impl BrightFieldPath {
                 // Light that was carried from slab to slab takes the place of products.
                 passage.floored = 0;
                 let indices: Vec<usize> = (0..lights.len()).collect();
-                let images = threads::map(self.threads, &indices, |&light| {
+                let images = threads::map(slide.threads, &indices, |&light| {
                     let ColouredLight { imager, shift_um, .. } = &group.lights[light];
                     abbe_image(slide, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
                 });
@@ -139,7 +126,7 @@ impl BrightFieldPath {
             }
             if let (false, Some(overlaps), Mixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
                 let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
-                overlaps.correct(colour, slide.phantoms, blur_px, pictures, self.threads)?;
+                overlaps.correct(colour, slide, blur_px, pictures)?;
             }
             for ((of, picture), absorbances) in group.lights.iter().zip(&*pictures).zip(&absorbances) {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
@@ -159,7 +146,7 @@ impl BrightFieldPath {
         let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
         let microscope = light.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
-        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
+        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * slide.scene.view.pixel_um)
     }
 
     /// Multiplies the lights of a group by what the objects let through, on either grid. Gives the mean absorbances over the
@@ -174,7 +161,7 @@ impl BrightFieldPath {
     ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
         let image = |index: usize| self.image(slide, index, focus, group);
-        threads::each(self.threads, slide.phantoms.len(), image, |index, passed: Result<_, Cause>| {
+        threads::each(slide.threads, slide.phantoms.len(), image, |index, passed: Result<_, Cause>| {
             let Some(passed) = passed? else {
                 for absorbances in &mut absorbances {
                     absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
@@ -240,7 +227,8 @@ impl BrightFieldPath {
             return Ok(None);
         };
         let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
-        if !window.meets(self.view.width * n, self.view.height * n, margin_px * n) {
+        let grid = slide.scene.grid();
+        if !window.meets(grid.width, grid.height, margin_px * n) {
             return Ok(None);
         }
         let mut bench = self.spare().pop().unwrap_or_default();

@@ -12,7 +12,7 @@ use crate::error::Cause;
 use crate::phantom::piece::Piece;
 use crate::phantom::tile::Tile;
 use crate::scene::SceneLight;
-use crate::threads::{self, Threads};
+use crate::threads;
 
 /// Spread below which a Gaussian changes nothing that 16 bits could show, px.
 const SHARP_PX: f64 = 0.03;
@@ -32,7 +32,6 @@ pub(crate) struct GaussianPath {
     px_per_um: f64,
     /// Wavelength of the light, µm.
     wavelength_um: f64,
-    threads: Threads,
     spare: Mutex<Spare>,
 }
 
@@ -54,12 +53,7 @@ struct Blurred<'a> {
 }
 
 impl GaussianPath {
-    pub(super) fn new(
-        slide: Slide<'_>,
-        sigma_xy_um: f64,
-        sigma_z_um_per_um: f64,
-        threads: Threads,
-    ) -> Result<Self, Cause> {
+    pub(super) fn new(slide: Slide<'_>, sigma_xy_um: f64, sigma_z_um_per_um: f64) -> Result<Self, Cause> {
         let view = slide.scene.view;
         let in_plane = Gaussian::truncated(sigma_xy_um / view.pixel_um, Method::Direct, LOST_TAIL_IN_PLANE)?;
         let wavelength_um = match slide.scene.light {
@@ -68,7 +62,7 @@ impl GaussianPath {
         };
         let px_per_um = sigma_z_um_per_um / view.pixel_um;
         let frame = Window { origin: [0, 0], width: view.width, height: view.height };
-        Ok(Self { frame, in_plane, px_per_um, wavelength_um, threads, spare: Mutex::default() })
+        Ok(Self { frame, in_plane, px_per_um, wavelength_um, spare: Mutex::default() })
     }
 
     /// The channel of `light` becomes the absorbance I_p of the phantoms.
@@ -88,7 +82,7 @@ impl GaussianPath {
             Ok(pieces.map(|piece| self.blur_piece(piece, gaussian.as_ref())).collect::<Vec<_>>())
         };
         // Eq. 14: I_p = Σ pᵢ ∗ G_σz, in the order of the objects whatever thread made them.
-        threads::each(self.threads, slide.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
+        threads::each(slide.threads, slide.phantoms.len(), blur, |_, pieces: Result<_, Cause>| {
             for piece in pieces? {
                 absorbances.push(piece.mean * f64::from(piece.strength));
                 let Some(tile) = piece.tile else { continue };

@@ -9,7 +9,7 @@ use super::canvas::Mixer;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};
-use crate::threads::{self, Threads};
+use crate::threads;
 
 /// Light that is imaged together, because dyes are mixed for all of it at once.
 pub(super) struct Group {
@@ -29,12 +29,7 @@ pub(super) struct ColouredLight {
 }
 
 /// The lights of a scene, each with its microscope.
-pub(super) fn groups(
-    slide: Slide<'_>,
-    optics: &SceneMicroscope,
-    lenses: &Lenses,
-    threads: Threads,
-) -> Result<Vec<Group>, Cause> {
+pub(super) fn groups(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses) -> Result<Vec<Group>, Cause> {
     let scene = slide.scene;
     let params = |wavelength_um: f64, bandwidth_um: f64| MicroscopeParams {
         na: optics.na,
@@ -56,7 +51,7 @@ pub(super) fn groups(
         stray_light: 0.0,
     };
     let group = |mixer: Mixer, lights: Vec<ColouredLight>| {
-        let shares = threads::map(threads, slide.phantoms, |phantom| mixer.shares(phantom));
+        let shares = threads::map(slide.threads, slide.phantoms, |phantom| mixer.shares(phantom));
         Group { mixer, lights, shares }
     };
     match scene.light {

@@ -35,11 +35,12 @@ pub(crate) enum FocusAt {
     Everywhere,
 }
 
-/// What is imaged: a scene and its phantoms.
+/// What is imaged: a scene and its phantoms; and by how many threads.
 #[derive(Clone, Copy)]
 pub(crate) struct Slide<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) phantoms: &'a [Phantom],
+    pub(crate) threads: Threads,
 }
 
 /// Rows of the light of one channel of a plane, as fractions of full scale.
@@ -95,13 +96,13 @@ pub(crate) enum LightPath {
 }
 
 impl LightPath {
-    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses, threads: Threads) -> Result<Self, Cause> {
+    pub(crate) fn new(slide: Slide<'_>, lenses: &Lenses) -> Result<Self, Cause> {
         Ok(match &slide.scene.optics {
             SceneOptics::Gaussian { sigma_xy_um, sigma_z_um_per_um } => {
-                Self::Gaussian(Box::new(GaussianPath::new(slide, *sigma_xy_um, *sigma_z_um_per_um, threads)?))
+                Self::Gaussian(Box::new(GaussianPath::new(slide, *sigma_xy_um, *sigma_z_um_per_um)?))
             }
             SceneOptics::BrightField(microscope) => {
-                Self::BrightField(Box::new(BrightFieldPath::new(slide, microscope, lenses, threads)?))
+                Self::BrightField(Box::new(BrightFieldPath::new(slide, microscope, lenses)?))
             }
         })
     }

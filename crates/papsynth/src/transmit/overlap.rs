@@ -10,11 +10,13 @@ use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
+use super::Slide;
 use super::canvas::{Window, add, blurred};
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, lay};
-use crate::threads::{self, Threads};
+use crate::scene::{Scene, View};
+use crate::threads;
 
 /// Absorbance below which an object changes no colour behind it.
 const FAINT: f32 = 0.01;
@@ -27,8 +29,6 @@ const LOST_TAIL: f64 = 1e-3;
 
 /// What overlaps in a scene: for each object that meets another its pieces' absorbances, on the camera's pixels.
 pub(super) struct Overlaps {
-    width: usize,
-    height: usize,
     objects: Vec<Overlapping>,
 }
 
@@ -46,17 +46,12 @@ struct Stained {
 }
 
 impl Overlaps {
-    /// Of objects whose boxes meet another's or, if so told, of all that are stained.
-    pub(super) fn new(
-        phantoms: &[Phantom],
-        width: usize,
-        height: usize,
-        n: usize,
-        all: bool,
-        threads: Threads,
-    ) -> Self {
-        let boxes: Vec<Option<Window>> =
-            phantoms.iter().map(|phantom| stained(phantom, width, height, n, all)).collect();
+    /// Of objects whose boxes meet another's or, since what overlaps beyond the border of a frame is not known in it, of all that
+    /// are stained.
+    pub(super) fn new(slide: Slide<'_>) -> Self {
+        let (scene, phantoms) = (slide.scene, slide.phantoms);
+        let (n, all) = (scene.oversampling(), scene.frame.is_some());
+        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained(phantom, scene)).collect();
         // Sorted by their left edges, only neighbours can meet.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
         order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
@@ -74,32 +69,31 @@ impl Overlaps {
             }
         }
         let indices: Vec<usize> = (0..boxes.len()).filter(|&i| meets[i]).collect();
-        let objects = threads::map(threads, &indices, |&index| Overlapping {
+        let objects = threads::map(slide.threads, &indices, |&index| Overlapping {
             index,
             pieces: phantoms[index].pieces.iter().map(|piece| piece.absorbance.coarsened(n)).collect(),
         });
-        Self { width, height, objects }
+        Self { objects }
     }
 
     /// Corrects three channels. `blur_px` says how widely each object is blurred, as a standard deviation.
     pub(super) fn correct(
         &self,
         colour: &Colour,
-        phantoms: &[Phantom],
+        slide: Slide<'_>,
         blur_px: impl Fn(usize) -> f64 + Sync + Send,
         channels: &mut [Vec<f32>],
-        threads: Threads,
     ) -> Result<(), Cause> {
         if self.objects.len() < 2 {
             return Ok(());
         }
-        let pixels = self.width * self.height;
-        let whole = Window { origin: [0, 0], width: self.width, height: self.height };
+        let View { width, height, .. } = slide.scene.view;
+        let (pixels, whole) = (width * height, Window { origin: [0, 0], width, height });
         let mut layers = vec![0.0_f32; pixels];
         let mut totals: [Vec<f32>; DYES] = core::array::from_fn(|_| vec![0.0; pixels]);
         let mut products: [Vec<f32>; 3] = core::array::from_fn(|_| vec![1.0; pixels]);
-        let stained = threads::map(threads, &self.objects, |object| {
-            object.stain(colour, &phantoms[object.index], blur_px(object.index))
+        let stained = threads::map(slide.threads, &self.objects, |object| {
+            object.stain(colour, &slide.phantoms[object.index], blur_px(object.index))
         });
         for stained in stained {
             let stained = stained?;
@@ -107,14 +101,14 @@ impl Overlaps {
                 add(total, whole, amounts, 1.0);
             }
             for (product, transmittance) in products.iter_mut().zip(&stained.transmittance) {
-                multiply(product, self.width, transmittance);
+                multiply(product, width, transmittance);
             }
-            count(&mut layers, self.width, &stained.transmittance[1]);
+            count(&mut layers, width, &stained.transmittance[1]);
         }
         let [h, e, l, o, n] = &totals;
-        let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; self.width]);
-        for y in 0..self.height {
-            let row = y * self.width..(y + 1) * self.width;
+        let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; width]);
+        for y in 0..height {
+            let row = y * width..(y + 1) * width;
             if layers[row.clone()].iter().all(|layers| *layers < 2.0) {
                 continue;
             }
@@ -158,13 +152,14 @@ impl Overlapping {
 }
 
 /// The camera's pixels over which an object is stained enough to matter.
-fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, all: bool) -> Option<Window> {
+fn stained(phantom: &Phantom, scene: &Scene) -> Option<Window> {
+    let (grid, n) = (scene.grid(), scene.oversampling());
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
     let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
-    (all || window.meets(width * n, height * n, 0)).then_some(Window {
+    (scene.frame.is_some() || window.meets(grid.width, grid.height, 0)).then_some(Window {
         origin: window.origin.map(|at| at / n as i64),
         width: window.width / n,
         height: window.height / n,
