@@ -43,6 +43,10 @@ struct Channel {
 /// What is on its way from electrons to grey levels, channel by channel.
 #[derive(Debug, Default)]
 pub(crate) struct Developing {
+    /// Columns of the frame.
+    width: usize,
+    /// Of the noise of each channel.
+    keys: Vec<u64>,
     levels: Vec<Vec<u16>>,
     means: Vec<Vec<f32>>,
     /// Runs of saturated pixels, of all channels.
@@ -53,7 +57,8 @@ pub(crate) struct Developing {
 
 impl Developing {
     /// Makes room for a frame.
-    pub(crate) fn start(&mut self) {
+    pub(crate) fn start(&mut self, width: usize, keys: Vec<u64>) {
+        (self.width, self.keys) = (width, keys);
         self.saturated.clear();
         self.frame.iter_mut().for_each(Vec::clear);
     }
@@ -132,24 +137,16 @@ impl Detector {
 
     /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
     /// charge crosses rows in this camera: then when all rows were [`finish`](Self::finish)ed.
-    pub(crate) fn expose(
-        &self,
-        electrons: &[&mut [f32]],
-        width: usize,
-        first: usize,
-        keys: &[u64],
-        grey: &mut [u16],
-        developing: &mut Developing,
-    ) {
+    pub(crate) fn expose(&self, electrons: &[&mut [f32]], first: usize, grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
             developing.frame.resize(self.channels.len(), Vec::new());
             developing.frame.iter_mut().zip(electrons).for_each(|(frame, rows)| frame.extend_from_slice(rows));
             return;
         }
-        let Developing { levels, saturated, .. } = developing;
+        let Developing { width, keys, levels, saturated, .. } = developing;
         let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
         let mut expose = |channel: &Channel, electrons: &[f32], key, levels: &mut [u16]| {
-            channel.camera.expose_window_marking(electrons, width, origin, key, levels, saturated);
+            channel.camera.expose_window_marking(electrons, *width, origin, key, levels, saturated);
         };
         match (&self.channels[..], electrons) {
             ([channel], [electrons]) => expose(channel, electrons, keys[0], grey),
@@ -158,11 +155,11 @@ impl Detector {
     }
 
     /// What can be done with a whole frame alone: charge that crosses rows.
-    pub(crate) fn finish(&self, width: usize, keys: &[u64], grey: &mut [u16], developing: &mut Developing) {
+    pub(crate) fn finish(&self, grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
-            let Developing { levels, saturated, frame, .. } = developing;
+            let Developing { width, keys, levels, saturated, frame, .. } = developing;
             self.develop(frame.iter().map(|rows| &rows[..]), keys, levels, grey, |channel, electrons, key, levels| {
-                channel.camera.expose_frame(electrons, width, key, levels, saturated);
+                channel.camera.expose_frame(electrons, *width, key, levels, saturated);
             });
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::error::{Cause, Error};
+use crate::error::Error;
 use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::Studio;
@@ -29,7 +29,7 @@ pub struct Inputs {
 pub struct Engine {
     pub(crate) model: Model,
     weight_map: Option<WeightMap>,
-    studio: Studio,
+    pub(crate) studio: Studio,
     pub(crate) lenses: Lenses,
     /// Memory of finished images: as many as were ever made side by side.
     desks: Mutex<Vec<Desk>>,
@@ -99,16 +99,12 @@ impl Engine {
         let index = scene.key.index;
         let fail = |cause| E::from(Error::Image { index, cause });
         self.at_desk(|desk| {
-            let mut rendering = self.rendering(scene, threads, desk).map_err(fail)?;
+            let mut rendering = Rendering::new(self, scene, threads, desk).map_err(fail)?;
             for plane in 0..rendering.planes() {
                 sink(rendering.plane(plane, desk).map_err(fail)?)?;
             }
             rendering.finish(desk).map_err(fail)
         })
-    }
-
-    pub(crate) fn rendering(&self, scene: Scene, threads: Threads, desk: &mut Desk) -> Result<Rendering, Cause> {
-        Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
     }
 
     /// Works in the memory of finished images, and leaves it to the next one.

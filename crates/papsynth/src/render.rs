@@ -4,16 +4,16 @@ use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
-use crate::engine::{Finished, Plane};
+use crate::engine::{Engine, Finished, Plane};
 use crate::error::Cause;
 use crate::fuse;
 use crate::phantom::tile::lay;
-use crate::phantom::{self, Phantom, Piece, Studio};
+use crate::phantom::{self, Phantom, Piece};
 use crate::profile::{Stage, Watch};
 use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene, View};
 use crate::threads::{self, Threads};
-use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Slide};
+use crate::transmit::{Band, FocusAt, Light, LightPath, Slide};
 use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts, with_layers};
 
 /// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
@@ -41,13 +41,8 @@ pub(crate) struct Rendering {
 }
 
 impl Rendering {
-    pub(crate) fn new(
-        studio: &Studio,
-        lenses: &Lenses,
-        scene: Scene,
-        threads: Threads,
-        desk: &mut Desk,
-    ) -> Result<Self, Cause> {
+    pub(crate) fn new(engine: &Engine, scene: Scene, threads: Threads, desk: &mut Desk) -> Result<Self, Cause> {
+        let (studio, lenses) = (&engine.studio, &engine.lenses);
         let watch = studio.watch.clone();
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
@@ -97,13 +92,12 @@ impl Rendering {
         (plane.index, plane.stage_um, plane.channels, plane.floored) = (index, stage_um, channels, passage.floored);
         plane.grey.resize(samples, 0);
         plane.noise_free.resize(samples, 0.0);
-        let keys = self.camera_keys(stage_um);
         // Of every mask the runs that are still to come, and the electrons so far, channel by channel.
         let mut runs: Vec<&[Run]> = self.pieces().map(|piece| piece.mask.runs()).collect();
         let mut electrons = vec![vec![0.0; runs.len()]; channels];
         let late = scene.restoration.restore == Restore::AfterDetection;
         self.watch.time(Stage::Camera, || {
-            developing.start();
+            developing.start(view.width, self.camera_keys(stage_um));
             self.path.spread(view, light, |Band { first, sharp, spread }| {
                 let at = first * view.width;
                 if !late {
@@ -112,7 +106,7 @@ impl Rendering {
                 self.count(spread);
                 let here = at * channels..(at + spread[0].len()) * channels;
                 let (grey, noise_free) = (&mut plane.grey[here.clone()], &mut plane.noise_free[here]);
-                self.detector.expose(spread, view.width, first, &keys, grey, developing);
+                self.detector.expose(spread, first, grey, developing);
                 self.detector.mean_dn_into(spread, noise_free, developing);
                 let end = first + spread[0].len() / view.width;
                 for (number, runs) in runs.iter_mut().enumerate() {
@@ -128,7 +122,7 @@ impl Rendering {
                     self.restore_finished(&feathered[at..], sharp, grey, noise_free, developing);
                 }
             });
-            self.detector.finish(view.width, &keys, &mut plane.grey, developing);
+            self.detector.finish(&mut plane.grey, developing);
             if let Some(fusion) = &scene.fusion {
                 let bits = [self.detector.bits, scene.camera.bits];
                 fuse::correlate(&mut plane.grey, &mut plane.noise_free, view.width, channels, fusion, bits);

@@ -11,6 +11,7 @@ use crate::engine::Engine;
 use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::recipe::{Imaging, Optics, Problem};
+use crate::render::Rendering;
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
 use crate::threads::{self, Threads};
 use crate::transmit::{self, LightPath};
@@ -272,7 +273,7 @@ impl<'a> Slide<'a> {
             })
         };
         self.engine.at_desk(|desk| {
-            let mut rendering = self.engine.rendering(scene, threads, desk)?;
+            let mut rendering = Rendering::new(self.engine, scene, threads, desk)?;
             let mut planes = Vec::new();
             for index in 0..rendering.planes() {
                 let plane = rendering.plane(index, desk)?;

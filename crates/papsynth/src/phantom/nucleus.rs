@@ -10,6 +10,7 @@ use super::studio::ClassStudio;
 use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
 use crate::error::Cause;
+use crate::key::Stream;
 use crate::random;
 use crate::recipe::Chromatin;
 use crate::scene::NucleusBody;
@@ -90,13 +91,13 @@ pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause>
     }
     let mut own = cell.stream("nucleoli");
     for _ in 0..nucleus.nucleoli {
-        add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
+        add_nucleolus(&mut absorbance, &outline, centre, cell, &mut own);
     }
     Ok(Piece { part: Part::Nucleus, imaged, ..Piece::whole(absorbance, coverage, area(&outline), nucleus.dyes) })
 }
 
 /// Makes a part of a texture's variance coarse.
-fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut crate::key::Stream) {
+fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut Stream) {
     /// Standard deviation of what white noise is smoothed by, µm.
     const CLUMP_UM: f64 = 0.7;
     let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least a hundredth of a µm wide");
@@ -135,14 +136,8 @@ const NUCLEOLUS_UM: [f64; 2] = [0.5, 1.1];
 const NUCLEOLUS: f64 = 0.8;
 
 /// A round, even, dark body inside a nucleus.
-fn add_nucleolus(
-    absorbance: &mut Tile,
-    outline: &[Point],
-    centre: Point,
-    strength: f64,
-    pixel_um: f64,
-    rng: &mut crate::key::Stream,
-) {
+fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: &Cell<'_>, rng: &mut Stream) {
+    let (strength, pixel_um) = (cell.body.nucleus.absorbance, cell.scene.grid().pixel_um);
     let radius = random::between(NUCLEOLUS_UM[0], NUCLEOLUS_UM[1], rng) / pixel_um;
     let rim = outline[random::below(outline.len(), rng)];
     let share = random::between(0.0, 0.6, rng);
@@ -156,7 +151,7 @@ fn add_nucleolus(
 }
 
 /// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.
-fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut crate::key::Stream) {
+fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let waves: Vec<[f64; 3]> = WRINKLES
         .map(|harmonic| {
