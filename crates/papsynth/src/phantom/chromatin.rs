@@ -54,7 +54,7 @@ impl Donors {
                 (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
             None => {
-                let make = |index| made(name, index, nucleus, shapes, &field);
+                let make = |index| field.donor(name, index, nucleus, shapes);
                 ((0..MADE_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, MADE_PIXEL_UM)
             }
         };
@@ -99,29 +99,6 @@ fn learned(donor: &Donor) -> Result<Source, Cause> {
     Source::new(&pixels, &mask, donor.width).map_err(Cause::Donor)
 }
 
-/// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
-fn made(
-    name: &str,
-    index: u64,
-    nucleus: &NucleusStatistics,
-    shapes: &ShapeModel,
-    field: &FieldSource,
-) -> Result<Source, Cause> {
-    // Donors belong to the model, not to an image: their key is the same for every data set.
-    let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
-    let radius =
-        nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
-    /// Smallest donor worth taking patches from, px.
-    const SMALLEST: f64 = 9.0;
-    let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
-    let outline: Vec<Point> = drawn.descriptors.outline(64);
-    let mut coverage = Tile::around(&outline, 1.0);
-    coverage.cover(&outline);
-    let mut pixels = field.texture(&coverage.values, coverage.width, &mut rng);
-    standardise(&mut pixels, &coverage.values);
-    Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
-}
-
 impl FieldSource {
     fn new(chromatin: &ChromatinStatistics) -> Result<Self, Cause> {
         /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
@@ -133,6 +110,23 @@ impl FieldSource {
             skewness: chromatin.skewness,
             profile: chromatin.rim_to_centre.clone(),
         })
+    }
+
+    /// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
+    fn donor(&self, name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Source, Cause> {
+        // Donors belong to the model, not to an image: their key is the same for every data set.
+        let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
+        let radius =
+            nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
+        /// Smallest donor worth taking patches from, px.
+        const SMALLEST: f64 = 9.0;
+        let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
+        let outline: Vec<Point> = drawn.descriptors.outline(64);
+        let mut coverage = Tile::around(&outline, 1.0);
+        coverage.cover(&outline);
+        let mut pixels = self.texture(&coverage.values, coverage.width, &mut rng);
+        standardise(&mut pixels, &coverage.values);
+        Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
     }
 
     /// A field with the class's marginal and its profile from rim to centre.

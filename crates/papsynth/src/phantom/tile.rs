@@ -404,7 +404,7 @@ pub(super) mod tests {
     }
 
     /// The value of a tile at a pixel of the large image.
-    fn at(tile: &Tile, [x, y]: [i64; 2]) -> f32 {
+    pub(in crate::phantom) fn at(tile: &Tile, [x, y]: [i64; 2]) -> f32 {
         let place = usize::try_from(x - tile.origin[0]).ok().zip(usize::try_from(y - tile.origin[1]).ok());
         let place = place.filter(|(x, y)| *x < tile.width && *y < tile.height());
         place.map_or(0.0, |(x, y)| tile.values[y * tile.width + x])

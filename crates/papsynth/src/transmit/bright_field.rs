@@ -182,13 +182,8 @@ impl BrightFieldPath {
     }
 
     /// Makes of what objects let through light, in some rows: B·(s + (1 − s)·∏), s the stray light.
-    pub(super) fn illuminate(
-        &self,
-        channels: &mut [Vec<f32>],
-        rows: Range<usize>,
-        empty_log10: &[f32],
-        empty: &mut Vec<f32>,
-    ) {
+    pub(super) fn illuminate(&self, light: &mut Light, rows: Range<usize>) {
+        let Light { empty_log10, channels, empty, .. } = light;
         empty.clear();
         empty.resize(rows.len(), 0.0);
         exp10_from(&empty_log10[rows.clone()], empty);

@@ -122,9 +122,8 @@ impl LightPath {
 
     /// Gives the light, band by band from the top.
     pub(crate) fn spread(&self, view: View, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
-        let Light { empty_log10, channels, empty, bands, scratch, .. } = light;
         let View { width, height, .. } = view;
-        bands.resize(channels.len(), Vec::new());
+        light.bands.resize(light.channels.len(), Vec::new());
         let mut lit = 0;
         for first in (0..height).step_by(BAND) {
             let end = (first + BAND).min(height);
@@ -132,9 +131,10 @@ impl LightPath {
             let rows = lit * width..needed * width;
             match self {
                 // 10^(I_b − I_p).
-                Self::Gaussian(_) => exp10_from(&empty_log10[rows.clone()], &mut channels[0][rows]),
-                Self::BrightField(path) => path.illuminate(channels, rows, empty_log10, empty),
+                Self::Gaussian(_) => exp10_from(&light.empty_log10[rows.clone()], &mut light.channels[0][rows]),
+                Self::BrightField(path) => path.illuminate(light, rows),
             }
+            let Light { channels, bands, scratch, .. } = light;
             lit = needed;
             for (whole, band) in channels.iter().zip(bands.iter_mut()) {
                 band.resize((end - first) * width, 0.0);

@@ -291,7 +291,7 @@ pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &Cell<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::phantom::tile::tests::disc;
+    use crate::phantom::tile::tests::{at, disc};
 
     #[test]
     fn a_rim_thins_by_the_mean_of_the_cover_around() {
@@ -300,21 +300,13 @@ mod tests {
         let radius = 4_i64;
         let mut thin = Tile { values: vec![1.0; 31 * 27], ..cover.clone() };
         thin_rim(&mut thin, &cover, 4.0);
-        for y in 0..27_i64 {
-            for x in 0..31_i64 {
-                let at = |x: i64, y: i64| {
-                    let inside = (0..31).contains(&x) && (0..27).contains(&y);
-                    if inside { f64::from(cover.values[usize::try_from(y * 31 + x).unwrap()]) } else { 0.0 }
-                };
-                let sum: f64 = (-radius..=radius)
-                    .flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)))
-                    .map(|(dx, dy)| at(x + dx, y + dy))
-                    .sum();
-                let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
-                let found = f64::from(thin.values[usize::try_from(y * 31 + x).unwrap()]);
-                assert!((found - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
-            }
-        }
+        thin.for_each(|p, found| {
+            let [x, y] = p.map(|at| at as i64);
+            let around = (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| [x, y]));
+            let sum: f64 = around.map(|p| f64::from(at(&cover, p))).sum();
+            let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
+            assert!((f64::from(*found) - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
+        });
     }
 
     #[test]
