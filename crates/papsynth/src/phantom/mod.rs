@@ -4,7 +4,6 @@
 
 mod cell;
 mod chromatin;
-mod form;
 mod nucleus;
 pub(crate) mod piece;
 pub(crate) mod pools;

@@ -4,7 +4,6 @@ use optics_psf::{Border, Gaussian, Method};
 
 use super::cell::Cell;
 use super::chromatin::standardise;
-use super::form;
 use super::piece::Piece;
 use super::studio::ClassStudio;
 use super::tile::{Point, Tile, area, grown};
@@ -41,8 +40,7 @@ pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause>
     let cell_centre = scene.grid().to_px(object.centre_um);
     let mut shape_rng = cell.stream("nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
-    let drawn = class.nucleus.draw(radius_px, &mut shape_rng)?;
-    let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
+    let mut outline = class.nucleus(radius_px, &mut shape_rng)?.outline(POINTS);
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }

@@ -12,7 +12,7 @@ use optics_psf::{
 };
 use portable_numerics::elementary::exp10_from;
 
-use super::canvas::{Canvas, Mixer, Window, add};
+use super::canvas::{Canvas, Mixer, Window, add, clear};
 use super::lights::{ColouredLight, Group, Lenses, groups};
 use super::overlap::Overlaps;
 use super::{FocusAt, Light, Passage, Slide};
@@ -184,8 +184,7 @@ impl BrightFieldPath {
     /// Makes of what objects let through light, in some rows: B·(s + (1 − s)·∏), s the stray light.
     pub(super) fn illuminate(&self, light: &mut Light, rows: Range<usize>) {
         let Light { empty_log10, channels, empty, .. } = light;
-        empty.clear();
-        empty.resize(rows.len(), 0.0);
+        clear(empty, rows.len());
         exp10_from(&empty_log10[rows.clone()], empty);
         for channel in channels {
             illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);

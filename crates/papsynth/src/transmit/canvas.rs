@@ -151,7 +151,7 @@ impl Mixer {
     }
 }
 
-fn clear(values: &mut Vec<f32>, samples: usize) {
+pub(super) fn clear(values: &mut Vec<f32>, samples: usize) {
     values.clear();
     values.resize(samples, 0.0);
 }

@@ -20,6 +20,7 @@ use crate::scene::{Scene, SceneIllumination, SceneOptics, View};
 use crate::threads::Threads;
 
 use bright_field::BrightFieldPath;
+use canvas::clear;
 use gaussian::GaussianPath;
 pub(crate) use lights::Lenses;
 
@@ -110,10 +111,7 @@ impl LightPath {
     /// Lets light through the phantoms.
     pub(crate) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
         let View { width, height, .. } = slide.scene.view;
-        for channel in &mut light.channels {
-            channel.clear();
-            channel.resize(width * height, 0.0);
-        }
+        light.channels.iter_mut().for_each(|channel| clear(channel, width * height));
         match self {
             Self::Gaussian(path) => path.pass(slide, focus, light),
             Self::BrightField(path) => path.pass(slide, focus, light),

@@ -9,11 +9,11 @@ mod wrinkles;
 use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
+use crate::phantom::nucleus;
 use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
 use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
-use crate::phantom::{form, nucleus};
 use crate::profile::Stage;
 use crate::scene::cell::{CellBody, Fold, FoldForm};
 use crate::scene::field::{Object, Scene};
@@ -83,8 +83,7 @@ impl<'a> Plan<'a> {
 fn outline(cell: &Cell<'_>, class: &ClassStudio, centre: Point) -> Result<Vec<Point>, Cause> {
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
-    let drawn = class.cytoplasm.draw(radius_px, &mut rng)?;
-    let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
+    let formed = class.cytoplasm(radius_px, &mut rng)?;
     let posed = formed.rotated(cell.object.rotation_deg.to_radians());
     let outline = posed.outline(POINTS);
     let middle = fsd_shape::centroid(&outline);
