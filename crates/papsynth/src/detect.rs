@@ -6,7 +6,6 @@ use multiversion::multiversion;
 
 use crate::error::Cause;
 use crate::recipe::{Binning, Mixing, PhotonNoise, Rendition, Subsampling};
-use crate::rendition::Srgb;
 use crate::scene::{Scene, SceneCamera, SceneLight};
 use crate::truth::{Mask, Run};
 
@@ -25,8 +24,8 @@ const UNCHANGED: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1
 /// The camera of a scene.
 pub(crate) struct Detector {
     channels: Vec<Channel>,
-    /// Bits of the grey levels that are handed over.
-    bits: u32,
+    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
+    pub(crate) bits: u32,
     /// How colours are made of the channels, if they are.
     srgb: Option<Srgb>,
     jpeg: Option<Jpeg>,
@@ -44,6 +43,10 @@ struct Channel {
 /// What is on its way from electrons to grey levels, channel by channel.
 #[derive(Debug, Default)]
 pub(crate) struct Developing {
+    /// Columns of the frame.
+    width: usize,
+    /// Of the noise of each channel.
+    keys: Vec<u64>,
     levels: Vec<Vec<u16>>,
     means: Vec<Vec<f32>>,
     /// Runs of saturated pixels, of all channels.
@@ -54,7 +57,8 @@ pub(crate) struct Developing {
 
 impl Developing {
     /// Makes room for a frame.
-    pub(crate) fn start(&mut self) {
+    pub(crate) fn start(&mut self, width: usize, keys: Vec<u64>) {
+        (self.width, self.keys) = (width, keys);
         self.saturated.clear();
         self.frame.iter_mut().for_each(Vec::clear);
     }
@@ -89,7 +93,16 @@ pub(crate) fn colour(lamp_k: f64, mixing: Mixing) -> Result<Colour, Cause> {
 impl Detector {
     pub(crate) fn new(scene: &Scene) -> Result<Self, Cause> {
         let camera = scene.camera;
-        let jpeg = (camera.jpeg_quality > 0).then(|| jpeg(&camera)).transpose()?;
+        let params = JpegParams {
+            quality: camera.jpeg_quality,
+            subsampling: match camera.jpeg_subsampling {
+                Subsampling::Full => ccd_noise::Subsampling::Full,
+                Subsampling::Columns => ccd_noise::Subsampling::Columns,
+                Subsampling::Squares => ccd_noise::Subsampling::Squares,
+            },
+            bit_depth: camera.bits,
+        };
+        let jpeg = (camera.jpeg_quality > 0).then(|| Jpeg::new(&params)).transpose()?;
         // What is fused is rounded once more afterwards.
         let unfused = if scene.fusion.is_some() { INNER_BITS } else { camera.bits };
         match scene.light {
@@ -115,11 +128,6 @@ impl Detector {
         }
     }
 
-    /// Bits of the grey levels that it makes; planes that are to be fused have more than the picture.
-    pub(crate) fn bits(&self) -> u32 {
-        self.bits
-    }
-
     /// Light as a fraction of full scale becomes mean electrons.
     pub(crate) fn electrons(&self, channel: usize, light: &mut [f32]) {
         let Channel { full_scale_e, glare, .. } = self.channels[channel];
@@ -129,51 +137,50 @@ impl Detector {
 
     /// Takes in rows that begin at row `first`. Their grey levels, channels side by side, stand in `grey` at once, unless
     /// charge crosses rows in this camera: then when all rows were [`finish`](Self::finish)ed.
-    pub(crate) fn expose(
-        &self,
-        electrons: &[&mut [f32]],
-        width: usize,
-        first: usize,
-        keys: &[u64],
-        grey: &mut [u16],
-        developing: &mut Developing,
-    ) {
+    pub(crate) fn expose(&self, electrons: &[&mut [f32]], first: usize, grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
             developing.frame.resize(self.channels.len(), Vec::new());
             developing.frame.iter_mut().zip(electrons).for_each(|(frame, rows)| frame.extend_from_slice(rows));
             return;
         }
-        let Developing { levels, saturated, .. } = developing;
+        let Developing { width, keys, levels, saturated, .. } = developing;
         let origin = [0, u32::try_from(first).unwrap_or(u32::MAX)];
         let mut expose = |channel: &Channel, electrons: &[f32], key, levels: &mut [u16]| {
-            channel.camera.expose_window_marking(electrons, width, origin, key, levels, saturated);
+            channel.camera.expose_window_marking(electrons, *width, origin, key, levels, saturated);
         };
-        if let ([channel], [electrons]) = (&self.channels[..], electrons) {
-            expose(channel, electrons, keys[0], grey);
-            return;
+        match (&self.channels[..], electrons) {
+            ([channel], [electrons]) => expose(channel, electrons, keys[0], grey),
+            _ => self.develop(electrons.iter().map(|rows| &**rows), keys, levels, grey, expose),
         }
-        levels.resize(self.channels.len(), Vec::new());
-        for (((channel, electrons), key), levels) in
-            self.channels.iter().zip(electrons).zip(keys).zip(levels.iter_mut())
-        {
-            levels.resize(electrons.len(), 0);
-            expose(channel, electrons, *key, levels);
-        }
-        self.develop(levels, grey);
     }
 
     /// What can be done with a whole frame alone: charge that crosses rows.
-    pub(crate) fn finish(&self, width: usize, keys: &[u64], grey: &mut [u16], developing: &mut Developing) {
+    pub(crate) fn finish(&self, grey: &mut [u16], developing: &mut Developing) {
         if self.needs_whole_frame() {
-            let Developing { levels, saturated, frame, .. } = developing;
-            levels.resize(self.channels.len(), Vec::new());
-            for (((channel, electrons), key), levels) in
-                self.channels.iter().zip(frame).zip(keys).zip(levels.iter_mut())
-            {
-                levels.resize(electrons.len(), 0);
-                channel.camera.expose_frame(electrons, width, *key, levels, saturated);
-            }
-            self.develop(levels, grey);
+            let Developing { width, keys, levels, saturated, frame, .. } = developing;
+            self.develop(frame.iter().map(|rows| &rows[..]), keys, levels, grey, |channel, electrons, key, levels| {
+                channel.camera.expose_frame(electrons, *width, key, levels, saturated);
+            });
+        }
+    }
+
+    /// Grey levels of all channels, side by side. `levels` is memory for those of each.
+    fn develop<'a>(
+        &self,
+        electrons: impl Iterator<Item = &'a [f32]>,
+        keys: &[u64],
+        levels: &mut Vec<Vec<u16>>,
+        grey: &mut [u16],
+        mut expose: impl FnMut(&Channel, &[f32], u64, &mut [u16]),
+    ) {
+        levels.resize(self.channels.len(), Vec::new());
+        for (((channel, electrons), key), levels) in self.channels.iter().zip(electrons).zip(keys).zip(&mut *levels) {
+            levels.resize(electrons.len(), 0);
+            expose(channel, electrons, *key, levels);
+        }
+        match &self.srgb {
+            Some(srgb) => srgb.render(levels, grey, |value| (value + 0.5).min(srgb.largest) as u16),
+            None => interleave(levels, grey),
         }
     }
 
@@ -183,18 +190,10 @@ impl Detector {
             (None, _) => {}
             (Some(jpeg), 1) => jpeg.frame(grey, width),
             (Some(jpeg), _) => {
-                #[expect(clippy::cast_possible_truncation, reason = "JPEG is for 8 bits")]
                 let mut rgb: Vec<u8> = grey.iter().map(|level| *level as u8).collect();
                 jpeg.rgb(&mut rgb, width);
                 grey.iter_mut().zip(&rgb).for_each(|(level, byte)| *level = u16::from(*byte));
             }
-        }
-    }
-
-    fn develop(&self, levels: &[Vec<u16>], grey: &mut [u16]) {
-        match &self.srgb {
-            Some(srgb) => srgb.levels(levels, grey),
-            None => interleave(levels, grey),
         }
     }
 
@@ -215,19 +214,16 @@ impl Detector {
             channel.camera.mean_dn_into(electrons, means);
         }
         match &self.srgb {
-            Some(srgb) => srgb.means(means, out),
+            Some(srgb) => srgb.render(means, out, |value| value),
             None => interleave(means, out),
         }
     }
 
-    /// The grey level of a channel expected from a number of electrons.
-    pub(crate) fn expected_dn(&self, channel: usize, electrons: f64) -> f64 {
-        self.channels[channel].camera.expected_dn(electrons)
-    }
-
-    /// Standard deviation of the grey level of a pixel that expects this many electrons.
-    pub(crate) fn noise_dn(&self, channel: usize, electrons: f64) -> f64 {
-        self.channels[channel].camera.noise_dn(electrons)
+    /// How far a pixel of so many mean electrons stands out from what it would be with more light, relative to its noise.
+    pub(crate) fn contrast(&self, channel: usize, electrons: f64, without: f64) -> f64 {
+        let camera = &self.channels[channel].camera;
+        let noise_dn = camera.noise_dn(electrons).max(f64::MIN_POSITIVE);
+        (camera.expected_dn(without) - camera.expected_dn(electrons)) / noise_dn
     }
 }
 
@@ -278,19 +274,6 @@ impl Channel {
     }
 }
 
-fn jpeg(camera: &SceneCamera) -> Result<Jpeg, Cause> {
-    let params = JpegParams {
-        quality: camera.jpeg_quality,
-        subsampling: match camera.jpeg_subsampling {
-            Subsampling::Full => ccd_noise::Subsampling::Full,
-            Subsampling::Columns => ccd_noise::Subsampling::Columns,
-            Subsampling::Squares => ccd_noise::Subsampling::Squares,
-        },
-        bit_depth: camera.bits,
-    };
-    Ok(Jpeg::new(&params)?)
-}
-
 /// Values of several channels, side by side.
 fn interleave<T: Copy>(channels: &[Vec<T>], out: &mut [T]) {
     for (channel, values) in channels.iter().enumerate() {
@@ -330,6 +313,62 @@ pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2
         }
     }
     sums.iter().sum()
+}
+
+/// Steps of the tone curve's table: between two of them it is straight to a twentieth of an 8-bit grey level.
+const STEPS: usize = 4096;
+
+/// From balanced, linear grey levels of three channels to colours as microscope cameras show them: sRGB primaries and tone curve
+/// (IEC 61966-2-1).
+struct Srgb {
+    matrix: [[f32; 3]; 3],
+    inner: f32,
+    largest: f32,
+    /// The curve at even steps from 0 to 1, in grey levels, and once more its end.
+    curve: Vec<f32>,
+}
+
+impl Srgb {
+    /// `matrix` leads from the channels to linear sRGB; grey levels come with `inner_bits` and leave with `bits`.
+    fn new(matrix: &[[f64; 3]; 3], inner_bits: u32, bits: u32) -> Self {
+        let levels = |bits: u32| libm::exp2(f64::from(bits)) - 1.0;
+        let largest = levels(bits);
+        let curve =
+            (0..=STEPS + 1).map(|step| (largest * encoded((step as f64 / STEPS as f64).min(1.0))) as f32).collect();
+        Self {
+            matrix: matrix.map(|row| row.map(|v| v as f32)),
+            inner: (1.0 / levels(inner_bits)) as f32,
+            largest: largest as f32,
+            curve,
+        }
+    }
+
+    /// Writes colours side by side.
+    fn render<T: Copy + Into<f32>, U>(&self, channels: &[Vec<T>], out: &mut [U], store: impl Fn(f32) -> U) {
+        let [r, g, b] = channels else { return };
+        for (((out, &r), &g), &b) in out.chunks_exact_mut(3).zip(r).zip(g).zip(b) {
+            for (out, value) in out.iter_mut().zip(self.convert([r.into(), g.into(), b.into()])) {
+                *out = store(value);
+            }
+        }
+    }
+
+    /// Between 0 and the largest grey level.
+    #[inline(always)]
+    fn convert(&self, levels: [f32; 3]) -> [f32; 3] {
+        self.matrix.map(|row| {
+            let linear = self.inner * (row[0] * levels[0] + row[1] * levels[1] + row[2] * levels[2]);
+            let at = linear.clamp(0.0, 1.0) * STEPS as f32;
+            let step = at as usize;
+            let (low, high) = (self.curve[step], self.curve[step + 1]);
+            low + (at - step as f32) * (high - low)
+        })
+    }
+}
+
+/// The tone curve, 0 to 1.
+fn encoded(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! The engine: recipe, model, seed and index in; image and truth out.
+//! The engine: recipe, model, seed and index in; planes and everything known about them out.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::error::{Cause, Error};
-use crate::frame::{Finished, Frame, Plane};
+use crate::error::Error;
 use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::Studio;
@@ -13,6 +12,7 @@ use crate::render::{Desk, Rendering};
 use crate::scene::{self, Scene, WeightMap};
 use crate::threads::Threads;
 use crate::transmit::Lenses;
+use crate::truth::{Mask, Truth};
 
 /// What a recipe names but does not hold.
 #[derive(Debug, Clone, Default)]
@@ -27,11 +27,10 @@ pub struct Inputs {
 /// Makes images of one recipe and one model.
 #[derive(Debug)]
 pub struct Engine {
-    recipe: Recipe,
-    model: Model,
+    pub(crate) model: Model,
     weight_map: Option<WeightMap>,
-    studio: Studio,
-    lenses: Lenses,
+    pub(crate) studio: Studio,
+    pub(crate) lenses: Lenses,
     /// Memory of finished images: as many as were ever made side by side.
     desks: Mutex<Vec<Desk>>,
 }
@@ -51,7 +50,6 @@ impl Engine {
         let watch = Watch(inputs.profile.clone());
         let studio = Studio::new(recipe, model, watch).map_err(Error::Model)?;
         Ok(Self {
-            recipe: recipe.clone(),
             model: model.clone(),
             weight_map: inputs.weight_map.clone(),
             studio,
@@ -63,7 +61,7 @@ impl Engine {
     /// The recipe of this engine.
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
-        &self.recipe
+        &self.studio.recipe
     }
 
     /// Draws what lies on the slide.
@@ -71,7 +69,7 @@ impl Engine {
     /// # Errors
     /// If the layout has no room for what is asked.
     pub fn scene(&self, key: Key) -> Result<Scene, Error> {
-        self.studio.watch.time(Stage::Scene, || scene::draw(&self.recipe, &self.model, self.weight_map.as_ref(), key))
+        self.studio.watch.time(Stage::Scene, || scene::draw(self.recipe(), &self.model, self.weight_map.as_ref(), key))
     }
 
     /// Makes an image and its truth, showing each plane as soon as it is done. Its memory is that of the next.
@@ -100,32 +98,21 @@ impl Engine {
     ) -> Result<Finished, E> {
         let index = scene.key.index;
         let fail = |cause| E::from(Error::Image { index, cause });
-        let mut rendering = self.rendering(scene, threads).map_err(fail)?;
-        for plane in 0..rendering.planes() {
-            sink(rendering.plane(plane).map_err(fail)?)?;
-        }
-        let (finished, desk) = rendering.finish().map_err(fail)?;
+        self.at_desk(|desk| {
+            let mut rendering = Rendering::new(self, scene, threads, desk).map_err(fail)?;
+            for plane in 0..rendering.planes() {
+                sink(rendering.plane(plane, desk).map_err(fail)?)?;
+            }
+            rendering.finish(desk).map_err(fail)
+        })
+    }
+
+    /// Works in the memory of finished images, and leaves it to the next one.
+    pub(crate) fn at_desk<T>(&self, work: impl FnOnce(&mut Desk) -> T) -> T {
+        let mut desk = self.desks().pop().unwrap_or_default();
+        let made = work(&mut desk);
         self.desks().push(desk);
-        Ok(finished)
-    }
-
-    pub(crate) fn model(&self) -> &Model {
-        &self.model
-    }
-
-    pub(crate) fn lenses(&self) -> &Lenses {
-        &self.lenses
-    }
-
-    /// A scene on its way, in the memory of finished ones.
-    pub(crate) fn rendering(&self, scene: Scene, threads: Threads) -> Result<Rendering, Cause> {
-        let desk = self.desks().pop().unwrap_or_default();
-        Rendering::new(&self.studio, &self.lenses, scene, threads, desk)
-    }
-
-    /// Takes the memory of a scene back.
-    pub(crate) fn give_back(&self, rendering: Rendering) {
-        self.desks().push(rendering.into_desk());
+        made
     }
 
     fn desks(&self) -> MutexGuard<'_, Vec<Desk>> {
@@ -143,5 +130,72 @@ impl Engine {
             Ok(())
         })?;
         Ok(Frame { planes, finished })
+    }
+}
+
+/// One focal plane.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Plane {
+    /// Its place in the stack, from 0.
+    pub index: usize,
+    /// Travel of the stage to it, µm: one of [`Scene::planes_um`].
+    pub stage_um: f64,
+    /// Channels of a pixel: 1, or 3 for red, green and blue.
+    pub channels: usize,
+    /// Grey levels as the camera gives them, `0..=2^bits − 1`, row by row, the channels of a pixel side by side.
+    pub grey: Vec<u16>,
+    /// The same without any noise and before rounding: the expected grey level at each pixel.
+    pub noise_free: Vec<f32>,
+    /// Pixels at full well, or whose converter is at its highest level, in some channel.
+    pub saturated: Mask,
+    /// Number of places, in pixels, where the model of the optics would have given less light than there can be and a least
+    /// one was put in its place: beside very dark things.
+    pub floored: usize,
+}
+
+/// Everything about an image except its planes.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    /// What the image was made from.
+    pub scene: Scene,
+    /// What is known of it.
+    pub truth: Truth,
+    /// The noise-free image of a focus stack with every object in focus, in grey levels; empty for a single plane.
+    pub all_in_focus: Vec<f32>,
+}
+
+/// One image or focus stack, whole.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The planes in the order of [`Scene::planes_um`]: one for an image, several for a stack.
+    pub planes: Vec<Plane>,
+    /// Everything else.
+    pub finished: Finished,
+}
+
+/// The largest grey level of a camera with so many bits, at most 16.
+#[must_use]
+pub fn white_level(bits: u32) -> u16 {
+    u16::MAX >> 16_u32.saturating_sub(bits.max(1)).min(15)
+}
+
+impl Finished {
+    /// [`all_in_focus`](Self::all_in_focus) as a camera without noise would give it.
+    #[must_use]
+    pub fn sharp(&self) -> Vec<u16> {
+        let white = f32::from(white_level(self.scene.camera.bits));
+        // NaN becomes 0.
+        self.all_in_focus.iter().map(|&level| (level + 0.5).clamp(0.0, white) as u16).collect()
+    }
+}
+
+impl Frame {
+    /// The image that shows it in one plane, in grey levels: its only one or, of a stack, the one with everything in focus.
+    #[must_use]
+    pub fn picture(&self) -> Vec<u16> {
+        match self.planes.as_slice() {
+            [plane] => plane.grey.clone(),
+            _ => self.finished.sharp(),
+        }
     }
 }

@@ -29,15 +29,15 @@ pub(crate) fn correlate(
     // Rounding adds noise that neighbours do not share.
     let diluted = 1.0 + ROUNDING / variance.max(ROUNDING);
     let correlation = fusion.noise_correlation.map(|asked| (asked * diluted).min(MOST));
-    let [across, down] = [0, 1].map(|axis| Kernel::of(correlation[axis], SECOND[axis]));
+    let [across, down] = [0, 1].map(|axis| kernel(correlation[axis], SECOND[axis]));
     let structure = structure(expected, width, channels);
     let half = (HALF_ALONE * variance) as f32;
-    let centre = across.centre * down.centre;
+    let centre = across[0] * down[0];
     let mut noise = own.clone();
     for (noise, line) in noise.chunks_exact_mut(row).zip(own.chunks_exact(row)) {
         for (i, value) in noise.iter_mut().enumerate() {
             let (x, channel) = (i / channels, i % channels);
-            *value = across.at(|step| line[mirrored(x, step, width) * channels + channel]);
+            *value = filtered(across, |step| line[mirrored(x, step, width) * channels + channel]);
         }
     }
     let height = noise.len() / row;
@@ -45,14 +45,15 @@ pub(crate) fn correlate(
     for (y, shared) in shared.chunks_exact_mut(row).enumerate() {
         let rows: [usize; 5] = core::array::from_fn(|k| mirrored(y, k as i64 - 2, height) * row);
         for (x, value) in shared.iter_mut().enumerate() {
-            #[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "steps from -2 to 2")]
-            let of_row = |step: i64| noise[rows[(step + 2) as usize] + x];
-            *value = down.at(of_row);
+            *value = filtered(down, |step| noise[rows[(step + 2) as usize] + x]);
         }
     }
     // To first order this changes the correlation along the diagonals alone.
     let skew = (0.5 * fusion.noise_skew) as f32;
-    let clipped = Clipped::new(PLANE_NOISE * variance.sqrt());
+    // What is left of noise so many steps below the largest grey level, when planes are clipped there before they are fused.
+    let per_level = (STEPS as f64 / (REACH * (PLANE_NOISE * variance.sqrt()).max(1e-6))) as f32;
+    let remaining: [f32; STEPS + 1] =
+        core::array::from_fn(|step| deviation_below(REACH * step as f64 / STEPS as f64) as f32);
     for (y, grey) in grey.chunks_exact_mut(row).enumerate() {
         let [above, below] = [-1, 1].map(|step| mirrored(y, step, height) * row);
         for (i, grey) in grey.iter_mut().enumerate() {
@@ -64,11 +65,9 @@ pub(crate) fn correlate(
             let rest = 1.0 - alone;
             // The pixel's own noise is a part of what it shares, so that variances do not simply add.
             let norm = (alone * alone + rest * rest + 2.0 * alone * rest * centre).sqrt();
-            let value =
-                clipped.rest(top - expected[at]) * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the grey levels")]
-            let level = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
-            *grey = level;
+            let step = ((top - expected[at]).max(0.0) * per_level) as usize;
+            let value = remaining[step.min(STEPS)] * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
+            *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
 }
@@ -80,29 +79,9 @@ const HALF_ALONE: f64 = 15.0;
 /// Noise of a plane, relative to that of the picture it is fused to: fitted to how noise falls just below the largest grey level.
 const PLANE_NOISE: f64 = 2.0;
 
-/// What is left of noise when planes are clipped at the largest grey level before they are fused.
-struct Clipped {
-    per_level: f32,
-    rest: [f32; Self::STEPS + 1],
-}
-
-impl Clipped {
-    /// Steps of the table, and how far it reaches, in standard deviations.
-    const STEPS: usize = 64;
-    const REACH: f64 = 4.0;
-
-    fn new(plane_noise: f64) -> Self {
-        let rest = core::array::from_fn(|step| deviation_below(Self::REACH * step as f64 / Self::STEPS as f64) as f32);
-        Self { per_level: (Self::STEPS as f64 / (Self::REACH * plane_noise.max(1e-6))) as f32, rest }
-    }
-
-    /// The part of noise that is left so many levels below the largest.
-    fn rest(&self, below: f32) -> f32 {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index, clamped")]
-        let step = (below.max(0.0) * self.per_level) as usize;
-        self.rest[step.min(Self::STEPS)]
-    }
-}
+/// Steps of the table of what is left of clipped noise, and how far it reaches, in standard deviations.
+const STEPS: usize = 64;
+const REACH: f64 = 4.0;
 
 /// Standard deviation of the lesser of a normal deviate and `most`.
 fn deviation_below(most: f64) -> f64 {
@@ -163,33 +142,25 @@ fn mirrored(at: usize, step: i64, count: usize) -> usize {
 /// Correlation of noise two pixels apart, across and down: measured on pictures of extended focus.
 const SECOND: [f64; 2] = [-0.025, 0.01];
 
-/// A symmetric filter of five values (b, a, 1, a, b) over the root of the sum of their squares.
-struct Kernel {
-    centre: f32,
-    first: f32,
-    second: f32,
+/// The symmetric filter of five values (b, a, 1, a, b) over the root of the sum of their squares that leaves neighbours a
+/// correlation: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b². Its values from the middle on.
+fn kernel(correlation: f64, second: f64) -> [f32; 3] {
+    /// Steps of the fixed-point iteration: a fraction of a per mille is left after far fewer.
+    const STEPS: usize = 60;
+    let second = if correlation > 0.0 { second } else { 0.0 };
+    let (mut a, mut b) = (0.0_f64, 0.0_f64);
+    for _ in 0..STEPS {
+        let n = 1.0 + 2.0 * a * a + 2.0 * b * b;
+        let next = (correlation * n / (2.0 * (1.0 + b)), 0.5 * (second * n - a * a));
+        a += 0.5 * (next.0 - a);
+        b += 0.5 * (next.1 - b);
+    }
+    let norm = 1.0 / (1.0 + 2.0 * a * a + 2.0 * b * b).sqrt();
+    [norm as f32, (norm * a) as f32, (norm * b) as f32]
 }
 
-impl Kernel {
-    /// The filter that leaves neighbours a correlation: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
-    fn of(correlation: f64, second: f64) -> Self {
-        /// Steps of the fixed-point iteration: a fraction of a per mille is left after far fewer.
-        const STEPS: usize = 60;
-        let second = if correlation > 0.0 { second } else { 0.0 };
-        let (mut a, mut b) = (0.0_f64, 0.0_f64);
-        for _ in 0..STEPS {
-            let n = 1.0 + 2.0 * a * a + 2.0 * b * b;
-            let next = (correlation * n / (2.0 * (1.0 + b)), 0.5 * (second * n - a * a));
-            a += 0.5 * (next.0 - a);
-            b += 0.5 * (next.1 - b);
-        }
-        let norm = 1.0 / (1.0 + 2.0 * a * a + 2.0 * b * b).sqrt();
-        Self { centre: norm as f32, first: (norm * a) as f32, second: (norm * b) as f32 }
-    }
-
-    fn at(&self, value: impl Fn(i64) -> f32) -> f32 {
-        self.centre * value(0) + self.first * (value(-1) + value(1)) + self.second * (value(-2) + value(2))
-    }
+fn filtered([centre, first, second]: [f32; 3], value: impl Fn(i64) -> f32) -> f32 {
+    centre * value(0) + first * (value(-1) + value(1)) + second * (value(-2) + value(2))
 }
 
 #[cfg(test)]
@@ -198,47 +169,59 @@ mod tests {
     use crate::key::Key;
     use crate::random;
 
+    const WIDTH: usize = 320;
+
+    /// What is left of a camera's noise of a standard deviation, in levels of the first number of bits, on what was expected; and its
+    /// variance.
+    fn fused(expected: impl Fn(usize) -> f32, sd: f64, skew: f64, bits: [u32; 2]) -> (Vec<f64>, f64) {
+        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
+        let mut expected: Vec<f32> = (0..WIDTH * 300).map(expected).collect();
+        let noisy = |e: &f32| (f64::from(*e) + 0.5 + sd * random::normal(&mut rng)) as u16;
+        let mut grey: Vec<u16> = expected.iter().map(noisy).collect();
+        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: skew };
+        correlate(&mut grey, &mut expected, WIDTH, 1, &fusion, bits);
+        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
+        let variance = product(&noise, 0);
+        (noise, variance)
+    }
+
+    /// Mean product of noise and that so many pixels on.
+    fn product(noise: &[f64], step: usize) -> f64 {
+        let pairs = (0..noise.len() - step).filter(|i| step + 1 >= WIDTH || i % WIDTH + step < WIDTH);
+        let products: Vec<f64> = pairs.map(|i| noise[i] * noise[i + step]).collect();
+        products.iter().sum::<f64>() / products.len() as f64
+    }
+
     #[test]
     fn neighbours_share_as_much_noise_as_asked_and_its_variance_stays() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 3, index: 0 }.stream("test", 0, "noise");
-        let mut expected = vec![2000.0_f32; width * height];
-        let mut grey: Vec<u16> =
-            (0..width * height).map(|_| (2000.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
-        let noise: Vec<f64> = grey.iter().map(|g| f64::from(*g) - 2000.0).collect();
-        let product = |step: usize| {
-            let pairs = (0..noise.len() - step).filter(|i| step + 1 >= width || i % width + step < width);
-            let products: Vec<f64> = pairs.map(|i| noise[i] * noise[i + step]).collect();
-            products.iter().sum::<f64>() / products.len() as f64
-        };
-        let variance = product(0);
+        let (noise, variance) = fused(|_| 2000.0, 30.0, 0.02, [12, 12]);
         // Some 10⁵ pixels: a standard error of .003 for each.
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-        assert!((product(1) / variance - 0.2).abs() < 0.012, "{}", product(1) / variance);
-        assert!((product(width) / variance - 0.4).abs() < 0.012, "{}", product(width) / variance);
-        assert!((product(2) / variance - SECOND[0]).abs() < 0.012, "{}", product(2) / variance);
-        let skew = 0.5 * (product(width + 1) - product(width - 1)) / variance;
+        for (step, wanted) in [(1, 0.2), (WIDTH, 0.4), (2, SECOND[0])] {
+            let found = product(&noise, step) / variance;
+            assert!((found - wanted).abs() < 0.012, "{step}: {found}");
+        }
+        let skew = 0.5 * (product(&noise, WIDTH + 1) - product(&noise, WIDTH - 1)) / variance;
         assert!((skew - 0.02).abs() < 0.008, "{skew}");
     }
 
     #[test]
     fn where_there_is_structure_noise_is_the_cameras() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 4, index: 0 }.stream("test", 0, "noise");
-        // Waves of 1900 levels in noise of 15.
-        let mut expected: Vec<f32> =
-            (0..width * height).map(|i| 2000.0 + 1900.0 * libm::sin((i % width) as f64 * 0.7) as f32).collect();
-        let mut grey: Vec<u16> =
-            expected.iter().map(|e| (f64::from(*e) + 0.5 + 30.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.02 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [12, 12]);
-        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
-        let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
-        let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64;
+        // Waves of 1900 levels.
+        let waves = |i| 2000.0 + 1900.0 * libm::sin((i % WIDTH) as f64 * 0.7) as f32;
+        let (noise, variance) = fused(waves, 30.0, 0.02, [12, 12]);
         assert!((variance / 900.0 - 1.0).abs() < 0.03, "{variance}");
-        assert!((down / variance).abs() < 0.03, "{}", down / variance);
+        let down = product(&noise, WIDTH) / variance;
+        assert!(down.abs() < 0.03, "{down}");
+    }
+
+    #[test]
+    fn faint_noise_is_shared_too() {
+        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
+        let (noise, variance) = fused(|_| 200.25 * 257.0, 0.9 * 257.0, 0.0, [16, 8]);
+        assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
+        let down = product(&noise, WIDTH) / variance;
+        assert!((down - 0.4).abs() < 0.03, "{down}");
     }
 
     #[test]
@@ -251,22 +234,5 @@ mod tests {
             assert!((deviation_below(most) - sd).abs() < 0.01, "{most}: {sd}");
         }
         assert!((deviation_below(6.0) - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn faint_noise_is_shared_too() {
-        let (width, height) = (320, 300);
-        let mut rng = Key { seed: 6, index: 0 }.stream("test", 0, "noise");
-        // Noise of .9 levels of 8 bits: a filter of whole levels would be undone by rounding.
-        let mut expected = vec![200.25 * 257.0_f32; width * height];
-        let mut grey: Vec<u16> =
-            expected.iter().map(|e| (f64::from(*e) + 0.9 * 257.0 * random::normal(&mut rng)) as u16).collect();
-        let fusion = Fusion { first_um: 0.0, step_um: 1.0, planes: 3, noise_correlation: [0.2, 0.4], noise_skew: 0.0 };
-        correlate(&mut grey, &mut expected, width, 1, &fusion, [16, 8]);
-        let noise: Vec<f64> = grey.iter().zip(&expected).map(|(g, e)| f64::from(*g) - f64::from(*e)).collect();
-        let variance = noise.iter().map(|n| n * n).sum::<f64>() / noise.len() as f64;
-        let down = noise.windows(width + 1).map(|w| w[0] * w[width]).sum::<f64>() / noise.len() as f64 / variance;
-        assert!((variance - 0.81 - ROUNDING).abs() < 0.03, "{variance}");
-        assert!((down - 0.4).abs() < 0.03, "{down}");
     }
 }

@@ -9,7 +9,6 @@ mod debris;
 mod detect;
 mod engine;
 mod error;
-mod frame;
 mod fuse;
 pub mod key;
 #[cfg(feature = "learn")]
@@ -19,8 +18,6 @@ mod phantom;
 pub mod profile;
 pub mod recipe;
 mod render;
-mod rendition;
-mod restore;
 pub mod scene;
 pub mod slide;
 mod threads;
@@ -29,8 +26,7 @@ pub mod truth;
 
 use portable_numerics::random;
 
-pub use engine::{Engine, Inputs};
+pub use engine::{Engine, Finished, Frame, Inputs, Plane, white_level};
 pub use error::{Cause, Error, Flaw};
-pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

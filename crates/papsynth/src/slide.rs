@@ -11,9 +11,10 @@ use crate::engine::Engine;
 use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::recipe::{Imaging, Optics, Problem};
+use crate::render::Rendering;
 use crate::scene::{BEYOND, Object, PLOT_PX, Plot, Population, Scene, SlideFrame, View};
 use crate::threads::{self, Threads};
-use crate::transmit::Spread;
+use crate::transmit::{self, LightPath};
 use crate::truth::{Group, LabelMap, ObjectTruth};
 
 /// A whole slide of an engine's recipe and model.
@@ -37,7 +38,8 @@ pub struct Slide<'a> {
     population: Population,
     /// The slide without anything on it.
     empty: Scene,
-    spread: Spread,
+    /// How the optics spread what lies on it.
+    path: LightPath,
     /// Pixels round a frame that are exposed with it and cut off.
     border_px: i64,
 }
@@ -102,11 +104,12 @@ impl<'a> Slide<'a> {
             return Err(fail("optics.imaging", "\"abbe\" images whole fields; slides know \"product\"".to_owned()));
         }
         let key = Key { seed, index: number };
-        let (population, mut empty) = Population::new(recipe, engine.model(), key).map_err(Error::Layout)?;
+        let (population, mut empty) = Population::new(recipe, &engine.model, key).map_err(Error::Layout)?;
         empty.slide = number;
         empty.background.illumination = empty.background.illumination.weakened(recipe.scan.shading_left);
-        let spread = Spread::new(&empty, engine.lenses()).map_err(Error::Layout)?;
-        let border_px = spread.of_picture_px() as i64;
+        let nothing = transmit::Slide { scene: &empty, phantoms: &[], threads: Threads::One };
+        let path = LightPath::new(nothing, &engine.lenses).map_err(Error::Layout)?;
+        let border_px = path.picture_reach_px() as i64;
         let reach_px = recipe.scan.reach_um / empty.view.pixel_um;
         let most = (BEYOND - 1) as f64 * PLOT_PX as f64;
         if reach_px > most {
@@ -118,7 +121,7 @@ impl<'a> Slide<'a> {
             );
             return Err(fail("scan.reach_um", message));
         }
-        Ok(Self { engine, number, population, empty, spread, border_px })
+        Ok(Self { engine, number, population, empty, path, border_px })
     }
 
     /// Columns and rows of the slide.
@@ -206,7 +209,7 @@ impl<'a> Slide<'a> {
                 let plot: Arc<Vec<Object>> = self.population.plot(at)?;
                 for object in plot.iter() {
                     let reach_px = object.body.reach_um(pixel_um) / pixel_um + 3.0;
-                    let spread_px = self.spread.of_object_px(&self.empty, object.depth_um)?;
+                    let spread_px = self.path.object_reach_px(&self.empty, object.depth_um)?;
                     let reach_px = reach_px + spread_px as f64;
                     if reach_px > halo as f64 {
                         let (kind, reach_um) = (object.body.kind().name(), reach_px * pixel_um);
@@ -236,49 +239,55 @@ impl<'a> Slide<'a> {
         if at[0] >= frames[0] || at[1] >= frames[1] {
             return Err(self.fail(Cause::NoFrame(at, frames)));
         }
-        self.expose(at, threads, true).map_err(|cause| self.fail(cause))
+        self.expose(at, [0, 0], self.size_px(), threads, true).map_err(|cause| self.fail(cause))
     }
 
-    fn expose(&self, at: [u32; 2], threads: Threads, noise_free: bool) -> Result<SlidePart, Cause> {
-        let side = self.side_px();
-        let origin_px = at.map(|at| at * side);
-        let border = self.border_px;
-        let low = origin_px.map(|at| i64::from(at) - border);
-        let whole = side as usize + 2 * border as usize;
-        let high = low.map(|at| at + whole as i64);
+    /// What of a part of the slide lies in a frame that it meets.
+    fn expose(
+        &self,
+        at: [u32; 2],
+        origin_px: [u32; 2],
+        size_px: [u32; 2],
+        threads: Threads,
+        noise_free: bool,
+    ) -> Result<SlidePart, Cause> {
+        let (side, pixel_um, slide_px) = (self.side_px(), self.pixel_um(), self.size_px());
+        let end_px = [0, 1].map(|axis| (origin_px[axis] + size_px[axis]).min((at[axis] * side).saturating_add(side)));
+        let origin_px = [0, 1].map(|axis| origin_px[axis].max(at[axis] * side));
+        let size_px = [0, 1].map(|axis| end_px[axis] - origin_px[axis]);
+        let low = at.map(|at| i64::from(at * side) - self.border_px);
+        let whole = side as usize + 2 * self.border_px as usize;
         let scene = Scene {
-            view: View { width: whole, height: whole, pixel_um: self.pixel_um() },
+            view: View { width: whole, height: whole, pixel_um },
             frame: Some(SlideFrame { number: at[1] << 16 | at[0], origin_px: low }),
-            objects: self.reaching(low, high)?,
+            objects: self.reaching(low, low.map(|at| at + whole as i64))?,
             ..self.empty.clone()
         };
-        let slide_px = self.size_px();
-        let size_px = [0, 1].map(|axis| side.min(slide_px[axis] - origin_px[axis]));
         let channels = scene.channels();
-        let cut = Cut { border: border as usize, whole, size: size_px.map(|side| side as usize) };
-        let mut rendering = self.engine.rendering(scene, threads)?;
-        let mut planes = Vec::new();
-        for index in 0..rendering.planes() {
-            let plane = rendering.plane(index)?;
-            planes.push(PartPlane {
-                stage_um: plane.stage_um,
-                grey: cut.of(&plane.grey, channels),
-                noise_free: if noise_free { cut.of(&plane.noise_free, channels) } else { Vec::new() },
-            });
-        }
-        let pixel_um = self.pixel_um();
+        let first = [0, 1].map(|axis| (i64::from(origin_px[axis]) - low[axis]) as usize);
+        let cut = Cut { first, whole, size: size_px.map(|side| side as usize) };
         let within = |place_um: [f64; 2]| {
             (0..2).all(|axis| {
-                let at = (place_um[axis] / pixel_um).floor() - border as f64;
+                let at = (place_um[axis] / pixel_um).floor() - first[axis] as f64;
                 at >= 0.0 && at < f64::from(size_px[axis])
             })
         };
-        let (truth, objects) = rendering.on_slide(slide_px, within);
-        self.engine.give_back(rendering);
-        let labels =
-            Group::ALL.map(|group| LabelMap { width: size_px[0] as usize, ids: cut.of(&truth.labels(group).ids, 1) });
-        let layers = cut.of(&truth.layers(), 1);
-        Ok(SlidePart { origin_px, size_px, planes, labels: labels.to_vec(), layers, objects })
+        self.engine.at_desk(|desk| {
+            let mut rendering = Rendering::new(self.engine, scene, threads, desk)?;
+            let mut planes = Vec::new();
+            for index in 0..rendering.planes() {
+                let plane = rendering.plane(index, desk)?;
+                planes.push(PartPlane {
+                    stage_um: plane.stage_um,
+                    grey: cut.of(&plane.grey, channels),
+                    noise_free: if noise_free { cut.of(&plane.noise_free, channels) } else { Vec::new() },
+                });
+            }
+            let (truth, objects) = rendering.on_slide(slide_px, within, desk);
+            let map = |group| LabelMap { width: cut.size[0], ids: cut.of(&truth.labels(group).ids, 1) };
+            let labels = Group::ALL.map(map).to_vec();
+            Ok(SlidePart { origin_px, size_px, planes, labels, layers: cut.of(&truth.layers(), 1), objects })
+        })
     }
 
     /// Any part of the slide, cut from the frames that it meets.
@@ -318,17 +327,10 @@ impl<'a> Slide<'a> {
         // Few at a time, since each takes the memory of a picture.
         for frames in frames.chunks(threads::count(threads)) {
             let inner = if frames.len() > 1 { Threads::One } else { threads };
-            for frame in threads::map(threads, frames, |&at| self.expose(at, inner, noise_free)) {
-                part.lay(&frame.map_err(|cause| self.fail(cause))?, self.channels());
+            for frame in threads::map(threads, frames, |&at| self.expose(at, origin_px, size_px, inner, noise_free)) {
+                part.lay(frame.map_err(|cause| self.fail(cause))?, self.channels());
             }
         }
-        let pixel_um = self.pixel_um();
-        part.objects.retain(|object| {
-            (0..2).all(|axis| {
-                let at = (object.centre_um[axis] / pixel_um).floor();
-                at >= f64::from(origin_px[axis]) && at < f64::from(origin_px[axis] + size_px[axis])
-            })
-        });
         part.objects.sort_by_key(|object| (object.id, object.part));
         Ok(part)
     }
@@ -353,49 +355,41 @@ impl SlidePart {
         }
     }
 
-    /// Takes over what it shares with another part.
-    fn lay(&mut self, other: &Self, channels: usize) {
-        let low = [0, 1].map(|axis| self.origin_px[axis].max(other.origin_px[axis]));
-        let high = [0, 1]
-            .map(|axis| (self.origin_px[axis] + self.size_px[axis]).min(other.origin_px[axis] + other.size_px[axis]));
-        if low[0] >= high[0] {
-            return;
-        }
-        let columns = (high[0] - low[0]) as usize;
-        let at = |part: &Self, y: u32| {
-            (y - part.origin_px[1]) as usize * part.size_px[0] as usize + (low[0] - part.origin_px[0]) as usize
-        };
-        let places: Vec<[usize; 2]> = (low[1]..high[1]).map(|y| [at(self, y), at(other, y)]).collect();
-        fn copy<T: Copy>(places: &[[usize; 2]], values: usize, to: &mut [T], from: &[T], channels: usize) {
-            for [own, others] in places {
-                to[own * channels..][..values].copy_from_slice(&from[others * channels..][..values]);
+    /// Takes in a part that lies within it.
+    fn lay(&mut self, other: Self, channels: usize) {
+        let [x, y] = [0, 1].map(|axis| (other.origin_px[axis] - self.origin_px[axis]) as usize);
+        let (width, columns) = (self.size_px[0] as usize, other.size_px[0] as usize);
+        let place = [y * width + x, width, columns];
+        fn copy<T: Copy>(to: &mut [T], from: &[T], [at, width, columns]: [usize; 3], channels: usize) {
+            for (row, from) in from.chunks_exact(columns * channels).enumerate() {
+                to[(at + row * width) * channels..][..from.len()].copy_from_slice(from);
             }
         }
         for (plane, others) in self.planes.iter_mut().zip(&other.planes) {
-            copy(&places, columns * channels, &mut plane.grey, &others.grey, channels);
-            if !plane.noise_free.is_empty() {
-                copy(&places, columns * channels, &mut plane.noise_free, &others.noise_free, channels);
-            }
+            copy(&mut plane.grey, &others.grey, place, channels);
+            copy(&mut plane.noise_free, &others.noise_free, place, channels);
         }
         for (labels, others) in self.labels.iter_mut().zip(&other.labels) {
-            copy(&places, columns, &mut labels.ids, &others.ids, 1);
+            copy(&mut labels.ids, &others.ids, place, 1);
         }
-        copy(&places, columns, &mut self.layers, &other.layers, 1);
-        self.objects.extend(other.objects.iter().cloned());
+        copy(&mut self.layers, &other.layers, place, 1);
+        self.objects.extend(other.objects);
     }
 }
 
 /// What is kept of a frame with its border.
 struct Cut {
-    border: usize,
+    /// First column and row.
+    first: [usize; 2],
+    /// Columns of the frame with its border.
     whole: usize,
+    /// Columns and rows.
     size: [usize; 2],
 }
 
 impl Cut {
     fn of<T: Copy>(&self, values: &[T], channels: usize) -> Vec<T> {
-        let row = self.whole * channels;
-        let rows = values.chunks_exact(row).skip(self.border).take(self.size[1]);
-        rows.flat_map(|row| &row[self.border * channels..][..self.size[0] * channels]).copied().collect()
+        let rows = values.chunks_exact(self.whole * channels).skip(self.first[1]).take(self.size[1]);
+        rows.flat_map(|row| &row[self.first[0] * channels..][..self.size[0] * channels]).copied().collect()
     }
 }

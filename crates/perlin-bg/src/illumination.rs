@@ -36,14 +36,8 @@ impl Default for Illumination {
 pub(crate) struct Shade {
     columns: Vec<f32>,
     rows: Vec<f32>,
-    join: Join,
-}
-
-/// How a column's and a row's part make a pixel.
-#[derive(Debug, Clone, Copy)]
-enum Join {
-    Smaller,
-    Sum,
+    /// Whether the smaller of a column's and a row's part makes a pixel, or their sum.
+    smaller: bool,
 }
 
 impl Shade {
@@ -62,7 +56,7 @@ impl Shade {
                         })
                         .collect()
                 };
-                Ok(Self { columns: powers(width), rows: powers(height), join: Join::Smaller })
+                Ok(Self { columns: powers(width), rows: powers(height), smaller: true })
             }
             Illumination::Bowl { x2, y2, tilt } => {
                 for (field, value) in [
@@ -84,9 +78,10 @@ impl Shade {
                 let shade = Self {
                     columns: parabola(width, 1.0, x2, tilt[0]),
                     rows: parabola(height, 0.0, y2, tilt[1]),
-                    join: Join::Sum,
+                    smaller: false,
                 };
-                let lowest = f64::from(shade.lowest());
+                let smallest = |part: &[f32]| part.iter().copied().fold(f32::INFINITY, f32::min);
+                let lowest = f64::from(smallest(&shade.columns) + smallest(&shade.rows));
                 if lowest > 0.0 { Ok(shade) } else { Err(Error::DarkBowl { x2, y2, tilt, lowest }) }
             }
         }
@@ -100,31 +95,15 @@ impl Shade {
         self.rows.len()
     }
 
-    /// The smallest value in the field of view.
-    pub(crate) fn lowest(&self) -> f32 {
-        let smallest = |part: &[f32]| part.iter().copied().fold(f32::INFINITY, f32::min);
-        self.join.of(smallest(&self.columns), smallest(&self.rows))
-    }
-
     /// Part of a row of the field of view.
     pub(crate) fn row_into(&self, row: &mut [f32], first_column: usize, number: usize) {
         let from_row = self.rows[number];
         let columns = &self.columns[first_column..first_column + row.len()];
         // One loop a shape, so that the choice stands outside it.
-        match self.join {
-            Join::Smaller => fill(row, columns, |column| Join::Smaller.of(column, from_row)),
-            Join::Sum => fill(row, columns, |column| Join::Sum.of(column, from_row)),
-        }
-    }
-}
-
-impl Join {
-    #[inline(always)]
-    fn of(self, column: f32, row: f32) -> f32 {
-        match self {
-            Self::Smaller if column < row => column,
-            Self::Smaller => row,
-            Self::Sum => column + row,
+        if self.smaller {
+            fill(row, columns, |column| if column < from_row { column } else { from_row });
+        } else {
+            fill(row, columns, |column| column + from_row);
         }
     }
 }

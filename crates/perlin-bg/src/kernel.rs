@@ -127,24 +127,16 @@ mod tests {
 
     #[test]
     fn log10_follows_libm() {
-        let mut worst = 0.0f64;
-        for i in 0..200_000u32 {
-            // Steps through all exponents of normal numbers and through mantissas.
-            let x = f32::from_bits(0x0080_0000 + i * 10_600);
-            let exact = libm::log10(f64::from(x));
-            let error = (f64::from(log10_of(x)) - exact).abs() / exact.abs().max(1e-30);
-            worst = worst.max(error);
-        }
-        assert!(worst < 3e-7, "{worst}");
-        assert_eq!(log10_of(1.0), 0.0);
-    }
-
-    #[test]
-    fn log10_of_a_row_is_log10_of_its_points() {
-        let mut row: Vec<f32> = (1..100).map(|i| i as f32 * 0.37).collect();
-        let points: Vec<f32> = row.iter().map(|&v| log10_of(v)).collect();
+        // Steps through all exponents of normal numbers and through mantissas.
+        let values: Vec<f32> = (0..200_001u32).map(|i| f32::from_bits(0x0080_0000 + i * 10_600)).collect();
+        let mut row = values.clone();
         log10(&mut row);
-        assert_eq!(row, points);
+        for (found, value) in row.into_iter().zip(values) {
+            let exact = libm::log10(f64::from(value));
+            assert!((f64::from(found) - exact).abs() < 3e-7 * exact.abs().max(1e-30), "{value}: {found}");
+            assert_eq!(found, log10_of(value));
+        }
+        assert_eq!(log10_of(1.0), 0.0);
     }
 
     #[test]

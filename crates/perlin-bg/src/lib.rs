@@ -10,12 +10,10 @@ mod interop;
 mod kernel;
 mod perlin;
 mod rows;
-mod unit;
 
-pub use background::{Background, BackgroundParams, Scatter};
+pub use background::{Background, BackgroundParams, Scatter, UnitRange, stretch_to_unit};
 pub use error::Error;
 pub use fractal::{Fractal, FractalParams};
 pub use illumination::Illumination;
 pub use perlin::{Fade, Perlin, PerlinParams};
 pub use rows::Window;
-pub use unit::{UnitRange, stretch_to_unit};

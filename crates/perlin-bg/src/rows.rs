@@ -55,13 +55,8 @@ impl Perlin {
     /// # Panics
     /// If `width` is zero or does not divide the length of `image`.
     pub fn add_into(&self, image: &mut [f32], width: usize, window: &Window, amplitude: f32) {
-        let mut rows = self.rows(width, window, amplitude);
+        let mut rows = Rows::new(self, (0..width).map(|c| window.x(c)), amplitude);
         for_each_row(image, width, |r, row| rows.add_row(row, window.y(r)));
-    }
-
-    /// The sampler behind [`Perlin::add_into`], one row at a time.
-    pub(crate) fn rows(&self, width: usize, window: &Window, amplitude: f32) -> Rows<'_> {
-        Rows::new(self, (0..width).map(|c| window.x(c)), amplitude)
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) fn outcome_of_tries<R: Rng + ?Sized>(
     // with probability 1 - (1 - x)ⁿ.
     #[expect(clippy::cast_precision_loss, reason = "far below 2^53 tries")]
     let least_of_tries = -libm::expm1(libm::log1p(-uniform(rng)) / tries as f64);
-    let mut left = least_of_tries * sum(weights);
+    let mut left = least_of_tries * level(costs, weights, f32::NEG_INFINITY, f32::INFINITY).0;
     // All that are good enough count as one level, and so do all of one cost: which of them was
     // tried first is a matter of their weights alone.
     let (mut above, mut to) = (f32::NEG_INFINITY, enough);
@@ -78,17 +78,6 @@ fn level(costs: &[f32], weights: &[f32], above: f32, to: f32) -> (f64, f32) {
     (sums.iter().map(|&s: &f32| f64::from(s)).sum(), next.into_iter().fold(f32::INFINITY, f32::min))
 }
 
-#[multiversion(targets = "simd")]
-fn sum(weights: &[f32]) -> f64 {
-    let mut sums = [0.0; LANES];
-    for block in weights.as_chunks::<LANES>().0 {
-        for lane in 0..LANES {
-            sums[lane] += block[lane];
-        }
-    }
-    sums.iter().map(|&s: &f32| f64::from(s)).sum()
-}
-
 /// Replaces each x by exp(least - x), `least` the smallest.
 #[multiversion(targets = "simd")]
 pub(crate) fn exp_below(xs: &mut [f32], least: f32) {
@@ -112,7 +101,7 @@ pub(crate) fn below_exp(u: f64, x: f64) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use portable_numerics::random::below;
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
@@ -146,6 +135,15 @@ mod tests {
         best.1
     }
 
+    /// Pearson's test of two rows of counts of as many draws.
+    pub(crate) fn assert_same_distribution(counts: &[[f64; 2]]) {
+        let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
+        let (chi_square, freedom) = (terms.clone().sum::<f64>(), terms.count() as f64 - 1.0);
+        assert!(freedom >= 2.0);
+        // The mean of the distribution and four standard deviations, a little more than 0.1 %.
+        assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{chi_square} of {freedom}");
+    }
+
     #[test]
     fn outcome_equals_that_of_tries_one_by_one() {
         const DRAWS: usize = 50_000;
@@ -170,11 +168,7 @@ mod tests {
                 let slow = slow(&costs, &weights, enough, least, tries, &mut rng);
                 counts[slow.unwrap_or(2 * LANES)][1] += 1.0;
             }
-            let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
-            let (chi_square, freedom) = (terms.clone().sum::<f64>(), terms.count() as f64 - 1.0);
-            assert!(freedom >= 2.0);
-            // The mean of the distribution and four standard deviations.
-            assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{enough} {tries}: {chi_square}, {freedom}");
+            assert_same_distribution(&counts);
         }
     }
 

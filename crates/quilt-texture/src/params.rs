@@ -170,17 +170,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paper_defaults() {
-        let paper = QuiltParams::paper();
-        assert_eq!((paper.patch_px, paper.overlap_px), (7, 2));
-        assert!(matches!(paper.acceptance, Acceptance::Threshold { d_max: 15.0, .. }));
-        assert_eq!(paper.seam, Seam::Feather);
-        assert!(paper.centre_bias.strength() > 0.0);
-        assert_eq!(paper.check(), Ok(()));
-        assert_eq!(QuiltParams::default().check(), Ok(()));
-    }
-
-    #[test]
     fn impossible_numbers_are_errors() {
         let good = QuiltParams::default;
         let near = |factor, floor| Acceptance::Near { factor, floor };

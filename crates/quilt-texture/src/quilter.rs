@@ -1,14 +1,11 @@
 use portable_numerics::random::{below, uniform};
 use rand_core::Rng;
 
-use crate::candidates::Candidates;
-use crate::canvas::Canvas;
-use crate::distance::centrality;
+use crate::canvas::{Canvas, Texture};
 use crate::draw::{below_exp, exp_below, outcome_of_tries, slots_between};
-use crate::scan::{Laid, Template, Tolerance, scan};
-use crate::source::{COVERED, LANES};
+use crate::scan::{Candidates, Laid, Template, Tolerance, scan};
+use crate::source::{COVERED, LANES, centrality};
 use crate::spectral::Spectral;
-use crate::texture::Texture;
 use crate::{Acceptance, CentreBias, Error, QuiltParams, Search, Source};
 
 /// Places drawn before one is taken although the weighting is against it: enough for a weight of
@@ -196,24 +193,37 @@ impl<'a> Quilter<'a> {
         rng: &mut R,
     ) -> Option<usize> {
         let Work { laid, costs, weights, .. } = work;
-        self.scan(laid, Tolerance { factor: 0.0, floor: least }, 0.0, costs);
+        self.scan(laid, Tolerance { factor: 0.0, floor: least }, 0.0, costs, None);
         // Without pixels the cost is strength · Δ², and exp(-cost) the weight.
         #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
         let strength = self.params.centre_bias.strength() as f32;
         laid.iter_mut().for_each(|laid| laid.forget_pixels(strength));
-        let nearest = self.scan(laid, Tolerance { factor: 1.0, floor: f32::INFINITY }, f32::INFINITY, weights);
+        let nearest = self.scan(laid, Tolerance { factor: 1.0, floor: f32::INFINITY }, f32::INFINITY, weights, None);
         exp_below(weights, nearest);
         outcome_of_tries(costs, weights, enough, least, tries, rng)
     }
 
-    /// Costs of all candidates, one by one, and the smallest.
-    fn scan(&self, laid: &[Laid], tolerance: Tolerance, mut least: f32, costs: &mut Vec<f32>) -> f32 {
+    /// Costs of all candidates, and the smallest: one by one, or by Fourier transforms where a template is given and they are
+    /// faster.
+    fn scan(
+        &self,
+        laid: &[Laid],
+        tolerance: Tolerance,
+        mut least: f32,
+        costs: &mut Vec<f32>,
+        template: Option<&Template>,
+    ) -> f32 {
         costs.resize(self.slots, 0.0);
         let mut rest = &mut costs[..];
-        for (Donor { source, candidates, .. }, laid) in self.donors.iter().zip(laid) {
+        for (Donor { source, candidates, spectral }, laid) in self.donors.iter().zip(laid) {
             let (costs, others) = rest.split_at_mut(candidates.slots);
             rest = others;
-            scan(source, candidates, laid, tolerance, &mut least, costs);
+            match (spectral, template) {
+                (Some(spectral), Some(template)) => {
+                    spectral.costs(source, candidates, self.params.patch_px, template, &mut least, costs);
+                }
+                _ => scan(source, candidates, laid, tolerance, &mut least, costs),
+            }
         }
         least
     }
@@ -229,12 +239,11 @@ impl<'a> Quilter<'a> {
     ) -> Candidate {
         #[expect(clippy::cast_precision_loss, reason = "at most 256 squared")]
         let scale = self.variance * work.template.pixels.len() as f64;
+        let (floor, weight) = (floor * scale, self.params.centre_bias.strength() * scale);
         #[expect(clippy::cast_possible_truncation, reason = "costs are single precision")]
-        let tolerance = Tolerance { factor: factor as f32, floor: (floor * scale) as f32 };
-        #[expect(clippy::cast_possible_truncation, reason = "costs are single precision")]
-        {
-            work.template.weight = (self.params.centre_bias.strength() * scale) as f32;
-        }
+        let [factor, floor, weight] = [factor, floor, weight].map(|number| number as f32);
+        let tolerance = Tolerance { factor, floor };
+        work.template.weight = weight;
         self.lay(&work.template, &mut work.laid);
         // What continues a neighbour usually fits well, and lets the scan reject early. It must be
         // found again with the same bits, which Fourier transforms do not promise.
@@ -245,21 +254,9 @@ impl<'a> Quilter<'a> {
                 least = least.min(work.laid[donor].cost(source, place));
             }
         }
-        work.costs.resize(self.slots, 0.0);
-        let mut rest = &mut work.costs[..];
-        for (donor, laid) in self.donors.iter().zip(&work.laid) {
-            let (costs, others) = rest.split_at_mut(donor.candidates.slots);
-            rest = others;
-            match &donor.spectral {
-                None => scan(donor.source, &donor.candidates, laid, tolerance, &mut least, costs),
-                Some(spectral) => {
-                    let patch = self.params.patch_px;
-                    spectral.costs(donor.source, &donor.candidates, patch, &work.template, &mut least, costs);
-                }
-            }
-        }
+        let least = self.scan(&work.laid, tolerance, least, &mut work.costs, Some(&work.template));
         work.near.clear();
-        slots_between(&work.costs, f32::NEG_INFINITY, tolerance.bound(least)).for_each(|slot| work.near.push(slot));
+        work.near.extend(slots_between(&work.costs, f32::NEG_INFINITY, tolerance.bound(least)));
         if work.near.is_empty() {
             // Only an overflow of every cost leaves none.
             return self.weighted(work.template.centrality, rng);
@@ -287,14 +284,19 @@ impl<'a> Quilter<'a> {
         [shift(left, false), shift(above, true)]
     }
 
-    fn candidate_of_slot(&self, mut slot: usize) -> Candidate {
+    fn candidate_of_slot(&self, slot: usize) -> Candidate {
+        let (donor, slot) = self.donor_of(slot, |candidates| candidates.slots);
+        Candidate { donor, place: self.donors[donor].candidates.place_of_slot(slot) }
+    }
+
+    /// The donor of something that is numbered through all of them, and its number there.
+    fn donor_of(&self, mut number: usize, count: impl Fn(&Candidates) -> usize) -> (usize, usize) {
         let mut donor = 0;
-        while slot >= self.donors[donor].candidates.slots {
-            slot -= self.donors[donor].candidates.slots;
+        while number >= count(&self.donors[donor].candidates) {
+            number -= count(&self.donors[donor].candidates);
             donor += 1;
         }
-        let place = self.donors[donor].candidates.place_of_slot(slot);
-        Candidate { donor, place }
+        (donor, number)
     }
 
     /// A random candidate, with probability in proportion to exp(-strength · Δ²).
@@ -317,20 +319,15 @@ impl<'a> Quilter<'a> {
     }
 
     fn any<R: Rng + ?Sized>(&self, rng: &mut R) -> Candidate {
-        let mut n = below(self.places, rng);
-        let mut donor = 0;
-        while n >= self.donors[donor].candidates.places.len() {
-            n -= self.donors[donor].candidates.places.len();
-            donor += 1;
-        }
-        let place = self.donors[donor].candidates.places[n];
-        Candidate { donor, place }
+        let (donor, n) = self.donor_of(below(self.places, rng), |candidates| candidates.places.len());
+        Candidate { donor, place: self.donors[donor].candidates.places[n] }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::tests::assert_same_distribution;
     use crate::scan::tests::{disc, template};
     use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
 
@@ -389,12 +386,7 @@ mod tests {
                 counts[2 * fast.place + fast.donor][0] += 1.0;
                 counts[2 * slow.place + slow.donor][1] += 1.0;
             }
-            let terms = counts.iter().filter(|[a, b]| a + b > 0.0).map(|[a, b]| (a - b) * (a - b) / (a + b));
-            let (chi_square, cells) = (terms.clone().sum::<f64>(), terms.count() as f64);
-            let freedom = cells - 1.0;
-            assert!(freedom >= 2.0);
-            // The mean of the distribution and four standard deviations, a little more than 0.1 %.
-            assert!(chi_square < freedom + 4.0 * (2.0 * freedom).sqrt(), "{d_max} {strength}: {chi_square} of {cells}");
+            assert_same_distribution(&counts);
         }
     }
 }

@@ -254,12 +254,10 @@ mod tests {
     #[test]
     fn impossible_numbers_are_errors() {
         for bad in [f64::NAN, f64::INFINITY, -1.0] {
-            assert!(Spectrum::PowerLaw { exponent: bad }.check().is_err());
-            assert!(Spectrum::Gaussian { sigma_px: bad }.check().is_err());
-            let rough = Spectrum::Matern { nu: bad, length_px: 1.0 };
-            assert!(rough.check().is_err());
-            let short = Spectrum::Matern { nu: 1.0, length_px: bad };
-            assert!(short.check().is_err());
+            let (power, gaussian) = (Spectrum::PowerLaw { exponent: bad }, Spectrum::Gaussian { sigma_px: bad });
+            let (rough, short) =
+                (Spectrum::Matern { nu: bad, length_px: 1.0 }, Spectrum::Matern { nu: 1.0, length_px: bad });
+            assert!([power, gaussian, rough, short].iter().all(|spectrum| spectrum.check().is_err()), "{bad}");
         }
         assert!(Spectrum::Gaussian { sigma_px: 0.0 }.check().is_err());
         let message = Spectrum::PowerLaw { exponent: 9.0 }.check().unwrap_err();

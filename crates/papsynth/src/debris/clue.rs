@@ -144,7 +144,7 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
 fn widened(tile: &Tile, place: &Tile) -> Tile {
     let mut wide = place.blank();
     let origin = wide.origin;
-    crate::phantom::tile::lay_at(&mut wide.values, place.width, origin, tile.as_ref(), |row, values| {
+    crate::phantom::tile::lay(&mut wide.values, place.width, origin, tile, |row, values| {
         row.copy_from_slice(values);
     });
     wide

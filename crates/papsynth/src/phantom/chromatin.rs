@@ -23,8 +23,8 @@ const MEASURED_SIGMA_UM: f64 = 0.225;
 #[derive(Debug)]
 pub(crate) struct Donors {
     sources: Vec<Source>,
-    pixel_um: f64,
-    /// Whether they were taken from images.
+    /// Size of their pixels, µm.
+    pub(crate) pixel_um: f64,
     pub(crate) imaged: bool,
     /// Factor from a standard deviation as imaged to one in the object plane.
     pub(crate) sharpening: f64,
@@ -54,7 +54,7 @@ impl Donors {
                 (nucleus.donors.iter().map(learned).collect::<Result<Vec<_>, _>>()?, first.pixel_um)
             }
             None => {
-                let make = |index| made(name, index, nucleus, shapes, &field);
+                let make = |index| field.donor(name, index, nucleus, shapes);
                 ((0..MADE_DONORS as u64).map(make).collect::<Result<Vec<_>, _>>()?, MADE_PIXEL_UM)
             }
         };
@@ -75,24 +75,13 @@ impl Donors {
             choose(self.sources.len(), donors, rng).into_iter().map(|i| &self.sources[i]).collect();
         let quilter = Quilter::new(&chosen, params)?;
         let grid = Grid::new(coverage, pixel_um / self.pixel_um);
-        let texture = quilter.synthesise(&grid.mask, grid.width, rng);
-        let mut pixels = grid.sample(&texture.pixels, coverage);
-        standardise(&mut pixels, &coverage.values);
-        Ok(pixels)
+        Ok(grid.sample(&quilter.synthesise(&grid.mask, grid.width, rng).pixels, coverage))
     }
 
     /// A texture for a nucleus that is a field of its own.
     pub(crate) fn field(&self, coverage: &Tile, pixel_um: f64, rng: &mut Stream) -> Vec<f32> {
         let grid = Grid::new(coverage, pixel_um / MADE_PIXEL_UM);
-        let texture = self.field.texture(&grid.mask, grid.width, rng);
-        let mut pixels = grid.sample(&texture, coverage);
-        standardise(&mut pixels, &coverage.values);
-        pixels
-    }
-
-    /// Size of the donors' pixels, µm.
-    pub(crate) fn pixel_um(&self) -> f64 {
-        self.pixel_um
+        grid.sample(&self.field.texture(&grid.mask, grid.width, rng), coverage)
     }
 }
 
@@ -110,29 +99,6 @@ fn learned(donor: &Donor) -> Result<Source, Cause> {
     Source::new(&pixels, &mask, donor.width).map_err(Cause::Donor)
 }
 
-/// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
-fn made(
-    name: &str,
-    index: u64,
-    nucleus: &NucleusStatistics,
-    shapes: &ShapeModel,
-    field: &FieldSource,
-) -> Result<Source, Cause> {
-    // Donors belong to the model, not to an image: their key is the same for every data set.
-    let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
-    let radius =
-        nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
-    /// Smallest donor worth taking patches from, px.
-    const SMALLEST: f64 = 9.0;
-    let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
-    let outline: Vec<Point> = drawn.descriptors.outline(64);
-    let mut coverage = Tile::around(&outline, 1.0);
-    coverage.cover(&outline);
-    let mut pixels = field.texture(&coverage.values, coverage.width, &mut rng);
-    standardise(&mut pixels, &coverage.values);
-    Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
-}
-
 impl FieldSource {
     fn new(chromatin: &ChromatinStatistics) -> Result<Self, Cause> {
         /// Side of the field, px: wider than any nucleus at the pixel size of made donors; it repeats.
@@ -144,6 +110,23 @@ impl FieldSource {
             skewness: chromatin.skewness,
             profile: chromatin.rim_to_centre.clone(),
         })
+    }
+
+    /// A donor from the spectrum: the shape of a nucleus of the class, filled with its field.
+    fn donor(&self, name: &str, index: u64, nucleus: &NucleusStatistics, shapes: &ShapeModel) -> Result<Source, Cause> {
+        // Donors belong to the model, not to an image: their key is the same for every data set.
+        let mut rng = Key { seed: 0, index: 0 }.stream(&format!("donor/{name}"), index, "made");
+        let radius =
+            nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * random::normal(&mut rng)) / MADE_PIXEL_UM;
+        /// Smallest donor worth taking patches from, px.
+        const SMALLEST: f64 = 9.0;
+        let drawn = shapes.draw(radius.max(SMALLEST), &mut rng)?;
+        let outline: Vec<Point> = drawn.descriptors.outline(64);
+        let mut coverage = Tile::around(&outline, 1.0);
+        coverage.cover(&outline);
+        let mut pixels = self.texture(&coverage.values, coverage.width, &mut rng);
+        standardise(&mut pixels, &coverage.values);
+        Ok(Source::new(&pixels, &coverage.values, coverage.width)?)
     }
 
     /// A field with the class's marginal and its profile from rim to centre.
@@ -187,20 +170,13 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
             depth[y as usize * width + x as usize]
         }
     };
-    let relax = |depth: &mut Vec<f64>, x: i64, y: i64, neighbours: [(i64, i64, f64); 4]| {
-        let at = y as usize * width + x as usize;
-        for (dx, dy, step) in neighbours {
-            depth[at] = depth[at].min(get(depth, x + dx, y + dy) + step);
-        }
-    };
-    for y in 0..height as i64 {
-        for x in 0..width as i64 {
-            relax(&mut depth, x, y, [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, DIAGONAL), (1, -1, DIAGONAL)]);
-        }
-    }
-    for y in (0..height as i64).rev() {
-        for x in (0..width as i64).rev() {
-            relax(&mut depth, x, y, [(1, 0, 1.0), (0, 1, 1.0), (1, 1, DIAGONAL), (-1, 1, DIAGONAL)]);
+    for sign in [-1, 1] {
+        for at in 0..mask.len() {
+            let at = if sign < 0 { at } else { mask.len() - 1 - at };
+            let (x, y) = ((at % width) as i64, (at / width) as i64);
+            for (dx, dy, step) in [(1, 0, 1.0), (0, 1, 1.0), (1, 1, DIAGONAL), (-1, 1, DIAGONAL)] {
+                depth[at] = depth[at].min(get(&depth, x + sign * dx, y + sign * dy) + step);
+            }
         }
     }
     let deepest = depth.iter().fold(1.0_f64, |a, b| a.max(*b));
@@ -276,27 +252,23 @@ impl Grid {
         Self { mask, width, ratio }
     }
 
-    /// The texture on the image's grid, by linear interpolation.
+    /// The texture on the image's grid, by linear interpolation, with mean 0 and variance 1 over the covered pixels.
     fn sample(&self, texture: &[f32], coverage: &Tile) -> Vec<f32> {
-        if self.ratio == 1.0 {
-            return texture.to_vec();
-        }
         let height = texture.len() / self.width;
-        let mut out = Vec::with_capacity(coverage.values.len());
-        for y in 0..coverage.height() {
-            for x in 0..coverage.width {
-                let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
-                let (x0, y0) =
-                    (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
-                let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
-                let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
-                let at = |x: usize, y: usize| texture[y * self.width + x];
-                let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
-                let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
-                out.push(upper + fy * (lower - upper));
-            }
+        let at = |x: usize, y: usize| texture[y * self.width + x];
+        let mut pixels = if self.ratio == 1.0 { texture.to_vec() } else { Vec::with_capacity(coverage.values.len()) };
+        for place in pixels.len()..coverage.values.len() {
+            let (x, y) = (place % coverage.width, place / coverage.width);
+            let (tx, ty) = (x as f64 * self.ratio, y as f64 * self.ratio);
+            let (x0, y0) = (random::count(tx.floor()).min(self.width - 1), random::count(ty.floor()).min(height - 1));
+            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(height - 1));
+            let (fx, fy) = ((tx - x0 as f64) as f32, (ty - y0 as f64) as f32);
+            let upper = at(x0, y0) + fx * (at(x1, y0) - at(x0, y0));
+            let lower = at(x0, y1) + fx * (at(x1, y1) - at(x0, y1));
+            pixels.push(upper + fy * (lower - upper));
         }
-        out
+        standardise(&mut pixels, &coverage.values);
+        pixels
     }
 }
 

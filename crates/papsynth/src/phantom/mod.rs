@@ -4,7 +4,6 @@
 
 mod cell;
 mod chromatin;
-mod form;
 mod nucleus;
 pub(crate) mod piece;
 pub(crate) mod pools;
@@ -15,8 +14,9 @@ pub(crate) mod wobble;
 use crate::debris::{Site, cover};
 use crate::error::Cause;
 use crate::profile::Stage;
-use crate::scene::{Body, CellBody, Object, Scene, View};
+use crate::scene::{Body, Object, Scene, View};
 
+use cell::Cell;
 pub(crate) use piece::{Phantom, Piece};
 pub(crate) use pools::Pools;
 pub(crate) use studio::Studio;
@@ -25,24 +25,22 @@ pub(crate) use studio::Studio;
 ///
 /// Objects are handed over in batches because sheets are pressed side by side in SIMD lanes; the result is the same
 /// for any grouping.
-pub(crate) fn make(
-    studio: &Studio,
-    scene: &Scene,
-    pools: &Pools<'_>,
-    objects: &[&Object],
+pub(crate) fn make<'a>(
+    studio: &'a Studio,
+    scene: &'a Scene,
+    pools: &'a Pools<'a>,
+    objects: &[&'a Object],
 ) -> Result<Vec<Phantom>, Cause> {
-    let cells: Vec<(&Object, &CellBody)> = objects
-        .iter()
-        .filter_map(|object| match &object.body {
-            Body::Cell(body) => Some((*object, &**body)),
-            _ => None,
-        })
-        .collect();
-    let mut made = cell::make(studio, scene, pools, &cells)?;
+    let cell = |object: &&'a Object| match &object.body {
+        Body::Cell(body) => Some(Cell { studio, scene, pools, object, body }),
+        _ => None,
+    };
+    let cells: Vec<Cell<'_>> = objects.iter().filter_map(cell).collect();
+    let mut made = cell::make(studio, &cells)?;
     studio.watch.time(Stage::Debris, || {
-        for ((object, _), phantom) in cells.iter().zip(&mut made) {
-            if let Some(coat) = &object.coat {
-                cover(coat, &site(scene, pools, object), phantom);
+        for (cell, phantom) in cells.iter().zip(&mut made) {
+            if let Some(coat) = &cell.object.coat {
+                cover(coat, &site(scene, pools, cell.object), phantom);
             }
         }
         let mut cells = made.into_iter();

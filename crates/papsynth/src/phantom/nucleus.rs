@@ -2,17 +2,17 @@
 
 use optics_psf::{Border, Gaussian, Method};
 
+use super::cell::Cell;
 use super::chromatin::standardise;
-use super::form;
 use super::piece::Piece;
-use super::studio::{ClassStudio, Studio};
+use super::studio::ClassStudio;
 use super::tile::{Point, Tile, area, grown};
 use super::wobble::{placed, wobbled_circle};
 use crate::error::Cause;
+use crate::key::Stream;
 use crate::random;
 use crate::recipe::Chromatin;
-use crate::scene::cell::{CellBody, NucleusBody};
-use crate::scene::field::{Object, Scene};
+use crate::scene::NucleusBody;
 use crate::truth::part::Part;
 
 /// Points of a nucleus's outline (the paper's K = 64).
@@ -33,21 +33,14 @@ const WRINKLE: f64 = 0.075;
 /// Part of the softened edge that may be cut off.
 const EDGE_LOST: f64 = 1e-3;
 
-/// Makes the nucleus of a cell.
-pub(super) fn make(
-    studio: &Studio,
-    class: &ClassStudio,
-    scene: &Scene,
-    object: &Object,
-    body: &CellBody,
-) -> Result<Piece, Cause> {
+pub(super) fn make(cell: &Cell<'_>, class: &ClassStudio) -> Result<Piece, Cause> {
+    let Cell { studio, scene, object, body, .. } = *cell;
     let nucleus = &body.nucleus;
     let pixel_um = scene.grid().pixel_um;
     let cell_centre = scene.grid().to_px(object.centre_um);
-    let mut shape_rng = scene.stream("cell", object, "nucleus.shape");
+    let mut shape_rng = cell.stream("nucleus.shape");
     let radius_px = nucleus.radius_um / pixel_um;
-    let drawn = class.nucleus.draw(radius_px, &mut shape_rng)?;
-    let mut outline = form::posed(&drawn.descriptors, &class.class.nucleus.form, &mut shape_rng).outline(POINTS);
+    let mut outline = class.nucleus(radius_px, &mut shape_rng)?.outline(POINTS);
     if nucleus.wrinkle > 0.0 {
         wrinkle(&mut outline, nucleus.wrinkle * WRINKLE, &mut shape_rng);
     }
@@ -62,7 +55,7 @@ pub(super) fn make(
     let shrink = (1.0 - RIM_UM / nucleus.radius_um).max(0.0);
     inner.cover(&grown(&outline, centre, shrink));
 
-    let mut rng = scene.stream("cell", object, "nucleus.texture");
+    let mut rng = cell.stream("nucleus.texture");
     let mut texture = match studio.recipe.nucleus.chromatin {
         Chromatin::Quilt => {
             let donors = studio.recipe.nucleus.donors.draw_count(&mut rng).max(1);
@@ -72,7 +65,7 @@ pub(super) fn make(
     };
     let imaged = class.donors.imaged && studio.recipe.nucleus.chromatin == Chromatin::Quilt;
     if nucleus.clumping > 0.0 && !imaged {
-        let own = &mut scene.stream("cell", object, "nucleus.clumps");
+        let own = &mut cell.stream("nucleus.clumps");
         clump(&mut texture, &coverage, nucleus.clumping, pixel_um, own);
     }
     let contrast = (nucleus.texture * class.donors.sharpening) as f32;
@@ -94,24 +87,15 @@ pub(super) fn make(
         let level = thickness.values[i] * (nucleus.absorbance as f32 * (1.0 + rim) + contrast * texture[i]);
         *value *= level.max(PALEST * nucleus.absorbance as f32);
     }
-    let mut own = scene.stream("cell", object, "nucleoli");
+    let mut own = cell.stream("nucleoli");
     for _ in 0..nucleus.nucleoli {
-        add_nucleolus(&mut absorbance, &outline, centre, nucleus.absorbance, pixel_um, &mut own);
+        add_nucleolus(&mut absorbance, &outline, centre, cell, &mut own);
     }
-    Ok(Piece {
-        part: Part::Nucleus,
-        absorbance,
-        coverage,
-        cover_step: 1,
-        area_px: area(&outline),
-        imaged,
-        dyes: nucleus.dyes,
-        phase_rad: 0.0,
-    })
+    Ok(Piece { part: Part::Nucleus, imaged, ..Piece::whole(absorbance, coverage, area(&outline), nucleus.dyes) })
 }
 
 /// Makes a part of a texture's variance coarse.
-fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut crate::key::Stream) {
+fn clump(texture: &mut [f32], coverage: &Tile, share: f64, pixel_um: f64, rng: &mut Stream) {
     /// Standard deviation of what white noise is smoothed by, µm.
     const CLUMP_UM: f64 = 0.7;
     let smooth = Gaussian::new(CLUMP_UM / pixel_um).expect("pixels are at least a hundredth of a µm wide");
@@ -150,29 +134,22 @@ const NUCLEOLUS_UM: [f64; 2] = [0.5, 1.1];
 const NUCLEOLUS: f64 = 0.8;
 
 /// A round, even, dark body inside a nucleus.
-fn add_nucleolus(
-    absorbance: &mut Tile,
-    outline: &[Point],
-    centre: Point,
-    strength: f64,
-    pixel_um: f64,
-    rng: &mut crate::key::Stream,
-) {
+fn add_nucleolus(absorbance: &mut Tile, outline: &[Point], centre: Point, cell: &Cell<'_>, rng: &mut Stream) {
+    let (strength, pixel_um) = (cell.body.nucleus.absorbance, cell.scene.grid().pixel_um);
     let radius = random::between(NUCLEOLUS_UM[0], NUCLEOLUS_UM[1], rng) / pixel_um;
     let rim = outline[random::below(outline.len(), rng)];
     let share = random::between(0.0, 0.6, rng);
     let at = [centre[0] + share * (rim[0] - centre[0]), centre[1] + share * (rim[1] - centre[1])];
     let mut cover = absorbance.blank();
-    cover.cover(
-        &wobbled_circle(radius, 0.08, 0.08, rng).iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>(),
-    );
+    let round = wobbled_circle(radius, 0.08, 0.08, rng);
+    cover.cover(&round.iter().map(|p| [p[0] + at[0], p[1] + at[1]]).collect::<Vec<_>>());
     for (value, cover) in absorbance.values.iter_mut().zip(&cover.values) {
         *value += cover * (NUCLEOLUS * strength) as f32;
     }
 }
 
 /// Pushes the points of an outline in and out by a few harmonics of random phase, with corners where they meet.
-fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut crate::key::Stream) {
+fn wrinkle(outline: &mut [Point], strength: f64, rng: &mut Stream) {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let waves: Vec<[f64; 3]> = WRINKLES
         .map(|harmonic| {

@@ -5,8 +5,7 @@ use std::borrow::Cow;
 use dye_spectra::Amounts;
 
 use super::tile::Tile;
-use crate::truth::part::Part;
-use crate::truth::traits::Trait;
+use crate::truth::{Mask, Part, Trait};
 
 /// Absorbance of what refracts and hardly absorbs: its phase is counted by its absorbance.
 pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
@@ -14,7 +13,6 @@ pub(crate) const LEAST_ABSORBANCE: f64 = 1e-6;
 /// A part of an object, in its own tile.
 #[derive(Debug, Clone)]
 pub(crate) struct Piece {
-    /// Which part it is.
     pub(crate) part: Part,
     /// What it absorbs along the light's path when it is in focus, decadic.
     pub(crate) absorbance: Tile,
@@ -29,9 +27,28 @@ pub(crate) struct Piece {
     pub(crate) dyes: Amounts,
     /// How late light comes, radians, where its absorbance is 1.
     pub(crate) phase_rad: f64,
+    /// Its complete mask in the image, once that is known, and the number of pixels it would have without the image's border.
+    pub(crate) mask: Mask,
+    pub(crate) covered: u64,
 }
 
 impl Piece {
+    /// One that is no part of anything else, and does not refract.
+    pub(super) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
+        Self {
+            part: Part::Whole,
+            absorbance,
+            coverage,
+            cover_step: 1,
+            area_px,
+            imaged: false,
+            dyes,
+            phase_rad: 0.0,
+            mask: Mask::default(),
+            covered: 0,
+        }
+    }
+
     /// The share of each of the camera's pixels that its outline covers, with `n` grid points along a pixel.
     pub(crate) fn cover_of_pixels(&self, n: usize) -> Cow<'_, Tile> {
         match n / self.cover_step {
@@ -53,17 +70,7 @@ pub(crate) struct Phantom {
 impl Phantom {
     /// A phantom without parts of its own.
     pub(crate) fn whole(absorbance: Tile, coverage: Tile, area_px: f64, dyes: Amounts) -> Self {
-        let piece = Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        };
-        Self { pieces: vec![piece], traits: Vec::new() }
+        Self { pieces: vec![Piece::whole(absorbance, coverage, area_px, dyes)], traits: Vec::new() }
     }
 
     /// The same, through which light comes late.
@@ -77,16 +84,7 @@ impl Phantom {
     /// The same with something in it that other dyes stain: it counts as part of the whole.
     pub(crate) fn stained(mut self, absorbance: Tile, dyes: Amounts) -> Self {
         let coverage = Tile { origin: absorbance.origin, width: 1, values: vec![0.0] };
-        self.pieces.push(Piece {
-            part: Part::Whole,
-            absorbance,
-            coverage,
-            cover_step: 1,
-            area_px: 0.0,
-            imaged: false,
-            dyes,
-            phase_rad: 0.0,
-        });
+        self.pieces.push(Piece::whole(absorbance, coverage, 0.0, dyes));
         self
     }
 }

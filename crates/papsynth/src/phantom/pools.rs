@@ -24,9 +24,8 @@ const GRAIN_LENGTH: f64 = 1.6;
 /// What makes pools: plans and spectra, the same for every image.
 #[derive(Debug)]
 pub(crate) struct PoolMaker {
-    clouds: SpectralField,
-    flecks: SpectralField,
-    grain: SpectralField,
+    /// Of clouds, flecks and grain.
+    fields: [SpectralField; 3],
 }
 
 /// The fields of one image. All have mean 0, variance 1 and repeat after [`SIDE`] texels. Each is made when a cell
@@ -35,9 +34,7 @@ pub(crate) struct PoolMaker {
 pub(crate) struct Pools<'a> {
     maker: &'a PoolMaker,
     key: Key,
-    clouds: OnceLock<Pool>,
-    flecks: OnceLock<Pool>,
-    grain: OnceLock<Pool>,
+    drawn: [OnceLock<Pool>; 3],
 }
 
 /// A field that repeats.
@@ -68,39 +65,39 @@ const BETWEEN: f64 = 0.211_324_865_405_187_1;
 
 impl PoolMaker {
     pub(crate) fn new() -> Self {
-        let maker = |spectrum| {
+        let spectra = [
+            Spectrum::Gaussian { sigma_px: CLOUD_SIGMA },
+            Spectrum::BROWNIAN,
+            Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH },
+        ];
+        let fields = spectra.map(|spectrum| {
             let params = FieldParams { width: SIDE, height: SIDE, spectrum, padding: Padding::Periodic };
             SpectralField::new(&params).expect("pools of this size can be planned")
-        };
-        Self {
-            clouds: maker(Spectrum::Gaussian { sigma_px: CLOUD_SIGMA }),
-            flecks: maker(Spectrum::BROWNIAN),
-            grain: maker(Spectrum::Matern { nu: 0.5, length_px: GRAIN_LENGTH }),
-        }
+        });
+        Self { fields }
     }
 
-    /// The pools of an image.
     pub(crate) fn make(&self, key: Key) -> Pools<'_> {
-        let (clouds, flecks, grain) = Default::default();
-        Pools { maker: self, key, clouds, flecks, grain }
+        Pools { maker: self, key, drawn: Default::default() }
     }
 }
 
 impl Pools<'_> {
     pub(crate) fn clouds(&self) -> &Pool {
-        self.clouds.get_or_init(|| self.draw(&self.maker.clouds, "pool.clouds"))
+        self.pool(0, "pool.clouds")
     }
 
     pub(crate) fn flecks(&self) -> &Pool {
-        self.flecks.get_or_init(|| self.draw(&self.maker.flecks, "pool.flecks"))
+        self.pool(1, "pool.flecks")
     }
 
     pub(crate) fn grain(&self) -> &Pool {
-        self.grain.get_or_init(|| self.draw(&self.maker.grain, "pool.grain"))
+        self.pool(2, "pool.grain")
     }
 
-    fn draw(&self, field: &SpectralField, purpose: &str) -> Pool {
-        Pool::new(field.draw(&mut self.key.stream("field", 0, purpose)))
+    fn pool(&self, which: usize, purpose: &str) -> &Pool {
+        self.drawn[which]
+            .get_or_init(|| Pool::new(self.maker.fields[which].draw(&mut self.key.stream("field", 0, purpose))))
     }
 }
 
@@ -168,8 +165,8 @@ impl Pool {
 /// Positions are kept in 2⁻¹⁶ texels: whole numbers wrap without rounding.
 const ONE: u32 = 1 << 16;
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "wraps on purpose")]
 fn fixed(texels: f64) -> u32 {
+    // The cast to 32 bits wraps on purpose.
     (texels * f64::from(ONE)).floor() as i64 as u32
 }
 
@@ -218,32 +215,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_look_reads_the_field_and_wraps() {
-        let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE) as f32).collect();
-        let pool = Pool::new(values);
-        let look = Look { origin: [510.25, 3.0], step: [1.0, 1.0] };
-        let mut seen = [0.0; 4];
-        pool.row_into(&mut seen, &look, [0.0, 0.0], &mut [0.0; SIDE + 1]);
-        assert_eq!(seen[0], 510.25);
-        assert_eq!(seen[1], 511.0 + 0.25 * (0.0 - 511.0), "between the last column and the first");
-        assert_eq!(seen[2], 0.25);
-        assert!((pool.quantile(0.5) - 256.0).abs() < 8.0);
-    }
-
-    #[test]
-    fn a_mirrored_look_reads_backwards_and_rows_follow_each_other() {
-        let values: Vec<f32> = (0..SIDE * SIDE).map(|i| (i % SIDE + 1000 * (i / SIDE)) as f32).collect();
-        let pool = Pool::new(values);
-        let look = Look { origin: [1.5, 2.0], step: [-0.5, 0.25] };
-        let mut seen = [0.0; 3];
-        pool.row_into(&mut seen, &look, [1.0, 2.0], &mut [0.0; SIDE + 1]);
-        assert_eq!(seen, [2501.0, 2500.5, 2500.0]);
-    }
-
-    #[test]
     fn a_row_is_the_field_at_each_pixel_however_long_it_is() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "pools");
         let pool = Pool::new((0..SIDE * SIDE).map(|_| random::uniform(&mut rng) as f32).collect());
+        assert!((pool.quantile(0.25) - 0.25).abs() < 0.03);
         for (texel_px, times) in [(0.3, 1), (1.0, 4), (1.17, 1), (4.0, 1)] {
             for length in [1, 2, 60, 511, 512, 1400].repeat(times) {
                 let look = Look::new(texel_px, &mut rng);

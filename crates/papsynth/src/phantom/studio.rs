@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
 use cloth_verlet::{Cloth, ClothParams};
-use fsd_shape::ShapeModel;
+use fsd_shape::{Descriptors, ShapeModel};
 use quilt_texture::QuiltParams;
 use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
 
@@ -13,12 +13,11 @@ use super::pools::PoolMaker;
 use super::tile::Point;
 use crate::error::Cause;
 use crate::key::{Key, Stream};
-use crate::model::{CellClass, Model, Shapes};
+use crate::model::{CellClass, Form, Model, Shapes};
 use crate::profile::Watch;
 use crate::random;
 use crate::recipe::{Acceptance, Recipe, Seam, ShapeSpread, Sheet};
 
-/// Everything that phantoms are made with.
 #[derive(Debug)]
 pub(crate) struct Studio {
     pub(crate) recipe: Recipe,
@@ -50,8 +49,8 @@ const TORUS_SITES: usize = 1200;
 #[derive(Debug)]
 pub(crate) struct ClassStudio {
     pub(crate) class: CellClass,
-    pub(crate) cytoplasm: ShapeModel,
-    pub(crate) nucleus: ShapeModel,
+    cytoplasm: ShapeModel,
+    nucleus: ShapeModel,
     pub(crate) donors: Donors,
     pub(crate) quilt: QuiltParams,
 }
@@ -62,10 +61,15 @@ impl Studio {
         for name in recipe.cells.keys() {
             classes.insert(name.clone(), ClassStudio::new(name, model.class(name)?, recipe)?);
         }
+        let cloth = match recipe.cytoplasm.sheet {
+            Sheet::Flat => None,
+            Sheet::Verlet => Some(ClothParams::paper()),
+            Sheet::Xpbd => Some(ClothParams::default()),
+        };
         Ok(Self {
             recipe: recipe.clone(),
             classes,
-            cloth: cloth(recipe),
+            cloth: cloth.map(|params| Cloth::new(&params).expect("the cloths that ship are valid")),
             cytoskeletons: Cytoskeletons::new(),
             pools: PoolMaker::new(),
             watch,
@@ -92,15 +96,6 @@ impl Cytoskeletons {
     }
 }
 
-fn cloth(recipe: &Recipe) -> Option<Cloth> {
-    let params = match recipe.cytoplasm.sheet {
-        Sheet::Flat => return None,
-        Sheet::Verlet => ClothParams::paper(),
-        Sheet::Xpbd => ClothParams::default(),
-    };
-    Some(Cloth::new(&params).expect("the cloths that ship are valid"))
-}
-
 impl ClassStudio {
     fn new(name: &str, class: &CellClass, recipe: &Recipe) -> Result<Self, Cause> {
         let model = |shapes: &Shapes, spread: ShapeSpread| {
@@ -114,10 +109,59 @@ impl ClassStudio {
         let cytoplasm = model(&class.cytoplasm.shapes, recipe.cytoplasm.shape)?;
         let nucleus = model(&class.nucleus.shapes, recipe.nucleus.shape)?;
         let donors = Donors::new(name, &class.nucleus, &nucleus)?;
-        let quilt = quilt(recipe, class, donors.pixel_um());
+        let quilt = quilt(recipe, class, donors.pixel_um);
         Ok(Self { class: class.clone(), cytoplasm, nucleus, donors, quilt })
     }
+
+    /// The outline of a cell's cytoplasm, of so many pixels' radius, its long axis along x.
+    pub(crate) fn cytoplasm(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
+        let drawn = self.cytoplasm.draw(radius_px, rng)?;
+        Ok(posed(&drawn.descriptors, &self.class.cytoplasm.form, rng))
+    }
+
+    /// That of its nucleus.
+    pub(crate) fn nucleus(&self, radius_px: f64, rng: &mut Stream) -> Result<Descriptors, Cause> {
+        let drawn = self.nucleus.draw(radius_px, rng)?;
+        Ok(posed(&drawn.descriptors, &self.class.nucleus.form, rng))
+    }
 }
+
+/// Most elongated outline: half axes of 1.8 and 0.2.
+const LONGEST: f64 = 0.8;
+
+/// A drawn shape, its long axis along x, with the form of its class: how that differs from learned ones.
+fn posed(drawn: &Descriptors, form: &Form, rng: &mut Stream) -> Descriptors {
+    let posed = drawn.aligned();
+    let elongation = form.elongation.map(|e| (e.mean + e.sd * random::normal(rng)).clamp(0.0, LONGEST));
+    if elongation.is_none() && form.taper == 0.0 && form.unevenness == 1.0 {
+        return posed;
+    }
+    let middle = posed.harmonics();
+    let radius = posed.radius();
+    let mut terms = posed.as_slice().to_vec();
+    for (place, term) in terms.iter_mut().enumerate() {
+        match (place.abs_diff(middle), place < middle) {
+            (0, _) | (1, false) => {}
+            (1, true) => {
+                if let Some(elongation) = elongation {
+                    *term = [elongation * radius, 0.0];
+                }
+            }
+            _ => *term = [form.unevenness * term[0], form.unevenness * term[1]],
+        }
+    }
+    if let Some(egg) = terms.get_mut(middle + 2) {
+        egg[0] += form.taper * radius;
+    }
+    // A form so extreme that the outline crosses itself is not taken.
+    match Descriptors::from_harmonics(terms) {
+        Ok(formed) if !fsd_shape::self_intersects(&formed.outline(CHECKED)) => formed,
+        _ => posed,
+    }
+}
+
+/// Points at which an outline is checked for crossing itself.
+const CHECKED: usize = 240;
 
 /// The quilting that a recipe asks for, on donors with pixels of a size.
 fn quilt(recipe: &Recipe, class: &CellClass, pixel_um: f64) -> QuiltParams {

@@ -1,5 +1,6 @@
 //! Small images at a place of the large one, and exact coverage of polygons.
 
+use core::ops::Range;
 use std::borrow::Cow;
 
 use ab_glyph_rasterizer::{Rasterizer, point};
@@ -16,19 +17,7 @@ pub(crate) struct Tile {
     pub(crate) values: Vec<f32>,
 }
 
-/// A tile whose pixels belong to someone else.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TileRef<'a> {
-    pub(crate) origin: [i64; 2],
-    pub(crate) width: usize,
-    pub(crate) values: &'a [f32],
-}
-
 impl Tile {
-    pub(crate) fn as_ref(&self) -> TileRef<'_> {
-        TileRef { origin: self.origin, width: self.width, values: &self.values }
-    }
-
     /// A tile of zeros that holds all these points and `margin` pixels round them.
     pub(crate) fn around<'a>(points: impl IntoIterator<Item = &'a Point>, margin: f64) -> Self {
         let mut low = [f64::INFINITY; 2];
@@ -39,7 +28,6 @@ impl Tile {
                 high[axis] = high[axis].max(point[axis]);
             }
         }
-        #[expect(clippy::cast_possible_truncation, reason = "places on a slide are far below 2⁶³ pixels")]
         let bound = |axis: usize| {
             let first = (low[axis] - margin).floor() as i64;
             let last = (high[axis] + margin).ceil() as i64;
@@ -61,7 +49,7 @@ impl Tile {
         let length = |axis: usize| usize::try_from(end[axis].min(high[axis]) - origin[axis]).unwrap_or(0).max(1);
         let (width, height) = (length(0), length(1));
         let mut part = Self { origin, width, values: vec![0.0; width * height] };
-        lay_at(&mut part.values, width, origin, self.as_ref(), |row, values| row.copy_from_slice(values));
+        lay(&mut part.values, width, origin, &self, |row, values| row.copy_from_slice(values));
         part
     }
 
@@ -100,40 +88,31 @@ impl Tile {
         Self { origin, width, values }
     }
 
-    /// The sum of all values: in sixteen partial sums, so that none has to wait for itself.
+    /// The sum of all values.
     pub(crate) fn sum(&self) -> f64 {
-        sum(&self.values)
+        sum_where(&self.values, &self.values, f32::NEG_INFINITY)
     }
 
     /// The sum of its values where another tile's, whose pixels are `step` times as wide, are at least so high.
     pub(crate) fn sum_where(&self, other: &Self, step: usize, least: f32) -> f64 {
-        let side = step as i64;
-        let low = [0, 1].map(|axis| self.origin[axis].max(side * other.origin[axis]));
-        let other_size = [other.width, other.height()].map(|length| length as i64);
-        let size = [self.width, self.height()].map(|length| length as i64);
-        let end = |axis: usize| {
-            (self.origin[axis] + size[axis]).min(side * (other.origin[axis] + other_size[axis])).max(low[axis])
-        };
-        let place = |at: i64, origin: i64| usize::try_from(at - origin).unwrap_or(0);
-        let columns = place(end(0), low[0]);
-        if columns == 0 {
+        let start = other.origin.map(|at| at * step as i64);
+        let (columns, others) = shared(self.origin[0], self.width, start[0], other.width * step);
+        let (rows, other_rows) = shared(self.origin[1], self.height(), start[1], other.height() * step);
+        if columns.is_empty() {
             return 0.0;
         }
-        // Pixels of the other tile that the columns begin and end in, and how far into the first.
-        let first = low[0].div_euclid(side);
-        let (from, skip) = (place(first, other.origin[0]), place(low[0], side * first));
-        let count = (skip + columns).div_ceil(step);
-        let mut line = vec![0.0; count * step];
+        // Pixels of the other tile that the columns begin and end in.
+        let wide = others.start / step..others.end.div_ceil(step);
+        let mut line = vec![0.0; wide.len() * step];
         let mut known = None;
         let mut sum = 0.0;
-        for y in low[1]..end(1) {
-            let row = place(y.div_euclid(side), other.origin[1]);
-            if known != Some(row) {
-                repeat_each(&mut line, &other.values[row * other.width + from..][..count], step);
-                known = Some(row);
+        for (y, other_y) in rows.zip(other_rows) {
+            let row = other_y / step;
+            if known.replace(row) != Some(row) {
+                repeat_each(&mut line, &other.values[row * other.width..][wide.clone()], step);
             }
-            let values = &self.values[place(y, self.origin[1]) * self.width + place(low[0], self.origin[0])..];
-            sum += sum_where(&values[..columns], &line[skip..], least);
+            let values = &self.values[y * self.width..][columns.clone()];
+            sum += sum_where(values, &line[others.start - wide.start * step..], least);
         }
         sum
     }
@@ -236,7 +215,7 @@ impl Tile {
 
     /// Gives every stretch of this tile that another one meets, with what of the other lies there.
     pub(crate) fn meet(&mut self, other: &Self, blend: impl FnMut(&mut [f32], &[f32])) {
-        lay_at(&mut self.values, self.width, self.origin, other.as_ref(), blend);
+        lay(&mut self.values, self.width, self.origin, other, blend);
     }
 }
 
@@ -313,26 +292,12 @@ fn repeat_each(fine: &mut [f32], row: &[f32], n: usize) {
     }
 }
 
-/// Each value of a row `N` times.
 #[multiversion(targets = "simd")]
 fn repeat<const N: usize>(fine: &mut [f32], row: &[f32]) {
     fine.as_chunks_mut::<N>().0.iter_mut().zip(row).for_each(|(fine, value)| *fine = [*value; N]);
 }
 
-#[multiversion(targets = "simd")]
-fn sum(values: &[f32]) -> f64 {
-    const PARTS: usize = 16;
-    let mut parts = [0.0_f64; PARTS];
-    let (whole, rest) = values.as_chunks::<PARTS>();
-    for chunk in whole {
-        for (part, value) in parts.iter_mut().zip(chunk) {
-            *part += f64::from(*value);
-        }
-    }
-    parts.iter().sum::<f64>() + rest.iter().map(|value| f64::from(*value)).sum::<f64>()
-}
-
-/// The sum of values beside others that are at least so high; in sixteen partial sums.
+/// The sum of values beside others that are at least so high: in sixteen partial sums, so that none has to wait for itself.
 #[multiversion(targets = "simd")]
 fn sum_where(values: &[f32], others: &[f32], least: f32) -> f64 {
     const PARTS: usize = 16;
@@ -382,40 +347,33 @@ fn clipped(polygon: &[Point], low: Point, high: Point) -> Cow<'_, [Point]> {
     Cow::Owned(left)
 }
 
-/// Lays the rows of a tile over rows of an image that is `width` wide, as far as they meet. `image` starts at row `first`;
-/// `blend` gets a stretch of the image and what of the tile lies over it.
+/// Lays the rows of a tile over those of an image that is `width` wide and whose first pixel is pixel `origin`, as far as they
+/// meet: `blend` gets a stretch of the image and what of the tile lies over it.
 #[inline(always)]
 pub(crate) fn lay(
     image: &mut [f32],
     width: usize,
-    first: usize,
-    tile: TileRef<'_>,
-    mut blend: impl FnMut(&mut [f32], &[f32]),
-) {
-    lay_at(image, width, [0, first as i64], tile, |row, values| blend(row, values));
-}
-
-/// The same where the first pixel of `image` is pixel `origin`.
-#[inline(always)]
-pub(crate) fn lay_at(
-    image: &mut [f32],
-    width: usize,
     origin: [i64; 2],
-    tile: TileRef<'_>,
+    tile: &Tile,
     mut blend: impl FnMut(&mut [f32], &[f32]),
 ) {
-    let [left, top] = [tile.origin[0] - origin[0], tile.origin[1] - origin[1]];
-    let column = |x: i64| usize::try_from(x).unwrap_or(0).min(tile.width);
-    let (from, to) = (column(-left), column(width as i64 - left));
-    if from >= to {
+    let (columns, own) = shared(origin[0], width, tile.origin[0], tile.width);
+    if columns.is_empty() {
         return;
     }
-    let x = usize::try_from(left).unwrap_or(0);
-    let hidden = usize::try_from(-top).unwrap_or(0);
-    let rows = image.chunks_exact_mut(width).skip(usize::try_from(top).unwrap_or(0));
-    for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(hidden)) {
-        blend(&mut row[x..x + to - from], &values[from..to]);
+    let (rows, own_rows) = shared(origin[1], image.len() / width, tile.origin[1], tile.height());
+    let rows = image.chunks_exact_mut(width).skip(rows.start);
+    for (row, values) in rows.zip(tile.values.chunks_exact(tile.width).skip(own_rows.start)) {
+        blend(&mut row[columns.clone()], &values[own.clone()]);
     }
+}
+
+/// What two stretches of pixels, told by their first pixels and lengths, have in common: as each counts it.
+fn shared(first: i64, length: usize, other: i64, other_length: usize) -> (Range<usize>, Range<usize>) {
+    let low = first.max(other);
+    let high = (first + length as i64).min(other + other_length as i64).max(low);
+    let from = |first: i64| (low - first) as usize..(high - first) as usize;
+    (from(first), from(other))
 }
 
 /// A polygon as many times as large about a point.
@@ -429,10 +387,10 @@ pub(crate) fn area(polygon: &[Point]) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn disc(centre: Point, radius: f64) -> Vec<Point> {
+    pub(in crate::phantom) fn disc(centre: Point, radius: f64) -> Vec<Point> {
         (0..400)
             .map(|i| {
                 let angle = core::f64::consts::TAU * f64::from(i) / 400.0;
@@ -441,10 +399,20 @@ mod tests {
             .collect()
     }
 
+    fn tile(origin: [i64; 2], width: usize, height: usize) -> Tile {
+        Tile { origin, width, values: (0..width * height).map(|i| ((i * 37) % 101) as f32 / 101.0).collect() }
+    }
+
+    /// The value of a tile at a pixel of the large image.
+    pub(in crate::phantom) fn at(tile: &Tile, [x, y]: [i64; 2]) -> f32 {
+        let place = usize::try_from(x - tile.origin[0]).ok().zip(usize::try_from(y - tile.origin[1]).ok());
+        let place = place.filter(|(x, y)| *x < tile.width && *y < tile.height());
+        place.map_or(0.0, |(x, y)| tile.values[y * tile.width + x])
+    }
+
     #[test]
     fn sums_are_taken_where_tiles_meet_and_the_other_is_high() {
-        let values = |count: usize| (0..count).map(|i| ((i * 37) % 101) as f32 / 101.0).collect::<Vec<f32>>();
-        let tile = Tile { origin: [3, -2], width: 40, values: values(40 * 17) };
+        let mut own = tile([3, -2], 40, 17);
         for (origin, step) in [
             ([3, -2], 1),
             ([-9, 4], 1),
@@ -456,53 +424,52 @@ mod tests {
             ([70, 0], 1),
             ([3, 30], 1),
         ] {
-            sums(&tile, &Tile { origin, width: 25, values: values(25 * 21) }, step);
+            let other = tile(origin, 25, 21);
+            let wide = other.clone().repeated(step);
+            let mut slow = 0.0;
+            own.for_each(|p, value| {
+                slow += if at(&wide, p.map(|c| c as i64)) >= 0.5 { f64::from(*value) } else { 0.0 };
+            });
+            let found = own.sum_where(&other, step, 0.5);
+            assert!((found - slow).abs() < 1e-9 * slow.max(1.0), "{origin:?} {step}: {found} {slow}");
         }
     }
 
-    fn sums(tile: &Tile, other: &Tile, step: usize) {
-        let mut wide = tile.blank();
-        wide.meet(&other.clone().repeated(step), |row, values| row.copy_from_slice(values));
-        let high = tile.values.iter().zip(&wide.values).filter(|(_, other)| **other >= 0.5);
-        let slow: f64 = high.map(|(value, _)| f64::from(*value)).sum();
-        let found = tile.sum_where(other, step, 0.5);
-        assert!((found - slow).abs() < 1e-9 * slow.max(1.0), "{:?} {step}: {found} {slow}", other.origin);
-    }
-
     #[test]
-    fn coverage_is_exact_area() {
+    fn coverage_is_exact_area_and_covering_twice_adds_nothing() {
         let polygon = disc([-3.3, 17.8], 6.4);
         let mut tile = Tile::around(&polygon, 2.0);
         tile.cover(&polygon);
         let sum: f64 = tile.values.iter().map(|v| f64::from(*v)).sum();
         assert!((sum - area(&polygon)).abs() < 1e-3, "{sum} {}", area(&polygon));
         let (mut x, mut y) = (0.0, 0.0);
-        tile.clone().for_each(|p, v| {
+        tile.for_each(|p, v| {
             x += p[0] * f64::from(*v);
             y += p[1] * f64::from(*v);
         });
         // A pixel covered in part counts at its centre: right to a hundredth, where a shifted grid would be off by a half.
         assert!((x / sum + 3.3).abs() < 1e-2 && (y / sum - 17.8).abs() < 1e-2, "pixel centres at whole numbers");
+        let once = tile.clone();
+        tile.cover(&polygon);
+        assert_eq!(once, tile);
     }
 
     #[test]
     fn sums_and_coarser_pixels_hold_everything() {
         for (origin, width, height) in [([0, 0], 7, 30), ([-21, 3], 60, 5), ([2, -9], 3, 41), ([1, 1], 1, 1)] {
-            let values: Vec<f32> = (0..width * height).map(|i| ((i * 37) % 101) as f32 / 101.0).collect();
-            let tile = Tile { origin, width, values };
+            let tile = tile(origin, width, height);
             let sum: f64 = tile.values.iter().map(|v| f64::from(*v)).sum();
             assert!((tile.sum() - sum).abs() < 1e-9);
-            for n in [1, 2, 3] {
-                let coarse = tile.coarsened(n);
-                assert!((coarse.sum() * (n * n) as f64 - sum).abs() < 1e-4, "{n}");
-                let (mut wanted, side) = (coarse.blank(), n as i64);
-                tile.clone().for_each(|[x, y], value| {
-                    let place = |at: f64, axis: usize| {
-                        usize::try_from((at as i64).div_euclid(side) - coarse.origin[axis]).unwrap()
-                    };
-                    wanted.values[place(y, 1) * coarse.width + place(x, 0)] += *value / (n * n) as f32;
+            for n in [1, 2, 3, 4, 5] {
+                let mut coarse = tile.coarsened(n);
+                let side = n as i64;
+                coarse.for_each(|p, value| {
+                    let corner = p.map(|at| at as i64 * side);
+                    let places = (0..side * side).map(|i| [corner[0] + i % side, corner[1] + i / side]);
+                    let wanted = places.map(|p| at(&tile, p)).sum::<f32>() / (n * n) as f32;
+                    assert!((*value - wanted).abs() < 1e-5, "{origin:?} {n}");
                 });
-                assert!(wanted.values.iter().zip(&coarse.values).all(|(a, b)| (a - b).abs() < 1e-5), "{origin:?} {n}");
+                assert!((coarse.sum() * (n * n) as f64 - sum).abs() < 1e-4, "{n}");
             }
         }
     }
@@ -533,17 +500,6 @@ mod tests {
     }
 
     #[test]
-    fn tiles_meet_where_they_overlap() {
-        let mut tile = Tile { origin: [-2, 4], width: 5, values: vec![0.0; 20] };
-        let other = Tile { origin: [1, 2], width: 4, values: (1..=16).map(|i| i as f32).collect() };
-        tile.meet(&other, |row, values| row.iter_mut().zip(values).for_each(|(row, value)| *row += value));
-        let mut wanted = vec![0.0; 20];
-        (wanted[3], wanted[4], wanted[8], wanted[9]) = (9.0, 10.0, 13.0, 14.0);
-        assert_eq!(tile.values, wanted);
-        tile.meet(&Tile { origin: [40, 4], ..other }, |_, _| panic!("they do not meet"));
-    }
-
-    #[test]
     fn what_lies_beyond_a_tile_is_left_out() {
         let polygon = disc([4.0, 6.0], 9.0);
         let mut whole = Tile::around(&polygon, 2.0);
@@ -551,27 +507,13 @@ mod tests {
         for (origin, width, height) in
             [([0, 0], 7, 30), ([-20, 3], 60, 4), ([2, -9], 3, 40), ([10, 12], 9, 9), ([30, 0], 4, 4)]
         {
-            let mut part = Tile { origin, width, values: vec![0.0; width * height] };
+            let mut part = tile(origin, width, height).blank();
             part.cover(&polygon);
-            let mut index = 0;
-            part.clone().for_each(|p, value| {
-                let [x, y] = [0, 1].map(|axis| usize::try_from(p[axis] as i64 - whole.origin[axis]).ok());
-                let expected = x.zip(y).filter(|(x, y)| *x < whole.width && *y < whole.height());
-                let expected = expected.map_or(0.0, |(x, y)| whole.values[y * whole.width + x]);
-                assert!((*value - expected).abs() < 1e-4, "{origin:?} {index}: {value} {expected}");
-                index += 1;
+            part.for_each(|p, value| {
+                let expected = at(&whole, p.map(|c| c as i64));
+                assert!((*value - expected).abs() < 1e-4, "{origin:?} {p:?}: {value} {expected}");
             });
         }
-    }
-
-    #[test]
-    fn covering_twice_adds_nothing() {
-        let polygon = disc([10.0, 10.0], 4.0);
-        let mut tile = Tile::around(&polygon, 2.0);
-        tile.cover(&polygon);
-        let once = tile.clone();
-        tile.cover(&polygon);
-        assert_eq!(once, tile);
     }
 
     #[test]
@@ -579,19 +521,10 @@ mod tests {
         for (x, y, width, height) in
             [(-2, -3, 9, 8), (3, 2, 2, 2), (5, 4, 9, 9), (-4, 1, 4, 2), (0, 6, 3, 3), (8, 0, 2, 2), (-9, -9, 40, 40)]
         {
-            let values: Vec<f32> = (1..=width * height).map(|i| i as f32).collect();
-            let tile = Tile { origin: [x, y], width, values };
-            // Rows 2 to 7 of an image of eight columns.
-            let mut image = vec![0.5; 48];
-            lay(&mut image, 8, 2, tile.as_ref(), |row, values| {
-                row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value);
-            });
-            for (index, pixel) in image.iter().enumerate() {
-                let [column, row] = [index as i64 % 8 - x, index as i64 / 8 + 2 - y];
-                let inside = (0..width as i64).contains(&column) && (0..height as i64).contains(&row);
-                let over = if inside { (row * width as i64 + column + 1) as f32 } else { 0.0 };
-                assert_eq!(*pixel, 0.5 + over, "{x} {y} {index}");
-            }
+            let other = tile([x, y], width, height);
+            let mut image = Tile { origin: [-1, 2], width: 8, values: vec![0.5; 48] };
+            image.meet(&other, |row, values| row.iter_mut().zip(values).for_each(|(pixel, value)| *pixel += value));
+            image.for_each(|p, pixel| assert_eq!(*pixel, 0.5 + at(&other, p.map(|c| c as i64)), "{x} {y} {p:?}"));
         }
     }
 }

@@ -1,43 +1,42 @@
 //! Partially coherent bright field: what each object lets through, filtered by the microscope's transfer functions, and
 //! the product over all objects.
 
+use core::ops::Range;
+use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use multiversion::multiversion;
-use optics_psf::{Border, Factor, Focus, Gaussian, Lattice, Method, Patch, PatchScratch};
+use optics_psf::{
+    Abbe, AbbeParams, Border, Factor, Focus, Gaussian, Lattice, Layer, Method, Microscope, Patch, PatchScratch, Source,
+    fast_length,
+};
 use portable_numerics::elementary::exp10_from;
 
-use super::abbe;
-use super::canvas::{Canvas, Mixer, Window, add};
-use super::lenses::Lenses;
-use super::lights::{ColouredLight, Group, groups};
-use super::overlap::{Meets, Overlaps};
-use super::passage::{BAND, Band, FocusAt, Light, Passage, Slide};
+use super::canvas::{Canvas, Mixer, Window, add, clear};
+use super::lights::{ColouredLight, Group, Lenses, groups};
+use super::overlap::Overlaps;
+use super::{FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
-use crate::phantom::piece::Phantom;
 use crate::phantom::tile::Tile;
+use crate::phantom::{Phantom, Piece};
 use crate::recipe::{Imaging, Mixing, Restore};
-use crate::scene::{Scene, SceneLight, SceneMicroscope, View};
-use crate::threads::{self, Threads};
+use crate::scene::{SceneLight, SceneMicroscope, View};
+use crate::threads;
 use crate::truth::{COVERED, Mask, Run};
-
-/// Objects whose factors are in memory at one time, when several threads make them.
-const CHUNK: usize = 64;
 
 /// Share of the further spread that lies beyond its ends and is left out.
 const LOST_TAIL: f64 = 1e-5;
 
 /// What all planes of one scene share.
 pub(crate) struct BrightFieldPath {
-    view: View,
     optics: SceneMicroscope,
-    further: Option<Gaussian>,
+    /// The further spread of finished light, if there is any.
+    pub(super) further: Option<Gaussian>,
     restoration: Option<Gaussian>,
     groups: Vec<Group>,
     /// Where colours mix, if the light has any.
     overlaps: Option<Overlaps>,
-    threads: Threads,
     /// What each object lets through, where several planes share it.
     kept: Option<Vec<Mutex<Option<Loaded>>>>,
     spare: Mutex<Vec<Bench>>,
@@ -71,33 +70,25 @@ struct Passed {
 }
 
 impl BrightFieldPath {
-    pub(super) fn new(
-        slide: Slide<'_>,
-        optics: &SceneMicroscope,
-        lenses: &Lenses,
-        threads: Threads,
-    ) -> Result<Self, Cause> {
+    pub(super) fn new(slide: Slide<'_>, optics: &SceneMicroscope, lenses: &Lenses) -> Result<Self, Cause> {
         let scene = slide.scene;
-        let groups = groups(slide, optics, lenses, threads)?;
-        let further = further(optics, scene.view.pixel_um)?;
-        let restores = scene.restoration.restore != Restore::Off && any_imaged(slide.phantoms);
+        let groups = groups(slide, optics, lenses)?;
+        let further = || Gaussian::truncated(optics.extra_blur_um / scene.view.pixel_um, Method::Direct, LOST_TAIL);
+        let further = (optics.extra_blur_um > 0.0).then(further).transpose();
+        let further = further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))?;
+        let imaged = slide.phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged);
+        let restores = scene.restoration.restore != Restore::Off && imaged;
         let feather = || Gaussian::new(scene.restoration.feather_um / scene.grid().pixel_um);
         let restoration = restores.then(feather).transpose()?;
         Ok(Self {
-            view: scene.view,
             optics: *optics,
             further,
             restoration,
-            threads,
             // Light of many single wavelengths would need too much memory.
             kept: (scene.planes_um.len() > 1 && groups.len() == 1)
                 .then(|| slide.phantoms.iter().map(|_| Mutex::default()).collect()),
-            overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. }).then(|| {
-                let view = scene.view;
-                // What overlaps beyond the border of a frame is not known in it.
-                let meets = if scene.frame.is_some() { Meets::All } else { Meets::Some };
-                Overlaps::new(slide.phantoms, view.width, view.height, scene.oversampling(), meets, threads)
-            }),
+            overlaps: matches!(scene.light, SceneLight::Colour { mixing: Mixing::Spectral, .. })
+                .then(|| Overlaps::new(slide)),
             groups,
             spare: Mutex::default(),
         })
@@ -105,24 +96,29 @@ impl BrightFieldPath {
 
     /// The channels of `light` become what the objects let through.
     pub(super) fn pass(&self, slide: Slide<'_>, focus: FocusAt, light: &mut Light) -> Result<Passage, Cause> {
-        let View { width, height, .. } = self.view;
+        let View { width, height, .. } = slide.scene.view;
         let Light { channels, lights, pictures, .. } = light;
-        for channel in channels.iter_mut() {
-            channel.clear();
-            channel.resize(width * height, 0.0);
-        }
         let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
         for group in &self.groups {
             lights.resize_with(group.lights.len(), optics_psf::Light::default);
             pictures.resize(group.lights.len(), Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
-                light.reset(of.lens.imager.microscope(), width, height);
+                light.reset(of.imager.microscope(), width, height);
             }
             let absorbances = self.pass_group(slide, focus, group, lights, &mut passage.floored)?;
             let exact = self.optics.imaging == Imaging::Abbe;
             if let (true, FocusAt::Stage(stage_um)) = (exact, focus) {
+                // Light that was carried from slab to slab takes the place of products.
                 passage.floored = 0;
-                self.replace(slide, stage_um, group, lights)?;
+                let indices: Vec<usize> = (0..lights.len()).collect();
+                let images = threads::map(slide.threads, &indices, |&light| {
+                    let ColouredLight { imager, shift_um, .. } = &group.lights[light];
+                    abbe_image(slide, &self.optics, imager.microscope(), (&group.mixer, light), stage_um - shift_um)
+                });
+                for (light, image) in lights.iter_mut().zip(images) {
+                    light.clear();
+                    light.multiply(&image?, [0, 0]);
+                }
             }
             for (light, picture) in lights.iter().zip(pictures.iter_mut()) {
                 picture.resize(width * height, 0.0);
@@ -130,7 +126,7 @@ impl BrightFieldPath {
             }
             if let (false, Some(overlaps), Mixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
                 let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
-                overlaps.correct(colour, slide.phantoms, blur_px, pictures, self.threads)?;
+                overlaps.correct(colour, slide, blur_px, pictures)?;
             }
             for ((of, picture), absorbances) in group.lights.iter().zip(&*pictures).zip(&absorbances) {
                 for (channel, &weight) in of.weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
@@ -144,33 +140,13 @@ impl BrightFieldPath {
         Ok(passage)
     }
 
-    /// Puts light that was carried from slab to slab in the place of products.
-    fn replace(
-        &self,
-        slide: Slide<'_>,
-        stage_um: f64,
-        group: &Group,
-        lights: &mut [optics_psf::Light],
-    ) -> Result<(), Cause> {
-        let indices: Vec<usize> = (0..lights.len()).collect();
-        let images = threads::map(self.threads, &indices, |&light| {
-            let ColouredLight { lens, shift_um, .. } = &group.lights[light];
-            abbe::image(slide, &self.optics, lens, (&group.mixer, light), stage_um - shift_um)
-        });
-        for (light, image) in lights.iter_mut().zip(images) {
-            light.clear();
-            light.multiply(&image?, [0, 0]);
-        }
-        Ok(())
-    }
-
     /// How widely an object is blurred in a plane, as the standard deviation of its cone of light, px.
     fn blur_px(&self, slide: Slide<'_>, index: usize, focus: FocusAt, group: &Group) -> f64 {
         let (FocusAt::Stage(plane_um), [.., light]) = (focus, &group.lights[..]) else { return 0.0 };
         let stage_um = slide.scene.seen_at_um(plane_um, slide.scene.objects[index].depth_um);
-        let microscope = light.lens.imager.microscope();
+        let microscope = light.imager.microscope();
         // An even disc of radius r has a standard deviation of r/2 along each axis.
-        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * self.view.pixel_um)
+        microscope.cone_radius_um(slide.scene.objects[index].depth_um, stage_um) / (2.0 * slide.scene.view.pixel_um)
     }
 
     /// Multiplies the lights of a group by what the objects let through, on either grid. Gives the mean absorbances over the
@@ -184,82 +160,60 @@ impl BrightFieldPath {
         floored: &mut usize,
     ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
-        let indices: Vec<usize> = (0..slide.phantoms.len()).collect();
-        // One thread multiplies a patch while it is still in the cache.
-        let chunk = match self.threads {
-            Threads::One => 1,
-            Threads::All => CHUNK,
-        };
-        for chunk in indices.chunks(chunk) {
-            let passed = threads::map(self.threads, chunk, |&index| self.image(slide, index, focus, group));
-            for (&index, passed) in chunk.iter().zip(passed) {
-                let Some(passed) = passed? else {
-                    for absorbances in &mut absorbances {
-                        absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
-                    }
-                    continue;
-                };
-                let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
-                let factors = passed.bench.factors.iter().zip(&passed.absorbances);
-                for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
-                    light.multiply(factor, at_px);
-                    *floored += factor.floored;
-                    absorbances.extend(own);
+        let image = |index: usize| self.image(slide, index, focus, group);
+        threads::each(slide.threads, slide.phantoms.len(), image, |index, passed: Result<_, Cause>| {
+            let Some(passed) = passed? else {
+                for absorbances in &mut absorbances {
+                    absorbances.extend(slide.phantoms[index].pieces.iter().map(|_| 0.0));
                 }
-                self.spare().push(passed.bench);
+                return Ok(());
+            };
+            let at_px = passed.window.origin.map(|at| at / i64::from(self.optics.oversampling));
+            let factors = passed.bench.factors.iter().zip(&passed.absorbances);
+            for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
+                light.multiply(factor, at_px);
+                *floored += factor.floored;
+                absorbances.extend(own);
             }
-        }
+            self.spare().push(passed.bench);
+            Ok::<_, Cause>(())
+        })?;
         Ok(absorbances)
     }
 
-    /// Gives the light of each band of rows: B·(s + (1 − s)·∏), s the stray light.
-    pub(super) fn spread(&self, light: &mut Light, mut visit: impl FnMut(Band<'_>)) {
-        let Light { empty_log10, channels, empty, bands, scratch, .. } = light;
-        let (width, height) = (self.view.width, self.view.height);
-        bands.resize(channels.len(), Vec::new());
-        let reach = self.further.as_ref().map_or(0, Gaussian::radius);
-        let mut lit = 0;
-        for first in (0..height).step_by(BAND) {
-            let end = (first + BAND).min(height);
-            let needed = (end + reach).min(height);
-            if lit < needed {
-                let rows = lit * width..needed * width;
-                empty.clear();
-                empty.resize(rows.len(), 0.0);
-                exp10_from(&empty_log10[rows.clone()], empty);
-                for channel in channels.iter_mut() {
-                    illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
-                }
-                lit = needed;
-            }
-            for (whole, band) in channels.iter().zip(bands.iter_mut()) {
-                band.resize((end - first) * width, 0.0);
-                match &self.further {
-                    Some(gaussian) => {
-                        gaussian.blur_rows_into(whole, width, Border::Reflect, first, band, scratch);
-                    }
-                    None => band.copy_from_slice(&whole[first * width..end * width]),
-                }
-            }
-            let mut spread: Vec<&mut [f32]> = bands.iter_mut().map(Vec::as_mut_slice).collect();
-            visit(Band { first, sharp: &[], spread: &mut spread });
+    /// Makes of what objects let through light, in some rows: B·(s + (1 − s)·∏), s the stray light.
+    pub(super) fn illuminate(&self, light: &mut Light, rows: Range<usize>) {
+        let Light { empty_log10, channels, empty, .. } = light;
+        clear(empty, rows.len());
+        exp10_from(&empty_log10[rows.clone()], empty);
+        for channel in channels {
+            illuminate(&mut channel[rows.clone()], empty, self.optics.stray_light as f32);
         }
     }
 
-    /// How deep an object lies and how far the stage has travelled.
-    fn place(scene: &Scene, depth_um: f64, focus: FocusAt, light: &ColouredLight) -> [f64; 2] {
-        match focus {
-            FocusAt::Everywhere => [0.0, 0.0],
-            FocusAt::Stage(plane_um) => [depth_um, scene.seen_at_um(plane_um, depth_um) - light.shift_um],
+    /// Pixels by which an object of that depth is spread where the stage stands.
+    pub(super) fn reach_px(&self, depth_um: f64, stage_um: f64) -> Result<usize, Cause> {
+        let mut widest = 0;
+        for light in self.groups.iter().flat_map(|group| &group.lights) {
+            widest = widest.max(light.imager.margin_px(depth_um, stage_um - light.shift_um)?);
         }
+        Ok(widest)
     }
 
     /// Images an object; nothing if none of its light reaches the picture.
     fn image(&self, slide: Slide<'_>, index: usize, at: FocusAt, group: &Group) -> Result<Option<Passed>, Cause> {
         let (object, phantom) = (&slide.scene.objects[index], &slide.phantoms[index]);
+        // How deep it lies and how far the stage has travelled.
+        let place = |light: &ColouredLight| match at {
+            FocusAt::Everywhere => (0.0, 0.0),
+            FocusAt::Stage(plane_um) => {
+                let depth_um = object.depth_um;
+                (depth_um, slide.scene.seen_at_um(plane_um, depth_um) - light.shift_um)
+            }
+        };
         let of_light = |light: &ColouredLight| {
-            let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
-            light.lens.imager.focus(depth_um, stage_um)
+            let (depth_um, stage_um) = place(light);
+            light.imager.focus(depth_um, stage_um)
         };
         let focuses = group.lights.iter().map(of_light).collect::<Result<Vec<Focus>, _>>()?;
         let n = self.optics.oversampling as usize;
@@ -267,7 +221,8 @@ impl BrightFieldPath {
             return Ok(None);
         };
         let margin_px = focuses.iter().map(Focus::margin_px).max().unwrap_or(0);
-        if !window.meets(self.view.width * n, self.view.height * n, margin_px * n) {
+        let grid = slide.scene.grid();
+        if !window.meets(grid.width, grid.height, margin_px * n) {
             return Ok(None);
         }
         let mut bench = self.spare().pop().unwrap_or_default();
@@ -287,10 +242,10 @@ impl BrightFieldPath {
         factors.resize_with(group.lights.len(), Factor::default);
         let lights = group.lights.iter().zip(&mut loaded.patches);
         for (factor, (focus, (light, patch))) in factors.iter_mut().zip(focuses.iter().zip(lights)) {
-            let imager = &light.lens.imager;
+            let imager = &light.imager;
             imager.expose(patch, focus, scratch, factor);
             if !loaded.restored.is_empty() {
-                let [depth_um, stage_um] = Self::place(slide.scene, object.depth_um, at, light);
+                let (depth_um, stage_um) = place(light);
                 let focus = imager.refocus(depth_um, stage_um)?;
                 imager.expose(patch, &focus, scratch, again);
                 restore(factor, again, &loaded.restored, window, n);
@@ -298,20 +253,19 @@ impl BrightFieldPath {
         }
         drop(kept);
         let absorbances = factors.iter().enumerate().map(|(light, factor)| {
-            let of_piece = |(mask, share): (&Mask, &f64)| share * mean_absorbance(mask, factor, window, n);
-            slide.masks[index].iter().zip(&group.shares[index][light]).map(of_piece).collect()
+            let of_piece = |(piece, share): (&Piece, &f64)| share * mean_absorbance(&piece.mask, factor, window, n);
+            phantom.pieces.iter().zip(&group.shares[index][light]).map(of_piece).collect()
         });
         let absorbances = absorbances.collect();
         Ok(Some(Passed { bench, window, absorbances }))
     }
 
-    /// Makes an object ready to be imaged.
     fn load(&self, phantom: &Phantom, group: &Group, window: Window, canvas: &mut Canvas, loaded: &mut Loaded) {
         group.mixer.compose(&phantom.pieces, window, canvas);
         loaded.patches.resize_with(group.lights.len(), Patch::default);
         let lights = group.lights.iter().zip(&canvas.transmittance);
         for ((light, transmittance), patch) in lights.zip(&mut loaded.patches) {
-            light.lens.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
+            light.imager.load(transmittance, &canvas.phase_rad, window.width, patch);
         }
         loaded.restored.clear();
         let imaged = phantom.pieces.iter().filter(|piece| piece.imaged);
@@ -330,15 +284,67 @@ impl BrightFieldPath {
     }
 }
 
-/// The further spread of finished light, if there is any.
-pub(super) fn further(optics: &SceneMicroscope, pixel_um: f64) -> Result<Option<Gaussian>, Cause> {
-    let gaussian = || Gaussian::truncated(optics.extra_blur_um / pixel_um, Method::Direct, LOST_TAIL);
-    let further = (optics.extra_blur_um > 0.0).then(gaussian).transpose();
-    further.map_err(|error| Cause::Optics("optics.extra_blur_um", error))
+/// How widely light spreads beyond the condenser's cone, µm.
+const DIFFRACTION_UM: f64 = 3.0;
+
+/// The accurate way: Abbe's integration over the source, light carried from slab to slab. The slide in one of a mixer's lights, where the stage stands: a factor that covers the picture.
+fn abbe_image(
+    slide: Slide<'_>,
+    optics: &SceneMicroscope,
+    microscope: &Microscope,
+    light: (&Mixer, usize),
+    stage_um: f64,
+) -> Result<Factor, Cause> {
+    let View { width, height, pixel_um } = slide.scene.grid();
+    // Light that leaves on one side comes back on the other: so far apart that it does not reach the picture.
+    let margin = crate::random::count(((reach_um(slide, microscope, stage_um) + DIFFRACTION_UM) / pixel_um).ceil());
+    let size = [width, height].map(|side| fast_length(side + 2 * margin));
+    let frame = Window { origin: [-(margin as i64); 2], width: size[0], height: size[1] };
+    let params =
+        AbbeParams { width: size[0], height: size[1], source: Source::Vogel { points: optics.directions as usize } };
+    let abbe = Abbe::new(microscope, &params).map_err(|error| Cause::Optics("optics.directions", error))?;
+    let layers = layers(slide, optics.slab_um, light, frame)?;
+    let whole = abbe.image(&layers, stage_um)?;
+    let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
+    let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();
+    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, floored: 0 })
 }
 
-fn any_imaged(phantoms: &[Phantom]) -> bool {
-    phantoms.iter().flat_map(|phantom| &phantom.pieces).any(|piece| piece.imaged)
+/// The widest cone of light of all objects, µm.
+fn reach_um(slide: Slide<'_>, microscope: &Microscope, stage_um: f64) -> f64 {
+    let depths = slide.scene.objects.iter().map(|object| object.depth_um);
+    depths.map(|depth_um| microscope.cone_radius_um(depth_um, stage_um)).fold(0.0, f64::max)
+}
+
+/// Every slab that is not empty, as amplitudes.
+fn layers(slide: Slide<'_>, slab_um: f64, (mixer, light): (&Mixer, usize), frame: Window) -> Result<Vec<Layer>, Cause> {
+    let mut slabs: BTreeMap<i64, Vec<[f64; 2]>> = BTreeMap::new();
+    let mut canvas = Canvas::default();
+    for (object, phantom) in slide.scene.objects.iter().zip(slide.phantoms) {
+        let tiles = phantom.pieces.iter().map(|piece| &piece.absorbance);
+        let Some(window) = Window::around(tiles, 1) else { continue };
+        mixer.compose(&phantom.pieces, window, &mut canvas);
+        let slab = libm::round(object.depth_um / slab_um) as i64;
+        let amplitudes = slabs.entry(slab).or_insert_with(|| vec![[1.0, 0.0]; frame.width * frame.height]);
+        let transmittance = canvas.transmittance[light].chunks_exact(window.width);
+        for (y, row) in transmittance.enumerate() {
+            let place = |axis: usize, at: usize| usize::try_from(window.origin[axis] + at as i64 - frame.origin[axis]);
+            let Ok(to_y) = place(1, y) else { continue };
+            for (x, light) in row.iter().enumerate() {
+                let Ok(to_x) = place(0, x) else { continue };
+                if to_x >= frame.width || to_y >= frame.height {
+                    continue;
+                }
+                let phase = canvas.phase_rad.get(y * window.width + x).map_or(0.0, |phase| f64::from(*phase));
+                let amplitude = f64::from(*light).max(0.0).sqrt();
+                let [re, im] = [amplitude * libm::cos(phase), amplitude * libm::sin(phase)];
+                let at = &mut amplitudes[to_y * frame.width + to_x];
+                *at = [at[0] * re - at[1] * im, at[0] * im + at[1] * re];
+            }
+        }
+    }
+    let layer = |(slab, amplitudes): (i64, Vec<[f64; 2]>)| Ok(Layer::new(slab as f64 * slab_um, amplitudes)?);
+    slabs.into_iter().map(layer).collect()
 }
 
 /// 1 where a tile is covered, 0 elsewhere.
@@ -367,7 +373,6 @@ fn add_light(channel: &mut [f32], light: &[f32], weight: f32) {
     channel.iter_mut().zip(light).for_each(|(channel, light)| *channel += weight * light);
 }
 
-/// Makes of what objects let through light: B·(s + (1 − s)·T).
 #[multiversion(targets = "simd")]
 fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));

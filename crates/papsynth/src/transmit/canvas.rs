@@ -2,10 +2,11 @@
 
 use dye_spectra::{Amounts, Colour, DYES};
 use multiversion::multiversion;
+use optics_psf::{Gaussian, Scratch};
 use portable_numerics::elementary::exp10_from;
 
 use crate::phantom::piece::{Phantom, Piece};
-use crate::phantom::tile::{Tile, lay_at};
+use crate::phantom::tile::{Tile, lay};
 use crate::truth::{COVERED, Part};
 
 /// How dyes become absorbance.
@@ -24,7 +25,6 @@ pub(super) struct Window {
     pub(super) height: usize,
 }
 
-/// An object on its rectangle.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     /// Light that comes through, 0 to 1, channel by channel.
@@ -58,10 +58,6 @@ impl Window {
             self.origin[axis] - margin < whole as i64 && self.origin[axis] + length as i64 + margin > 0
         };
         inside(0, self.width, width) && inside(1, self.height, height)
-    }
-
-    fn samples(self) -> usize {
-        self.width * self.height
     }
 }
 
@@ -110,7 +106,7 @@ impl Mixer {
 
     /// Lets light through the pieces of an object.
     pub(super) fn compose(&self, pieces: &[Piece], window: Window, canvas: &mut Canvas) {
-        let samples = window.samples();
+        let samples = window.width * window.height;
         let Canvas { transmittance, phase_rad, amounts, zeros } = canvas;
         transmittance.resize(self.channels(), Vec::new());
         match self {
@@ -155,7 +151,7 @@ impl Mixer {
     }
 }
 
-fn clear(values: &mut Vec<f32>, samples: usize) {
+pub(super) fn clear(values: &mut Vec<f32>, samples: usize) {
     values.clear();
     values.resize(samples, 0.0);
 }
@@ -163,7 +159,16 @@ fn clear(values: &mut Vec<f32>, samples: usize) {
 /// Adds a tile, so many times as strong, to a rectangle.
 #[multiversion(targets = "simd")]
 pub(super) fn add(values: &mut [f32], window: Window, tile: &Tile, strength: f32) {
-    lay_at(values, window.width, window.origin, tile.as_ref(), |row, tile| {
+    lay(values, window.width, window.origin, tile, |row, tile| {
         row.iter_mut().zip(tile).for_each(|(value, tile)| *value += strength * tile);
     });
+}
+
+/// A tile that is blurred and as much larger, in memory of another one.
+pub(super) fn blurred(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32>, scratch: &mut Scratch) -> Tile {
+    let margin = gaussian.radius();
+    let width = tile.width + 2 * margin;
+    values.resize(width * (tile.height() + 2 * margin), 0.0);
+    gaussian.spread_into(&tile.values, tile.width, &mut values, scratch);
+    Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
 }

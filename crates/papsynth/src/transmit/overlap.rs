@@ -10,11 +10,13 @@ use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::canvas::{Window, add};
+use super::Slide;
+use super::canvas::{Window, add, blurred};
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
-use crate::phantom::tile::{Tile, TileRef, lay};
-use crate::threads::{self, Threads};
+use crate::phantom::tile::{Tile, lay};
+use crate::scene::{Scene, View};
+use crate::threads;
 
 /// Absorbance below which an object changes no colour behind it.
 const FAINT: f32 = 0.01;
@@ -27,8 +29,6 @@ const LOST_TAIL: f64 = 1e-3;
 
 /// What overlaps in a scene: for each object that meets another its pieces' absorbances, on the camera's pixels.
 pub(super) struct Overlaps {
-    width: usize,
-    height: usize,
     objects: Vec<Overlapping>,
 }
 
@@ -40,35 +40,22 @@ struct Overlapping {
 
 /// An object's amounts of dye, and what they let through.
 struct Stained {
-    window: Window,
-    amounts: [Vec<f32>; DYES],
-    transmittance: [Vec<f32>; 3],
-}
-
-/// Which objects are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meets {
-    /// Those whose boxes meet another's.
-    Some,
-    /// All that are stained.
-    All,
+    /// Without pixels where there is none of a dye.
+    amounts: [Tile; DYES],
+    transmittance: [Tile; 3],
 }
 
 impl Overlaps {
-    pub(super) fn new(
-        phantoms: &[Phantom],
-        width: usize,
-        height: usize,
-        n: usize,
-        which: Meets,
-        threads: Threads,
-    ) -> Self {
-        let boxes: Vec<Option<Window>> =
-            phantoms.iter().map(|phantom| stained(phantom, width, height, n, which)).collect();
+    /// Of objects whose boxes meet another's or, since what overlaps beyond the border of a frame is not known in it, of all that
+    /// are stained.
+    pub(super) fn new(slide: Slide<'_>) -> Self {
+        let (scene, phantoms) = (slide.scene, slide.phantoms);
+        let (n, all) = (scene.oversampling(), scene.frame.is_some());
+        let boxes: Vec<Option<Window>> = phantoms.iter().map(|phantom| stained(phantom, scene)).collect();
         // Sorted by their left edges, only neighbours can meet.
         let mut order: Vec<usize> = (0..boxes.len()).filter(|&i| boxes[i].is_some()).collect();
         order.sort_by_key(|&i| boxes[i].map(|b| b.origin[0]));
-        let mut meets: Vec<bool> = boxes.iter().map(|b| which == Meets::All && b.is_some()).collect();
+        let mut meets: Vec<bool> = boxes.iter().map(|b| all && b.is_some()).collect();
         for (at, &i) in order.iter().enumerate() {
             let Some(a) = boxes[i] else { continue };
             for &j in &order[at + 1..] {
@@ -82,47 +69,46 @@ impl Overlaps {
             }
         }
         let indices: Vec<usize> = (0..boxes.len()).filter(|&i| meets[i]).collect();
-        let objects = threads::map(threads, &indices, |&index| Overlapping {
+        let objects = threads::map(slide.threads, &indices, |&index| Overlapping {
             index,
             pieces: phantoms[index].pieces.iter().map(|piece| piece.absorbance.coarsened(n)).collect(),
         });
-        Self { width, height, objects }
+        Self { objects }
     }
 
     /// Corrects three channels. `blur_px` says how widely each object is blurred, as a standard deviation.
     pub(super) fn correct(
         &self,
         colour: &Colour,
-        phantoms: &[Phantom],
+        slide: Slide<'_>,
         blur_px: impl Fn(usize) -> f64 + Sync + Send,
         channels: &mut [Vec<f32>],
-        threads: Threads,
     ) -> Result<(), Cause> {
         if self.objects.len() < 2 {
             return Ok(());
         }
-        let pixels = self.width * self.height;
+        let View { width, height, .. } = slide.scene.view;
+        let (pixels, whole) = (width * height, Window { origin: [0, 0], width, height });
         let mut layers = vec![0.0_f32; pixels];
         let mut totals: [Vec<f32>; DYES] = core::array::from_fn(|_| vec![0.0; pixels]);
         let mut products: [Vec<f32>; 3] = core::array::from_fn(|_| vec![1.0; pixels]);
-        let stained = threads::map(threads, &self.objects, |object| {
-            object.stain(colour, &phantoms[object.index], blur_px(object.index))
+        let stained = threads::map(slide.threads, &self.objects, |object| {
+            object.stain(colour, &slide.phantoms[object.index], blur_px(object.index))
         });
         for stained in stained {
             let stained = stained?;
-            let tile = |values| TileRef { origin: stained.window.origin, width: stained.window.width, values };
-            for (total, amounts) in totals.iter_mut().zip(&stained.amounts).filter(|(_, amounts)| !amounts.is_empty()) {
-                sum(total, self.width, tile(amounts));
+            for (total, amounts) in totals.iter_mut().zip(&stained.amounts) {
+                add(total, whole, amounts, 1.0);
             }
             for (product, transmittance) in products.iter_mut().zip(&stained.transmittance) {
-                multiply(product, self.width, tile(transmittance));
+                multiply(product, width, transmittance);
             }
-            count(&mut layers, self.width, tile(&stained.transmittance[1]));
+            count(&mut layers, width, &stained.transmittance[1]);
         }
         let [h, e, l, o, n] = &totals;
-        let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; self.width]);
-        for y in 0..self.height {
-            let row = y * self.width..(y + 1) * self.width;
+        let mut together: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; width]);
+        for y in 0..height {
+            let row = y * width..(y + 1) * width;
             if layers[row.clone()].iter().all(|layers| *layers < 2.0) {
                 continue;
             }
@@ -138,66 +124,57 @@ impl Overlaps {
 
 impl Overlapping {
     fn stain(&self, colour: &Colour, phantom: &Phantom, blur_px: f64) -> Result<Stained, Cause> {
-        let blurred;
+        let spread;
         let pieces = if blur_px > SHARP_PX {
             let gaussian = Gaussian::truncated(blur_px, Method::Decimated, LOST_TAIL)?;
-            blurred = self.pieces.iter().map(|tile| spread(&gaussian, tile)).collect::<Vec<_>>();
-            &blurred
+            let tiles = self.pieces.iter().map(|tile| blurred(tile, &gaussian, Vec::new(), &mut Scratch::default()));
+            spread = tiles.collect::<Vec<_>>();
+            &spread
         } else {
             &self.pieces
         };
         let window = Window::around(pieces.iter(), 1).expect("what overlaps has pixels");
         let samples = window.width * window.height;
-        let mut amounts: [Vec<f32>; DYES] = Default::default();
+        let blank = |samples| Tile { origin: window.origin, width: window.width, values: vec![0.0; samples] };
+        let mut amounts: [Tile; DYES] = core::array::from_fn(|_| blank(0));
         for (dye, amounts) in amounts.iter_mut().enumerate() {
             for (piece, tile) in phantom.pieces.iter().zip(pieces).filter(|(piece, _)| piece.dyes[dye] > 0.0) {
-                amounts.resize(samples, 0.0);
-                add(amounts, window, tile, piece.dyes[dye] as f32);
+                amounts.values.resize(samples, 0.0);
+                add(&mut amounts.values, window, tile, piece.dyes[dye] as f32);
             }
         }
-        let mut transmittance: [Vec<f32>; 3] = core::array::from_fn(|_| vec![0.0; samples]);
-        let ([h, e, l, o, n], [r, g, b]) = (&amounts, &mut transmittance);
-        colour.transmittance_into([h, e, l, o, n], [r, g, b]);
-        Ok(Stained { window, amounts, transmittance })
+        let mut transmittance: [Tile; 3] = core::array::from_fn(|_| blank(samples));
+        let [r, g, b] = &mut transmittance;
+        let light = [&mut r.values[..], &mut g.values, &mut b.values];
+        colour.transmittance_into(amounts.each_ref().map(|amounts| &amounts.values[..]), light);
+        Ok(Stained { amounts, transmittance })
     }
 }
 
 /// The camera's pixels over which an object is stained enough to matter.
-fn stained(phantom: &Phantom, width: usize, height: usize, n: usize, which: Meets) -> Option<Window> {
+fn stained(phantom: &Phantom, scene: &Scene) -> Option<Window> {
+    let (grid, n) = (scene.grid(), scene.oversampling());
     let strong = phantom.pieces.iter().filter(|piece| {
         let dyes: f64 = piece.dyes[..DYES - 1].iter().sum();
         piece.absorbance.values.iter().any(|value| value * dyes as f32 > FAINT)
     });
     let window = Window::around(strong.map(|piece| &piece.absorbance), n)?;
-    (which == Meets::All || window.meets(width * n, height * n, 0)).then_some(Window {
+    (scene.frame.is_some() || window.meets(grid.width, grid.height, 0)).then_some(Window {
         origin: window.origin.map(|at| at / n as i64),
         width: window.width / n,
         height: window.height / n,
     })
 }
 
-fn spread(gaussian: &Gaussian, tile: &Tile) -> Tile {
-    let margin = gaussian.radius();
-    let width = tile.width + 2 * margin;
-    let mut values = vec![0.0; width * (tile.height() + 2 * margin)];
-    gaussian.spread_into(&tile.values, tile.width, &mut values, &mut Scratch::default());
-    Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
-}
-
 #[multiversion(targets = "simd")]
-fn sum(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(sum, value)| *sum += value));
-}
-
-#[multiversion(targets = "simd")]
-fn multiply(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
+fn multiply(image: &mut [f32], width: usize, tile: &Tile) {
+    lay(image, width, [0, 0], tile, |row, values| row.iter_mut().zip(values).for_each(|(v, value)| *v *= value));
 }
 
 /// Counts what is not empty.
 #[multiversion(targets = "simd")]
-fn count(image: &mut [f32], width: usize, tile: TileRef<'_>) {
-    lay(image, width, 0, tile, |row, values| {
+fn count(image: &mut [f32], width: usize, tile: &Tile) {
+    lay(image, width, [0, 0], tile, |row, values| {
         row.iter_mut().zip(values).for_each(|(layers, value)| *layers += if *value < 1.0 { 1.0 } else { 0.0 });
     });
 }

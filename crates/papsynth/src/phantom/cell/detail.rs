@@ -3,14 +3,13 @@
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
+use super::Cell;
 use crate::error::Cause;
 use crate::key::Stream;
-use crate::phantom::pools::{Look, Pools, SIDE, Texels};
-use crate::phantom::studio::Studio;
+use crate::phantom::pools::{Look, SIDE, Texels};
 use crate::phantom::tile::{Point, Tile, grown};
 use crate::phantom::wobble::wobbled_circle;
 use crate::random;
-use crate::scene::cell::CellBody;
 
 /// Radius of a granule, µm (the standard deviation of its absorbance).
 const GRANULE_UM: f64 = 0.28;
@@ -19,15 +18,8 @@ const GRANULE_UM: f64 = 0.28;
 const GRANULE: f64 = 0.75;
 
 /// The first two levels of detail, and the grain: factors on the thickness.
-pub(super) fn add_detail(
-    absorbance: &mut Tile,
-    coverage: &Tile,
-    body: &CellBody,
-    pools: &Pools<'_>,
-    pixel_um: f64,
-    rng: &mut Stream,
-) {
-    let detail = &body.detail;
+pub(super) fn add_detail(absorbance: &mut Tile, coverage: &Tile, cell: &Cell<'_>, rng: &mut Stream) {
+    let (detail, pools, pixel_um) = (&cell.body.detail, cell.pools, cell.pixel_um());
     let clouds = Look::clouds(detail.clouds_um / pixel_um, rng);
     let flecks = Look::fine(pixel_um, rng);
     let grain = Look::fine(pixel_um, rng);
@@ -84,22 +76,23 @@ fn covered(row: &[f32]) -> Option<(usize, usize)> {
     Some((row.iter().position(inside)?, row.iter().rposition(inside)? + 1))
 }
 
-/// The third level of detail.
 pub(super) fn add_cytoskeleton(
-    studio: &Studio,
     absorbance: &mut Tile,
     outline: &[Point],
-    strength: f64,
-    pixel_um: f64,
+    cell: &Cell<'_>,
     rng: &mut Stream,
 ) -> Result<(), Cause> {
     /// Width of a fibre, µm.
     const FIBRE_UM: f64 = 0.3;
+    let strength = cell.body.detail.cytoskeleton;
+    if strength <= 0.0 {
+        return Ok(());
+    }
     let origin = absorbance.origin.map(|o| o as f64);
     let local: Vec<Point> = outline.iter().map(|p| [p[0] - origin[0], p[1] - origin[1]]).collect();
-    let rivers = studio.cytoskeletons.grow(&local, rng)?;
+    let rivers = cell.studio.cytoskeletons.grow(&local, rng)?;
     let mut lines = vec![0.0; absorbance.values.len()];
-    let line = LineParams { width_px: (FIBRE_UM / pixel_um).max(1.0), ..LineParams::default() };
+    let line = LineParams { width_px: (FIBRE_UM / cell.pixel_um()).max(1.0), ..LineParams::default() };
     draw_into(&mut lines, absorbance.width, &rivers, &line)?;
     for (value, line) in absorbance.values.iter_mut().zip(&lines) {
         *value += strength as f32 * line;
@@ -123,7 +116,6 @@ pub(super) fn add_granules(absorbance: &mut Tile, coverage: &Tile, per_100_um2: 
         let sigma = GRANULE_UM / pixel_um * random::between(0.6, 1.3, rng);
         let strength = GRANULE * random::between(0.3, 1.5, rng);
         let reach = (3.0 * sigma).ceil();
-        #[expect(clippy::cast_possible_truncation, reason = "a few pixels round a place in a tile")]
         let span = |at: f64| ((at - reach) as i64).max(0)..(at + reach) as i64 + 1;
         let fall = |away: f64| libm::exp(-away * away / (2.0 * sigma * sigma));
         across.clear();
@@ -243,18 +235,12 @@ fn ramp(like: &Tile, polygon: &[Point], centre: Point, inner: f64, outer: f64) -
 }
 
 /// The granular inner part of the cytoplasm round the nucleus, denser than the clear outer part.
-pub(super) fn add_endoplasm(
-    absorbance: &mut Tile,
-    outline: &[Point],
-    nucleus: Point,
-    body: &CellBody,
-    pools: &Pools<'_>,
-    pixel_um: f64,
-    rng: &mut Stream,
-) {
+pub(super) fn add_endoplasm(absorbance: &mut Tile, outline: &[Point], nucleus: Point, cell: &Cell<'_>) {
+    let Cell { body, pools, .. } = *cell;
     if body.detail.endoplasm <= 0.0 {
         return;
     }
+    let (pixel_um, rng) = (cell.pixel_um(), &mut cell.stream("endoplasm"));
     let share = random::between(0.45, 0.75, rng);
     let softness = random::between(0.08, 0.3, rng);
     let zone = ramp(absorbance, outline, nucleus, share - softness, share + softness);
@@ -269,7 +255,7 @@ pub(super) fn add_endoplasm(
         values.iter_mut().zip(shares).for_each(|(value, share)| *value *= 1.0 + lift * share);
     });
     let grain = Look::fine(pixel_um, rng);
-    let (density, grainy) = (body.detail.endoplasm as f32, body.detail.endoplasm as f32);
+    let density = body.detail.endoplasm as f32;
     let width = absorbance.width;
     let mut field = vec![0.0_f32; width];
     let mut texels: Texels = [0.0; SIDE + 1];
@@ -279,18 +265,17 @@ pub(super) fn add_endoplasm(
         let field = &mut field[..end - first];
         pools.grain().row_into(field, &grain, [first as f64, y as f64], &mut texels);
         for ((value, share), noise) in row[first..end].iter_mut().zip(&zone[first..end]).zip(field) {
-            *value *= 1.0 + share * (density + grainy * noise.max(0.0));
+            *value *= 1.0 + share * (density + density * noise.max(0.0));
         }
     }
 }
 
 /// The cleared space round the nucleus of a koilocyte, and the condensed cytoplasm at its edge.
-pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, body: &CellBody, pixel_um: f64, rng: &mut Stream) {
+pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, cell: &Cell<'_>) {
     /// How far the condensed rim reaches, relative to the cleared space.
     const RIM: f64 = 1.35;
-    let Some(halo) = body.halo else { return };
-    let radius = halo.radius_um / pixel_um;
-    let edge = wobbled_circle(radius, 0.12, 0.10, rng);
+    let Some(halo) = cell.body.halo else { return };
+    let edge = wobbled_circle(halo.radius_um / cell.pixel_um(), 0.12, 0.10, &mut cell.stream("halo"));
     let edge: Vec<Point> = edge.iter().map(|p| [nucleus[0] + 1.15 * p[0], nucleus[1] + 0.87 * p[1]]).collect();
     let near = Tile::around(&grown(&edge, nucleus, RIM), 1.0);
     let clear = ramp(&near, &edge, nucleus, 0.88, 1.0);
@@ -306,13 +291,7 @@ pub(super) fn add_halo(absorbance: &mut Tile, nucleus: Point, body: &CellBody, p
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn disc(centre: Point, radius: f64) -> Vec<Point> {
-        (0..200)
-            .map(|i| core::f64::consts::TAU * f64::from(i) / 200.0)
-            .map(|angle| [centre[0] + radius * libm::cos(angle), centre[1] + radius * libm::sin(angle)])
-            .collect()
-    }
+    use crate::phantom::tile::tests::{at, disc};
 
     #[test]
     fn a_rim_thins_by_the_mean_of_the_cover_around() {
@@ -321,21 +300,13 @@ mod tests {
         let radius = 4_i64;
         let mut thin = Tile { values: vec![1.0; 31 * 27], ..cover.clone() };
         thin_rim(&mut thin, &cover, 4.0);
-        for y in 0..27_i64 {
-            for x in 0..31_i64 {
-                let at = |x: i64, y: i64| {
-                    let inside = (0..31).contains(&x) && (0..27).contains(&y);
-                    if inside { f64::from(cover.values[usize::try_from(y * 31 + x).unwrap()]) } else { 0.0 }
-                };
-                let sum: f64 = (-radius..=radius)
-                    .flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)))
-                    .map(|(dx, dy)| at(x + dx, y + dy))
-                    .sum();
-                let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
-                let found = f64::from(thin.values[usize::try_from(y * 31 + x).unwrap()]);
-                assert!((found - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
-            }
-        }
+        thin.for_each(|p, found| {
+            let [x, y] = p.map(|at| at as i64);
+            let around = (y - radius..=y + radius).flat_map(|y| (x - radius..=x + radius).map(move |x| [x, y]));
+            let sum: f64 = around.map(|p| f64::from(at(&cover, p))).sum();
+            let share = (2.0 * sum / 81.0 - 1.0).clamp(0.0, 1.0);
+            assert!((f64::from(*found) - share * (2.0 - share)).abs() < 1e-5, "{x} {y}: {found}");
+        });
     }
 
     #[test]

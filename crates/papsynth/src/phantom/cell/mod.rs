@@ -9,11 +9,11 @@ mod wrinkles;
 use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
+use crate::phantom::nucleus;
 use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
 use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
-use crate::phantom::{form, nucleus};
 use crate::profile::Stage;
 use crate::scene::cell::{CellBody, Fold, FoldForm};
 use crate::scene::field::{Object, Scene};
@@ -29,19 +29,32 @@ const SKEW: f64 = 0.45;
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
 
+/// A cell that is being made, and what it is made with.
+#[derive(Clone, Copy)]
+pub(super) struct Cell<'a> {
+    pub(super) studio: &'a Studio,
+    pub(super) scene: &'a Scene,
+    pub(super) pools: &'a Pools<'a>,
+    pub(super) object: &'a Object,
+    pub(super) body: &'a CellBody,
+}
+
+impl Cell<'_> {
+    pub(super) fn stream(&self, purpose: &str) -> Stream {
+        self.scene.stream("cell", self.object, purpose)
+    }
+
+    /// Size of a pixel of its sheet.
+    fn pixel_um(&self) -> f64 {
+        self.scene.sheet_grid().pixel_um
+    }
+}
+
 /// Makes cells, sixteen sheets at a time.
-pub(super) fn make(
-    studio: &Studio,
-    scene: &Scene,
-    pools: &Pools<'_>,
-    cells: &[(&Object, &CellBody)],
-) -> Result<Vec<Phantom>, Cause> {
-    let plans =
-        cells.iter().map(|(object, body)| Plan::new(studio, scene, object, body)).collect::<Result<Vec<_>, _>>()?;
-    let sheets = studio.watch.time(Stage::Sheets, || crumple(studio, scene, cells, &plans))?;
-    let finished = |(((object, body), plan), sheet): ((&(&Object, &CellBody), Plan), Option<Sheet>)| {
-        finish(studio, scene, pools, object, body, plan, sheet)
-    };
+pub(super) fn make(studio: &Studio, cells: &[Cell<'_>]) -> Result<Vec<Phantom>, Cause> {
+    let plans = cells.iter().map(Plan::new).collect::<Result<Vec<_>, _>>()?;
+    let sheets = studio.watch.time(Stage::Sheets, || crumple(studio, cells, &plans))?;
+    let finished = |((cell, plan), sheet): ((&Cell<'_>, Plan), Option<Sheet>)| finish(cell, plan, sheet);
     studio.watch.time(Stage::Cytoplasm, || cells.iter().zip(plans).zip(sheets).map(finished).collect())
 }
 
@@ -55,41 +68,34 @@ struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    fn new(studio: &'a Studio, scene: &Scene, object: &Object, body: &CellBody) -> Result<Self, Cause> {
+    fn new(cell: &Cell<'a>) -> Result<Self, Cause> {
+        let Cell { studio, scene, object, body, .. } = *cell;
         let class = studio.classes.get(&body.class).ok_or_else(|| Cause::ForeignClass(body.class.clone()))?;
         let centre = scene.sheet_grid().to_px(object.centre_um);
-        let outline = studio.watch.time(Stage::Outlines, || outline(class, scene, object, body, centre))?;
-        let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(studio, class, scene, object, body))?;
-        let creases = body.fold.map_or(Vec::new(), |fold| creases(fold, &outline, centre, body, scene));
+        let outline = studio.watch.time(Stage::Outlines, || outline(cell, class, centre))?;
+        let nucleus = studio.watch.time(Stage::Nuclei, || nucleus::make(cell, class))?;
+        let creases = body.fold.map_or(Vec::new(), |fold| creases(cell, fold, &outline, centre));
         Ok(Self { class, centre, outline, nucleus, creases })
     }
 }
 
 /// The outline of a cell before its rim is roughened.
-fn outline(
-    class: &ClassStudio,
-    scene: &Scene,
-    object: &Object,
-    body: &CellBody,
-    centre: Point,
-) -> Result<Vec<Point>, Cause> {
-    let mut rng = scene.stream("cell", object, "outline");
-    let radius_px = body.radius_um / scene.sheet_grid().pixel_um;
-    let drawn = class.cytoplasm.draw(radius_px, &mut rng)?;
-    let formed = form::posed(&drawn.descriptors, &class.class.cytoplasm.form, &mut rng);
-    let posed = formed.rotated(object.rotation_deg.to_radians());
+fn outline(cell: &Cell<'_>, class: &ClassStudio, centre: Point) -> Result<Vec<Point>, Cause> {
+    let mut rng = cell.stream("outline");
+    let radius_px = cell.body.radius_um / cell.pixel_um();
+    let formed = class.cytoplasm(radius_px, &mut rng)?;
+    let posed = formed.rotated(cell.object.rotation_deg.to_radians());
     let outline = posed.outline(POINTS);
     let middle = fsd_shape::centroid(&outline);
     let outline: Vec<Point> =
         outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
-    let own = &mut scene.stream("cell", object, "outline.corners");
-    Ok(outline::shaped(outline, &body.detail, own))
+    Ok(outline::shaped(outline, &cell.body.detail, &mut cell.stream("outline.corners")))
 }
 
 /// The lines along which a cell is folded, each with its side turned in.
-fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene: &Scene) -> Vec<Crease> {
+fn creases(cell: &Cell<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec<Crease> {
     let radius = (area(outline) / core::f64::consts::PI).sqrt();
-    let pixel_um = scene.sheet_grid().pixel_um;
+    let (body, pixel_um) = (cell.body, cell.pixel_um());
     let off_centre = body.nucleus.off_centre.map(|share| share * body.radius_um / pixel_um);
     let nucleus_radius = body.nucleus.radius_um / pixel_um;
     let crease = |direction: f64| {
@@ -125,35 +131,21 @@ fn creases(fold: Fold, outline: &[Point], centre: Point, body: &CellBody, scene:
     }
 }
 
-/// Presses the sheets of all cells.
-fn crumple(
-    studio: &Studio,
-    scene: &Scene,
-    cells: &[(&Object, &CellBody)],
-    plans: &[Plan],
-) -> Result<Vec<Option<Sheet>>, Cause> {
+fn crumple(studio: &Studio, cells: &[Cell<'_>], plans: &[Plan]) -> Result<Vec<Option<Sheet>>, Cause> {
     let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
-    let jobs =
-        cells.iter().zip(plans).map(|((_, body), plan)| Job { outline: &plan.outline, excess: body.detail.excess });
-    let mut streams: Vec<Stream> = cells.iter().map(|(object, _)| scene.stream("cell", object, "sheet")).collect();
+    let jobs = cells.iter().zip(plans);
+    let jobs = jobs.map(|(cell, plan)| Job { outline: &plan.outline, excess: cell.body.detail.excess });
+    let mut streams: Vec<Stream> = cells.iter().map(|cell| cell.stream("sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| Ok(Some(sheet?))).collect()
 }
 
 /// Presses, folds and stains a cell. Its absorbance is that of a dye along the light's path (Eq. 12): A = κ·c·l, where
 /// l is the sheet's thickness and κ·c the cell's stain.
-fn finish(
-    studio: &Studio,
-    scene: &Scene,
-    pools: &Pools<'_>,
-    object: &Object,
-    body: &CellBody,
-    plan: Plan,
-    sheet: Option<Sheet>,
-) -> Result<Phantom, Cause> {
-    let own = |purpose: &str| scene.stream("cell", object, purpose);
-    let mut rng = own("detail");
-    let pixel_um = scene.sheet_grid().pixel_um;
+fn finish(cell: &Cell<'_>, plan: Plan, sheet: Option<Sheet>) -> Result<Phantom, Cause> {
+    let Cell { scene, body, .. } = *cell;
+    let mut rng = cell.stream("detail");
+    let pixel_um = cell.pixel_um();
     let mut pieces = vec![plan.outline.clone()];
     for crease in &plan.creases {
         let folded = pieces.iter().map(|piece| crease_outline(piece, crease)).collect::<Result<Vec<_>, _>>();
@@ -185,13 +177,11 @@ fn finish(
     detail::slant(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.wedge);
     detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
-    wrinkles::add(&mut absorbance, &coverage, &plan.outline, &body.detail, pixel_um, &mut own("wrinkles"));
-    detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, body, pools, pixel_um, &mut own("endoplasm"));
-    detail::add_halo(&mut absorbance, nucleus, body, pixel_um, &mut own("halo"));
-    detail::add_detail(&mut absorbance, &coverage, body, pools, pixel_um, &mut rng);
-    if body.detail.cytoskeleton > 0.0 {
-        detail::add_cytoskeleton(studio, &mut absorbance, &plan.outline, body.detail.cytoskeleton, pixel_um, &mut rng)?;
-    }
+    wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell);
+    detail::add_endoplasm(&mut absorbance, &plan.outline, nucleus, cell);
+    detail::add_halo(&mut absorbance, nucleus, cell);
+    detail::add_detail(&mut absorbance, &coverage, cell, &mut rng);
+    detail::add_cytoskeleton(&mut absorbance, &plan.outline, cell, &mut rng)?;
     detail::add_granules(&mut absorbance, &coverage, body.detail.granules, pixel_um, &mut rng);
     // Eq. 12: A = κ·c·l.
     let strength = body.cytoplasm_absorbance.max(LEAST_ABSORBANCE) as f32;
@@ -200,16 +190,8 @@ fn finish(
     let area_px = coverage.sum() * (step * step) as f64;
     let absorbance = absorbance.refined(step);
     let phase_rad = body.phase_rad / body.cytoplasm_absorbance.max(LEAST_ABSORBANCE);
-    let cytoplasm = Piece {
-        part: Part::Cytoplasm,
-        absorbance,
-        coverage,
-        cover_step: step,
-        area_px,
-        imaged: false,
-        dyes: body.dyes,
-        phase_rad,
-    };
+    let whole = Piece::whole(absorbance, coverage, area_px, body.dyes);
+    let cytoplasm = Piece { part: Part::Cytoplasm, cover_step: step, phase_rad, ..whole };
     Ok(Phantom { pieces: vec![cytoplasm, plan.nucleus], traits: traits(body) })
 }
 

@@ -5,10 +5,10 @@ use core::ops::Range;
 use multiversion::multiversion;
 use portable_numerics::elementary::exp_f32;
 
-use super::super::tile::{Point, Tile};
+use super::Cell;
 use crate::key::Stream;
+use crate::phantom::tile::{Point, Tile};
 use crate::random;
-use crate::scene::cell::CellDetail;
 
 /// Distance of the points of a wrinkle, µm.
 const STEP_UM: f64 = 0.5;
@@ -24,18 +24,11 @@ const TAPER: f64 = 0.3;
 const SLOPE: f64 = 0.30;
 const SLOPE_WIDTH: f64 = 4.0;
 
-/// Adds a cell's wrinkles to its thickness.
-pub(super) fn add(
-    thickness: &mut Tile,
-    coverage: &Tile,
-    outline: &[Point],
-    detail: &CellDetail,
-    pixel_um: f64,
-    rng: &mut Stream,
-) {
+pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell: &Cell<'_>) {
+    let (detail, pixel_um, rng) = (&cell.body.detail, cell.pixel_um(), &mut cell.stream("wrinkles"));
     let step = STEP_UM / pixel_um;
-    let rim =
-        if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round(outline, step)) } else { Vec::new() };
+    let steps_round = || random::count(fsd_shape::perimeter(outline) / step).max(8);
+    let rim = if detail.wrinkles > 0 { fsd_shape::resample_along(outline, steps_round()) } else { Vec::new() };
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     let mut canvas = vec![0.0; thickness.values.len()];
     for _ in 0..detail.wrinkles {
@@ -64,11 +57,6 @@ pub(super) fn add(
 fn uneven(count: usize, rng: &mut Stream) -> Vec<f64> {
     let mut walk = Walk::new(0.45, rng);
     (0..count).map(|_| (0.9 + walk.next(rng)).clamp(0.0, 2.5)).collect()
-}
-
-/// How many steps it takes to go round.
-fn steps_round(outline: &[Point], step: f64) -> usize {
-    random::count(fsd_shape::perimeter(outline) / step).max(8)
 }
 
 /// A stretch of the rim, moved inwards. `fine` is the outline step by step.
@@ -259,7 +247,6 @@ impl Strip {
 
 /// The whole numbers between two others, of those below a count.
 fn whole(low: f64, high: f64, count: usize) -> Range<usize> {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to pixels of a tile")]
     let clamped = |value: f64| value.clamp(0.0, count as f64) as usize;
     clamped(low.ceil())..clamped(high.floor() + 1.0)
 }
