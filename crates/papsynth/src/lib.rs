@@ -23,6 +23,7 @@ pub mod slide;
 mod threads;
 mod transmit;
 pub mod truth;
+mod words;
 
 use portable_numerics::random;
 

@@ -4,65 +4,33 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// A stage of the way from recipe to files. Stages do not overlap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Which objects there are, and where.
-    Scene,
-    /// Outlines of cells.
-    Outlines,
-    /// Nuclei: outline, chromatin, membrane.
-    Nuclei,
-    /// Sheets pressed into outlines.
-    Sheets,
-    /// Sheets folded, drawn, wrinkled, stained; with the first of a field the fields that all look their texture up in.
-    Cytoplasm,
-    /// Everything that is no cell.
-    Debris,
-    /// Complete masks.
-    Masks,
-    /// What comes through the slide, imaged.
-    Light,
-    /// Light on the sensor, noise, grey levels.
-    Camera,
-    /// Fronts and layers, rows of the table.
-    Truth,
-    /// Files encoded and written.
-    Files,
-}
+use crate::words::words;
 
-impl Stage {
-    /// Every stage, in the order of the way.
-    pub const ALL: [Self; 11] = [
-        Self::Scene,
-        Self::Outlines,
-        Self::Nuclei,
-        Self::Sheets,
-        Self::Cytoplasm,
-        Self::Debris,
-        Self::Masks,
-        Self::Light,
-        Self::Camera,
-        Self::Truth,
-        Self::Files,
-    ];
-
-    /// Its name in a report.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Scene => "scene",
-            Self::Outlines => "outlines of cells",
-            Self::Nuclei => "nuclei",
-            Self::Sheets => "sheets pressed",
-            Self::Cytoplasm => "cytoplasm",
-            Self::Debris => "debris",
-            Self::Masks => "masks",
-            Self::Light => "light",
-            Self::Camera => "camera",
-            Self::Truth => "truth",
-            Self::Files => "files",
-        }
+words! {
+    /// A stage of the way from recipe to files. Stages do not overlap.
+    pub enum Stage {
+        /// Which objects there are, and where.
+        Scene = "scene",
+        /// Outlines of cells.
+        Outlines = "outlines of cells",
+        /// Nuclei: outline, chromatin, membrane.
+        Nuclei = "nuclei",
+        /// Sheets pressed into outlines.
+        Sheets = "sheets pressed",
+        /// Sheets folded, drawn, wrinkled, stained; with the first of a field the fields that all look their texture up in.
+        Cytoplasm = "cytoplasm",
+        /// Everything that is no cell.
+        Debris = "debris",
+        /// Complete masks.
+        Masks = "masks",
+        /// What comes through the slide, imaged.
+        Light = "light",
+        /// Light on the sensor, noise, grey levels.
+        Camera = "camera",
+        /// Fronts and layers, rows of the table.
+        Truth = "truth",
+        /// Files encoded and written.
+        Files = "files",
     }
 }
 
@@ -122,8 +90,7 @@ mod tests {
         assert_eq!(profile.time(Stage::Light, || 3), 3);
         profile.time(Stage::Light, || ());
         profile.time(Stage::Files, || ());
-        for (place, stage) in Stage::ALL.into_iter().enumerate() {
-            assert_eq!(stage as usize, place);
+        for stage in Stage::ALL {
             let wanted = match stage {
                 Stage::Light => 14,
                 Stage::Files => 7,

@@ -1,28 +1,18 @@
 //! Rod-shaped bacteria ("Bacilli"): short bent lines of even width with round ends, some in chains.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Clusters, Ground};
-use super::kind::{Kinds, Thing};
-use super::site::Site;
-use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
-use crate::phantom::tile::{Point, Tile};
-use crate::phantom::wobble::placed;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
-    pub struct Bacilli {
+    pub struct Bacilli, drawn from rng as pub Bacillus {
         /// Number of clusters; drawn once a field.
-        clusters: Count = Number::log_normal(4.0, 0.8), 0..=100000;
+        clusters: Count (undrawn) = Number::log_normal(4.0, 0.8), 0..=100000;
         /// Bacilli of a cluster.
-        per_cluster: Count = Number::log_normal(9.0, 0.9).at_least(1.0), 1..=10000;
+        per_cluster: Count (undrawn) = Number::log_normal(9.0, 0.9).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster.
-        cluster_um: Number = Number::uniform(5.0, 16.0), 0..=1000, "µm";
+        cluster_um: Number (undrawn) = Number::uniform(5.0, 16.0), 0..=1000, "µm";
         /// Share of the clusters that lie on a cell.
-        on_cells: Number = 0.85, 0..=1;
+        on_cells: Number (undrawn) = 0.85, 0..=1;
         /// Length of a bacillus.
         length_um: Number = Number::log_normal(2.6, 0.35), 0.3..=50, "µm";
         /// Width of a bacillus.
@@ -30,37 +20,19 @@ section! {
         /// Bend of a bacillus.
         bend_deg: Number = Number::uniform(0.0, 35.0), 0..=120, "degrees between its ends";
         /// Share of the bacilli that hang together in chains of two to four.
-        chained: Number = 0.12, 0..=1;
+        chained: Number (given usize as rods: "Number of rods in a chain.") = 0.12, 0..=1;
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.09, 0.35), 0..=4;
         /// How late light comes through a bacillus; seen by bright-field optics alone.
-        phase_rad: Number = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
+        phase_rad: Number (given f64 as phase_rad: "How late light comes through it, radians.") = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
     }
-}
-
-/// A rod-shaped bacterium or a chain of them, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bacillus {
-    /// Length of a rod, µm.
-    pub length_um: f64,
-    /// Width, µm.
-    pub width_um: f64,
-    /// Bend between its ends, degrees.
-    pub bend_deg: f64,
-    /// Number of rods in a chain.
-    pub rods: usize,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
 }
 
 /// Chains have this many rods at most.
 const LONGEST_CHAIN: usize = 4;
 
-impl Kinds<Bacillus> for Bacilli {
-    fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
+impl Bacilli {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Bacillus>) {
         let clusters = Clusters {
             purpose: "cluster",
             on_cells: &self.on_cells,
@@ -72,12 +44,9 @@ impl Kinds<Bacillus> for Bacilli {
             let mut own = ground.stream(number, "chain");
             let chained = random::chance(self.chained.draw(&mut own), &mut own);
             Bacillus {
-                length_um: self.length_um.draw(rng),
-                width_um: self.width_um.draw(rng),
-                bend_deg: self.bend_deg.draw(rng),
                 rods: if chained { 2 + random::below(LONGEST_CHAIN - 1, &mut own) } else { 1 },
-                absorbance: self.absorbance.draw(rng),
                 phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+                ..self.one(rng)
             }
         });
     }
@@ -92,12 +61,12 @@ const KINK: f64 = 0.35;
 /// Width of a chain between two rods, relative to the rods': there the wall has grown in.
 const WAIST: f64 = 0.7;
 
-impl Thing for Bacillus {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Bacillus {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.rods.max(1) as f64 * (1.2 * self.length_um + self.width_um)
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let half_width = 0.5 * site.px(self.width_um);
         let length = site.px((self.length_um - self.width_um).max(0.0));
         let bend = self.bend_deg.to_radians();

@@ -1,26 +1,14 @@
 //! Bare nuclei: nuclei of intermediate cells that have lost their cytoplasm but for faint shreds.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::{Painting, Stroke};
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::Point;
-use crate::phantom::wobble::wobbled_circle;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Bare nuclei: what bacteria leave of intermediate cells.
-    pub struct BareNuclei {
+    pub struct BareNuclei, drawn from rng as pub BareNucleus {
         /// Number of nuclei; drawn once a field.
-        count: Count = Number::log_normal(0.5, 0.9), 0..=100000;
+        count: Count (undrawn) = Number::log_normal(0.5, 0.9), 0..=100000;
         /// Share of the nuclei that lie on a cell.
-        on_cells: Number = 0.15, 0..=1;
+        on_cells: Number (undrawn) = 0.15, 0..=1;
         /// Radius of the disc of the same area.
         radius_um: Number = Number::normal(3.7, 0.35), 1..=20, "µm";
         /// Length relative to width.
@@ -31,38 +19,19 @@ section! {
         texture: Number = Number::uniform(0.08, 0.18), 0..=2;
         /// Absorbance of the shreds of cytoplasm round it.
         shreds: Number = Number::uniform(0.0, 0.06), 0..=4;
+    } also {
+        /// Dyes of the shreds where their absorbance is 1.
+        dyes: Amounts,
     }
 }
 
-/// A bare nucleus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BareNucleus {
-    /// Radius of the disc of the same area, µm.
-    pub radius_um: f64,
-    /// Length relative to width.
-    pub elongation: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// Contrast of its chromatin relative to the absorbance.
-    pub texture: f64,
-    /// Absorbance of the shreds of cytoplasm round it.
-    pub shreds: f64,
-    /// Dyes of the shreds where their absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<BareNucleus> for BareNuclei {
-    fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
+impl BareNuclei {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, BareNucleus>) {
         let dyes = ground.cyanophilic();
         let stain = ground.nuclear_stain();
-        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| BareNucleus {
-            radius_um: self.radius_um.draw(rng),
-            elongation: self.elongation.draw(rng),
-            absorbance: self.absorbance.draw(rng) * stain,
-            texture: self.texture.draw(rng),
-            shreds: self.shreds.draw(rng),
-            dyes,
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| {
+            let nucleus = self.one(rng);
+            BareNucleus { absorbance: nucleus.absorbance * stain, dyes, ..nucleus }
         });
     }
 }
@@ -77,12 +46,12 @@ const CLUMP_UM: f64 = 0.35;
 /// Shreds round a nucleus.
 const SHREDS: usize = 7;
 
-impl Thing for BareNucleus {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl BareNucleus {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.8 * self.elongation.max(1.0 / self.elongation).sqrt()).max(2.8) * self.radius_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let stretch = self.elongation.sqrt();
         let shape = wobbled_circle(self.radius_um, 0.04, 0.08, &mut rng);
@@ -94,13 +63,11 @@ impl Thing for BareNucleus {
         nucleus.coverage.cover(&outline);
         let mut inner = nucleus.coverage.blank();
         inner.cover(&scaled((1.0 - RIM_UM / self.radius_um).max(0.0)));
-        let values = nucleus.absorbance.values.iter_mut().zip(&nucleus.coverage.values).zip(&inner.values);
-        for ((value, cover), inner) in values {
-            *value = self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0));
-        }
+        nucleus
+            .layered(&inner.values, |cover, inner| self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0)));
         let look = Look::clouds(site.px(CLUMP_UM), &mut rng);
         nucleus.texture(site.pools.clouds(), &look, self.texture as f32);
-        let mut shreds = Painting { coverage: nucleus.coverage.blank(), absorbance: nucleus.coverage.blank() };
+        let mut shreds = nucleus.blank();
         for _ in 0..SHREDS {
             let (angle, reach) = (random::direction(&mut rng), self.radius_um * random::between(1.0, 1.8, &mut rng));
             let ends = [0.7 * self.radius_um, reach];

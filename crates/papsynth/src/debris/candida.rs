@@ -1,41 +1,28 @@
 //! *Candida*: pseudohyphae, long and septate with constrictions and branches, and budding yeasts.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Ground, Lie, cluster_id, member_number};
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::key::Stream;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
-use crate::truth::traits::Trait;
+use super::prelude::*;
 
 section! {
     /// *Candida*: colonies of pseudohyphae and budding yeasts.
-    pub struct Candidas {
+    pub struct Candidas, drawn from rng as pub Candida {
         /// Number of colonies; drawn once a field.
-        colonies: Count = Number::log_normal(0.08, 0.9), 0..=10000;
+        colonies: Count (undrawn) = Number::log_normal(0.08, 0.9), 0..=10000;
         /// Pseudohyphae of a colony.
-        hyphae: Count = Number::uniform(1.0, 5.0), 0..=1000;
+        hyphae: Count (given Growth as growth: "What it is.") = Number::uniform(1.0, 5.0), 0..=1000;
         /// Yeasts of a colony, most of them budding.
-        yeasts: Count = Number::log_normal(7.0, 0.7), 0..=10000;
+        yeasts: Count (undrawn) = Number::log_normal(7.0, 0.7), 0..=10000;
         /// Radius (standard deviation) of a colony.
-        colony_um: Number = Number::uniform(10.0, 25.0), 0..=1000, "µm";
+        colony_um: Number (undrawn) = Number::uniform(10.0, 25.0), 0..=1000, "µm";
         /// Share of the colonies that lie on a cell.
-        on_cells: Number = 0.7, 0..=1;
+        on_cells: Number (undrawn) = 0.7, 0..=1;
         /// Segments of a pseudohypha.
         segments: Count = Number::uniform(2.0, 6.0), 1..=30;
         /// Length of a segment.
         segment_um: Number = Number::log_normal(10.0, 0.25), 2..=50, "µm";
         /// Width of a pseudohypha.
-        width_um: Number = Number::normal(2.4, 0.2), 0.5..=10, "µm";
+        width_um: Number (given f64 as width_um: "Width or diameter, µm.") = Number::normal(2.4, 0.2), 0.5..=10, "µm";
         /// Diameter of a yeast.
-        yeast_um: Number = Number::normal(3.6, 0.35), 0.5..=20, "µm";
+        yeast_um: Number (given f64 as yeast_um: "Diameter of buds, µm.") = Number::normal(3.6, 0.35), 0.5..=20, "µm";
         /// Probability of a branch at each septum.
         branches: Number = 0.2, 0..=1;
         /// Probability of buds at each septum.
@@ -50,43 +37,18 @@ section! {
 }
 
 /// What a piece of *Candida* is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Growth {
     /// A pseudohypha with its branches and buds.
+    #[default]
     Hypha,
     /// A yeast with its bud, if it has one.
     Yeast,
 }
 
-/// A pseudohypha or a yeast, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Candida {
-    /// What it is.
-    pub growth: Growth,
-    /// Segments of a pseudohypha.
-    pub segments: usize,
-    /// Length of a segment, µm.
-    pub segment_um: f64,
-    /// Width of the pseudohypha, or diameter of the yeast, µm.
-    pub width_um: f64,
-    /// Diameter of buds, µm.
-    pub yeast_um: f64,
-    /// Probability of a branch at each septum.
-    pub branches: f64,
-    /// Probability of buds at each septum, or on the yeast.
-    pub buds: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-    /// Its dyes where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<Candida> for Candidas {
-    fn draw(&self, ground: &mut Ground<'_, Candida>) {
+impl Candidas {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Candida>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.colonies)) {
             let mut rng = ground.stream(index, "colony");
@@ -99,18 +61,8 @@ impl Kinds<Candida> for Candidas {
                 let growth = if member < hyphae { Growth::Hypha } else { Growth::Yeast };
                 let yeast_um = self.yeast_um.draw(&mut rng);
                 let width_um = self.width_um.draw(&mut rng);
-                let candida = Candida {
-                    growth,
-                    segments: self.segments.draw_count(&mut rng).max(1),
-                    segment_um: self.segment_um.draw(&mut rng),
-                    width_um: if growth == Growth::Hypha { width_um } else { yeast_um },
-                    yeast_um,
-                    branches: self.branches.draw(&mut rng),
-                    buds: self.buds.draw(&mut rng),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut rng),
-                    dyes,
-                };
+                let width_um = if growth == Growth::Hypha { width_um } else { yeast_um };
+                let candida = Candida { growth, width_um, yeast_um, dyes, ..self.one(&mut rng) };
                 let centre_um = colony.place(&mut rng);
                 let depth_um = colony.depth_um + 0.5 * random::normal(&mut rng);
                 let lie = Lie::any_way(centre_um, depth_um, &mut rng);
@@ -134,8 +86,8 @@ const OVAL: f64 = 1.3;
 const WALL_UM: f64 = 0.35;
 const INSIDE: f32 = 0.55;
 
-impl Thing for Candida {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Candida {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         match self.growth {
             // Half of its length, and a branch of two segments from an end of it that bends back.
             Growth::Hypha => (0.8 * self.segments as f64 + 3.0) * self.segment_um + 2.0 * self.yeast_um + self.width_um,
@@ -143,7 +95,7 @@ impl Thing for Candida {
         }
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let mut strokes = Vec::new();
         match self.growth {
@@ -178,14 +130,11 @@ impl Thing for Candida {
             }
         }
         // What lies within the wall is paler.
-        let inside = core::mem::replace(&mut painting.coverage.values, vec![0.0; painting.absorbance.values.len()]);
+        let inside = painting.lifted();
         for stroke in &placed {
             painting.stroke(stroke, 0.0);
         }
-        let values = painting.absorbance.values.iter_mut().zip(&painting.coverage.values).zip(&inside);
-        for ((value, cover), inner) in values {
-            *value = self.absorbance as f32 * (cover - (1.0 - INSIDE) * inner.min(*cover));
-        }
+        painting.layered(&inside, |cover, inner| self.absorbance as f32 * (cover - (1.0 - INSIDE) * inner.min(cover)));
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         phantom.traits.push(match self.growth {
             Growth::Hypha => Trait::Hypha,

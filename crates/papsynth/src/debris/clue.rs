@@ -3,24 +3,14 @@
 //! The coat is no object of its own: it follows the folds and tongues of its cell, lies at the cell's depth, and the
 //! cell's row in the truth has the trait `clue`.
 
-use serde::{Deserialize, Serialize};
-
-use super::paint::{Painting, Stroke};
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::Tile;
-use crate::random;
-use crate::recipe::number::Number;
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 use crate::scene::numbers::FieldNumbers;
-use crate::truth::traits::Trait;
 
 section! {
     /// Clue cells: cells covered with coccobacilli, and cells with patches of them.
-    pub struct ClueCells {
+    pub struct ClueCells, drawn from rng as pub Coat {
         /// Share of the cells that carry a coat; drawn once a field.
-        share: Number = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
+        share: Number (undrawn) = Number::log_normal(0.004, 1.3).at_most(0.8), 0..=1;
         /// Coccobacilli per µm² where a coat is dense.
         density: Number = Number::uniform(1.5, 4.5), 0..=10;
         /// Share of the cell that the dense patches of its coat cover.
@@ -34,22 +24,6 @@ section! {
     }
 }
 
-/// The coat of a clue cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Coat {
-    /// Coccobacilli per µm² where it is dense.
-    pub density: f64,
-    /// Share of the cell that dense patches cover.
-    pub cover: f64,
-    /// How far it reaches beyond the rim, µm.
-    pub beyond_um: f64,
-    /// Width of a coccobacillus, µm.
-    pub width_um: f64,
-    /// Absorbance of one.
-    pub absorbance: f64,
-}
-
 impl ClueCells {
     /// Gives cells, by their numbers, their coats.
     pub(crate) fn draw<'a>(&self, field: &FieldNumbers, cells: impl Iterator<Item = (u64, &'a mut Option<Coat>)>) {
@@ -59,13 +33,7 @@ impl ClueCells {
         }
         for (number, coat) in cells {
             let mut rng = field.key.stream("cell", number, "coat");
-            *coat = random::chance(share, &mut rng).then(|| Coat {
-                density: self.density.draw(&mut rng),
-                cover: self.cover.draw(&mut rng),
-                beyond_um: self.beyond_um.draw(&mut rng),
-                width_um: self.width_um.draw(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-            });
+            *coat = random::chance(share, &mut rng).then(|| self.one(&mut rng));
         }
     }
 }

@@ -1,31 +1,20 @@
 //! Cocci and coccobacilli: round bacteria in pairs, chains and clouds. A colony is one object.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::key::Stream;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Cocci and coccobacilli, colony by colony.
-    pub struct Cocci {
+    pub struct Cocci, drawn from rng as pub Colony {
         /// Number of colonies; drawn once a field.
-        colonies: Count = Number::log_normal(0.6, 1.1), 0..=100000;
+        colonies: Count (undrawn) = Number::log_normal(0.6, 1.1), 0..=100000;
         /// Cocci of a colony.
-        per_colony: Count = Number::log_normal(30.0, 0.9).at_least(2.0), 1..=20000;
+        per_colony: Count (Count as cocci: "Number of cocci.") = Number::log_normal(30.0, 0.9).at_least(2.0), 1..=20000;
         /// Radius (standard deviation) of a cloud.
         cloud_um: Number = Number::log_normal(3.5, 0.5), 0..=500, "µm";
         /// Share of the colonies that lie on a cell.
-        on_cells: Number = 0.6, 0..=1;
+        on_cells: Number (undrawn) = 0.6, 0..=1;
         /// Share of the colonies that are one chain.
-        chains: Number = 0.15, 0..=1;
+        chains: Number (Chance as chain: "Whether they hang together in one chain.") = 0.15, 0..=1;
         /// Diameter of a coccus.
         diameter_um: Number = Number::normal(0.8, 0.05), 0.1..=5, "µm";
         /// Length of a coccus relative to its diameter: above 1.3 it is a coccobacillus.
@@ -37,37 +26,9 @@ section! {
     }
 }
 
-/// A colony of cocci, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Colony {
-    /// Number of cocci.
-    pub cocci: usize,
-    /// Radius of the cloud, µm.
-    pub cloud_um: f64,
-    /// Whether they hang together in one chain.
-    pub chain: bool,
-    /// Diameter of a coccus, µm.
-    pub diameter_um: f64,
-    /// Its length relative to that.
-    pub elongation: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-}
-
-impl Kinds<Colony> for Cocci {
-    fn draw(&self, ground: &mut Ground<'_, Colony>) {
-        ground.strew_on_cells(named!(self.colonies), &self.on_cells, |rng| Colony {
-            cocci: self.per_colony.draw_count(rng).max(1),
-            cloud_um: self.cloud_um.draw(rng),
-            chain: random::chance(self.chains.draw(rng), rng),
-            diameter_um: self.diameter_um.draw(rng),
-            elongation: self.elongation.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-        });
+impl Cocci {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Colony>) {
+        ground.strew_on_cells(named!(self.colonies), &self.on_cells, |rng| self.one(rng));
     }
 }
 
@@ -84,8 +45,8 @@ const KINK: f64 = 0.45;
 /// How far from the middle of a normal cloud a coccus may lie, in standard deviations.
 const FARTHEST: f64 = 4.0;
 
-impl Thing for Colony {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Colony {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         if self.chain {
             0.8 * self.cocci.min(LONGEST_CHAIN) as f64 * self.diameter_um * self.elongation + self.diameter_um
         } else {
@@ -93,7 +54,7 @@ impl Thing for Colony {
         }
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let places = if self.chain { self.chain(&mut rng) } else { self.cloud(&mut rng) };
         let places: Vec<(Point, f64)> = places.iter().map(|(at, way)| (site.place(*at), *way)).collect();

@@ -1,35 +1,24 @@
 //! The faint dirt of the background: flecks of a micrometre or two, many of them, hardly darker than empty slide.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Ground, Lie, cluster_id, member_number};
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Faint flecks of background dirt, in drifts that the fluid has laid down side by side.
     ///
     /// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
-    pub struct Dirt {
+    pub struct Dirt, drawn from rng as pub Fleck {
         /// Number of drifts; drawn once a field.
-        drifts: Count = Number::log_normal(20.0, 0.7), 0..=100000;
+        drifts: Count (undrawn) = Number::log_normal(20.0, 0.7), 0..=100000;
         /// Flecks of a drift.
-        per_drift: Count = Number::log_normal(4.0, 0.8).at_least(1.0), 1..=10000;
+        per_drift: Count (undrawn) = Number::log_normal(4.0, 0.8).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a drift.
-        drift_um: Number = Number::log_normal(22.0, 0.6), 0..=1000, "µm";
+        drift_um: Number (undrawn) = Number::log_normal(22.0, 0.6), 0..=1000, "µm";
         /// Length of a fleck.
         length_um: Number = Number::log_normal(2.1, 0.5), 0.1..=20, "µm";
         /// Width of a fleck.
         width_um: Number = Number::log_normal(1.1, 0.35), 0.1..=10, "µm";
         /// Share of the flecks that lie in the direction of their drift.
-        aligned: Number = 0.6, 0..=1;
+        aligned: Number (undrawn) = 0.6, 0..=1;
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.028, 0.5).at_least(0.01).at_most(0.15), 0..=4;
         /// How late light comes through a fleck; seen by bright-field optics alone.
@@ -37,22 +26,6 @@ section! {
         /// Their dyes.
         dyes: DyeAmounts = DyeAmounts { light_green: 1.0, haematein: 0.35, eosin_y: 0.6, orange_g: 0.3, neutral: 0.2 };
     }
-}
-
-/// A fleck of dirt, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fleck {
-    /// Length, µm.
-    pub length_um: f64,
-    /// Width, µm.
-    pub width_um: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-    /// Its dyes where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
 }
 
 /// Most strokes that a fleck is made of, and the spread of the angles between them, radians.
@@ -65,8 +38,8 @@ const SCATTER_UM: f64 = 1.2;
 /// Spread of the directions of flecks that lie as their drift does, degrees.
 const ASTRAY_DEG: f64 = 14.0;
 
-impl Kinds<Fleck> for Dirt {
-    fn draw(&self, ground: &mut Ground<'_, Fleck>) {
+impl Dirt {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Fleck>) {
         let dyes = ground.dyes(&self.dyes);
         for index in 0..ground.count(named!(self.drifts)) {
             let mut rng = ground.stream(index, "drift");
@@ -76,14 +49,8 @@ impl Kinds<Fleck> for Dirt {
                 let number = member_number(index, member);
                 let mut rng = ground.stream(number, "body");
                 let centre_um = drift.place(&mut rng);
-                let length_um = self.length_um.draw(&mut rng);
-                let fleck = Fleck {
-                    length_um,
-                    width_um: self.width_um.draw(&mut rng).min(length_um),
-                    absorbance: self.absorbance.draw(&mut rng),
-                    phase_rad: self.phase_rad.draw(&mut rng),
-                    dyes,
-                };
+                let fleck = self.one(&mut rng);
+                let fleck = Fleck { width_um: fleck.width_um.min(fleck.length_um), dyes, ..fleck };
                 let depth_um = drift.depth_um + SCATTER_UM * random::normal(&mut rng);
                 let mut lie = Lie::any_way(centre_um, depth_um, &mut rng);
                 if random::chance(self.aligned.draw(&mut rng), &mut rng) {
@@ -95,12 +62,12 @@ impl Kinds<Fleck> for Dirt {
     }
 }
 
-impl Thing for Fleck {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Fleck {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         self.length_um + self.width_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         // A crumb: a few strokes one after the other, each with its own width and heading.
         let count = 2 + random::below(MOST_STROKES - 1, &mut rng);
@@ -117,9 +84,7 @@ impl Thing for Fleck {
             let [(from, first), (to, last)] = [pair[0], pair[1]];
             painting.stroke(&Stroke { ends: [from, to], half_widths: [first, last] }, 0.0);
         }
-        for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
-            *value = self.absorbance as f32 * cover;
-        }
+        painting.even(self.absorbance);
         painting.finish(self.dyes, self.phase_rad, self.absorbance)
     }
 }

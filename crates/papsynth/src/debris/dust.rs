@@ -1,55 +1,35 @@
 //! Dust on the glass, so far from the cells that only its shade is seen.
 
-use serde::{Deserialize, Serialize};
-
 use super::crystal::shard;
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Dust on the cover glass or within the mountant.
-    pub struct Dust {
+    pub struct Dust, drawn from rng as pub Grain {
         /// Number of grains; drawn once a field.
-        count: Count = Number::log_normal(0.12, 0.9), 0..=100000;
+        count: Count (undrawn) = Number::log_normal(0.12, 0.9), 0..=100000;
         /// Diameter.
         diameter_um: Number = Number::log_normal(14.0, 0.5), 0.5..=200, "µm";
         /// How far above the cells it lies: 170 is the outside of a cover glass, less lies within the mountant.
-        height_um: Number = Number::choice([20.0, 35.0, 60.0, 170.0]), -1000..=1000, "µm";
+        height_um: Number (undrawn) = Number::choice([20.0, 35.0, 60.0, 170.0]), -1000..=1000, "µm";
         /// Absorbance.
         absorbance: Number = Number::uniform(0.1, 0.7), 0..=4;
     }
 }
 
-/// A grain of dust, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Grain {
-    /// Diameter, µm.
-    pub diameter_um: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-}
-
-impl Kinds<Grain> for Dust {
-    fn draw(&self, ground: &mut Ground<'_, Grain>) {
-        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Grain {
-            diameter_um: self.diameter_um.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-        });
+impl Dust {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Grain>) {
+        let height = |rng: &mut Stream| self.height_um.draw(rng);
+        ground.strew_anywhere(named!(self.count), |_, _, rng| self.one(rng), height);
     }
 }
 
-impl Thing for Grain {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Grain {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.65 * self.diameter_um + 1.0
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let outline = site.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
         let mut painting = site.painting(&outline, 0.0);

@@ -1,22 +1,12 @@
 //! Fibres of cotton and cloth: long, of even width, sharply bounded, with refracting edges.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Fibres of cotton and cloth, in the mountant or on the glass.
-    pub struct Fibres {
+    pub struct Fibres, drawn from rng as pub Fibre {
         /// Number of fibres; drawn once a field.
-        count: Count = Number::log_normal(0.1, 0.8), 0..=10000;
+        count: Count (undrawn) = Number::log_normal(0.1, 0.8), 0..=10000;
         /// Length.
         length_um: Number = Number::uniform(60.0, 200.0), 5..=500, "µm";
         /// Width.
@@ -24,7 +14,7 @@ section! {
         /// How wavy it is: 0 is straight.
         waves: Number = Number::uniform(0.0, 0.8), 0..=2;
         /// How far above the cells it lies: 170 is the outside of a cover glass, less lies within the mountant.
-        height_um: Number = Number::choice([0.0, 8.0, 30.0, 170.0]), -1000..=1000, "µm";
+        height_um: Number (undrawn) = Number::choice([0.0, 8.0, 30.0, 170.0]), -1000..=1000, "µm";
         /// Absorbance.
         absorbance: Number = Number::uniform(0.03, 0.2), 0..=4;
         /// How late light comes through its middle; seen by bright-field optics alone.
@@ -32,31 +22,10 @@ section! {
     }
 }
 
-/// A fibre, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Fibre {
-    /// Length, µm.
-    pub length_um: f64,
-    /// Width, µm.
-    pub width_um: f64,
-    /// How wavy it is.
-    pub waves: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through its middle, radians.
-    pub phase_rad: f64,
-}
-
-impl Kinds<Fibre> for Fibres {
-    fn draw(&self, ground: &mut Ground<'_, Fibre>) {
-        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Fibre {
-            length_um: self.length_um.draw(rng),
-            width_um: self.width_um.draw(rng),
-            waves: self.waves.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-        });
+impl Fibres {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Fibre>) {
+        let height = |rng: &mut Stream| self.height_um.draw(rng);
+        ground.strew_anywhere(named!(self.count), |_, _, rng| self.one(rng), height);
     }
 }
 
@@ -72,12 +41,12 @@ const EDGE: f32 = 2.5;
 /// Width of an edge relative to the fibre's.
 const EDGE_WIDTH: f64 = 0.12;
 
-impl Thing for Fibre {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Fibre {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.7 * self.length_um + self.width_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let step = self.length_um / PARTS as f64;
         let (phase, turns) = (random::direction(&mut rng), random::between(0.5, 2.0, &mut rng));
@@ -95,14 +64,11 @@ impl Thing for Fibre {
         for part in spine.windows(2) {
             painting.stroke(&Stroke::even(part[0], part[1], half_width * (1.0 - 2.0 * EDGE_WIDTH)), 0.0);
         }
-        let inside = core::mem::replace(&mut painting.coverage.values, vec![0.0; painting.absorbance.values.len()]);
+        let inside = painting.lifted();
         for part in spine.windows(2) {
             painting.stroke(&Stroke::even(part[0], part[1], half_width), 0.0);
         }
-        let values = painting.absorbance.values.iter_mut().zip(&painting.coverage.values).zip(&inside);
-        for ((value, cover), inner) in values {
-            *value = self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0));
-        }
+        painting.layered(&inside, |cover, inner| self.absorbance as f32 * (inner + EDGE * (cover - inner).max(0.0)));
         painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

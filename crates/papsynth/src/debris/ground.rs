@@ -153,18 +153,18 @@ impl<'a, T> Ground<'a, T> {
         }
     }
 
-    /// Strews objects that lie anywhere, each at a height of its own. `draw` draws one from its stream.
-    pub(super) fn strew_on_glass(
+    /// Strews objects that lie anywhere. `draw` draws one, by its number, from its stream, and `depth_um` its depth.
+    pub(super) fn strew_anywhere(
         &mut self,
         count: (&str, &Number),
-        height_um: &Number,
-        draw: impl Fn(&mut Stream) -> T,
+        draw: impl Fn(&Self, u64, &mut Stream) -> T,
+        depth_um: impl Fn(&mut Stream) -> f64,
     ) {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
             let centre_um = self.anywhere(&mut rng);
-            let thing = draw(&mut rng);
-            let lie = Lie::any_way(centre_um, height_um.draw(&mut rng), &mut rng);
+            let thing = draw(self, number, &mut rng);
+            let lie = Lie::any_way(centre_um, depth_um(&mut rng), &mut rng);
             self.add(number, 0, lie, thing);
         }
     }

@@ -3,16 +3,7 @@
 mod neutrophil;
 mod round;
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Cluster, Ground, Lie, cluster_id, member_number, near};
-use super::kind::{Kinds, Thing};
-use super::site::Site;
-use crate::key::Stream;
-use crate::phantom::piece::Phantom;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// How the nucleus of a leukocyte is shaped.
@@ -84,8 +75,8 @@ pub struct Leukocyte {
     pub dyes: dye_spectra::Amounts,
 }
 
-impl Kinds<Leukocyte> for Leukocytes {
-    fn draw(&self, ground: &mut Ground<'_, Leukocyte>) {
+impl Leukocytes {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Leukocyte>) {
         let dyes = ground.cyanophilic();
         for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "cluster");
@@ -182,12 +173,12 @@ impl Cluster {
     }
 }
 
-impl Thing for Leukocyte {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Leukocyte {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         (1.3 * self.cell_um).max((2.0 + 2.0 * self.alpha) * self.radius_um)
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         match self.form {
             NucleusForm::Round => round::make(self, site),
             NucleusForm::Lobed => neutrophil::make(self, site),

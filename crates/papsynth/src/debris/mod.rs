@@ -1,7 +1,8 @@
 //! Everything that is no epithelial cell ("Debris Object Generation").
 //!
-//! A kind of object is one file: its section of the recipe with what is accepted there, the numbers that are drawn of
-//! one object, where objects lie, and the phantom of one. The list below makes of the files the recipe's `[debris]`, the
+//! A kind of object is one file: its section of the recipe with what is accepted there, and which of its numbers are drawn
+//! of one object; `draw` strews the objects of a field, `reach_um` says how far one may reach from its middle where pixels
+//! have a size, `phantom` what it absorbs where it lies. The list below makes of the files the recipe's `[debris]`, the
 //! scene's bodies and the truth's classes. Adding a kind means adding its file and its entry.
 
 mod bacillus;
@@ -15,7 +16,6 @@ mod dirt;
 mod dust;
 mod fibre;
 pub(crate) mod ground;
-mod kind;
 mod leukocyte;
 mod mucus;
 mod out_of_focus;
@@ -32,6 +32,7 @@ use serde::{Deserialize, Serialize};
 use crate::phantom::piece::Phantom;
 use crate::recipe::section::section;
 use crate::scene::cell::CellBody;
+use crate::words::words;
 
 pub use bacillus::{Bacilli, Bacillus};
 pub use bare_nucleus::{BareNuclei, BareNucleus};
@@ -54,8 +55,28 @@ pub use speckle::{SpeckForm, Speckle, Speckles};
 pub use trichomonad::{Trichomonad, Trichomonads};
 
 use ground::{Field, Ground, Strewn};
-use kind::{Kinds, Thing};
 pub(crate) use site::Site;
+
+/// What the files of the kinds are written with.
+mod prelude {
+    pub(super) use dye_spectra::Amounts;
+    pub(super) use rand_core::Rng;
+    pub(super) use serde::{Deserialize, Serialize};
+
+    pub(super) use super::ground::{Cluster, Clusters, Ground, Lie, cluster_id, member_number, near};
+    pub(super) use super::paint::{Painting, Stroke};
+    pub(super) use super::site::Site;
+    pub(super) use crate::key::Stream;
+    pub(super) use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
+    pub(super) use crate::phantom::pools::Look;
+    pub(super) use crate::phantom::tile::{Point, Tile, area};
+    pub(super) use crate::phantom::wobble::{placed, smooth, textured, wobbled_circle};
+    pub(super) use crate::random;
+    pub(super) use crate::recipe::dyes::DyeAmounts;
+    pub(super) use crate::recipe::number::{Count, Number};
+    pub(super) use crate::recipe::section::{named, section};
+    pub(super) use crate::truth::traits::Trait;
+}
 
 macro_rules! kinds {
     ($($(#[$doc:meta])* $field:ident: $Section:ident { $count:ident } => $Kind:ident($Thing:ident), $name:literal;)*) => {
@@ -68,13 +89,16 @@ macro_rules! kinds {
             }
         }
 
-        /// What kind of thing an object is.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-        #[serde(rename_all = "kebab-case")]
-        pub enum Kind {
-            /// Epithelial cells: cytoplasm and nucleus.
-            Cell,
-            $($(#[$doc])* $Kind,)*
+        words! {
+            /// What kind of thing an object is, in the order in which objects are numbered. The name of a kind is also the class of
+            /// what has no class of its own.
+            #[derive(PartialOrd, Ord, Hash, Serialize, Deserialize)]
+            #[serde(rename_all = "kebab-case")]
+            pub enum Kind {
+                /// Epithelial cells: cytoplasm and nucleus.
+                Cell = "cell",
+                $($(#[$doc])* $Kind = $name,)*
+            }
         }
 
         /// What an object is, its numbers drawn.
@@ -84,20 +108,6 @@ macro_rules! kinds {
             /// An epithelial cell.
             Cell(Box<CellBody>),
             $($(#[$doc])* $Kind($Thing),)*
-        }
-
-        impl Kind {
-            /// All kinds, in the order in which their objects are numbered.
-            pub const ALL: [Self; 1 + [$($name),*].len()] = [Self::Cell, $(Self::$Kind),*];
-
-            /// The name of the kind, which is also the class of what has no class of its own.
-            #[must_use]
-            pub fn name(self) -> &'static str {
-                match self {
-                    Self::Cell => "cell",
-                    $(Self::$Kind => $name,)*
-                }
-            }
         }
 
         impl Kind {

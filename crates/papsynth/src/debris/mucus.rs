@@ -1,26 +1,14 @@
 //! Strands of mucus: long bundles of faint parallel fibres.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Strands of mucus, bundles of faint fibres.
-    pub struct Mucus {
+    pub struct Mucus, drawn from rng as pub Strand {
         /// Number of strands; drawn once a field.
-        strands: Count = Number::log_normal(0.3, 0.8), 0..=10000;
+        strands: Count (undrawn) = Number::log_normal(0.3, 0.8), 0..=10000;
         /// Share of the strands that lie on a cell.
-        on_cells: Number = 0.3, 0..=1;
+        on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Length of a strand.
         length_um: Number = Number::log_normal(40.0, 0.45).at_least(10.0).at_most(150.0), 5..=400, "µm";
         /// Width of a strand.
@@ -38,38 +26,10 @@ section! {
     }
 }
 
-/// A strand of mucus, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Strand {
-    /// Length, µm.
-    pub length_um: f64,
-    /// Width, µm.
-    pub width_um: f64,
-    /// Fibres across it.
-    pub fibres: usize,
-    /// Width of a fibre, µm.
-    pub fibre_um: f64,
-    /// Absorbance of a fibre.
-    pub absorbance: f64,
-    /// How late light comes through a fibre, radians.
-    pub phase_rad: f64,
-    /// Its dyes where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<Strand> for Mucus {
-    fn draw(&self, ground: &mut Ground<'_, Strand>) {
+impl Mucus {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Strand>) {
         let dyes = ground.dyes(&self.dyes);
-        ground.strew_on_cells(named!(self.strands), &self.on_cells, |rng| Strand {
-            length_um: self.length_um.draw(rng),
-            width_um: self.width_um.draw(rng),
-            fibres: self.fibres.draw_count(rng).max(1),
-            fibre_um: self.fibre_um.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-            dyes,
-        });
+        ground.strew_on_cells(named!(self.strands), &self.on_cells, |rng| Strand { dyes, ..self.one(rng) });
     }
 }
 
@@ -90,12 +50,12 @@ const TAPER: f64 = 0.3;
 /// Narrowest place of a strand relative to its width: where it was drawn out.
 const NECK: f64 = 0.35;
 
-impl Thing for Strand {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Strand {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.8 * self.length_um + self.width_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let step = self.length_um / PARTS as f64;
         let (mut at, mut way, mut bend) = ([0.0, 0.0], 0.0, 0.0);

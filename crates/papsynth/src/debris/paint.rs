@@ -53,6 +53,38 @@ impl Painting {
         Self { absorbance: coverage.blank(), coverage }
     }
 
+    /// An empty painting of the same place.
+    pub(super) fn blank(&self) -> Self {
+        Self { coverage: self.coverage.blank(), absorbance: self.coverage.blank() }
+    }
+
+    /// Takes what it covers away, to be covered anew.
+    pub(super) fn lifted(&mut self) -> Vec<f32> {
+        let blank = vec![0.0; self.coverage.values.len()];
+        core::mem::replace(&mut self.coverage.values, blank)
+    }
+
+    /// Absorbs so much wherever it covers something.
+    pub(super) fn even(&mut self, absorbance: f64) {
+        self.shade(|_| absorbance);
+    }
+
+    /// Absorbs as much as a function of the place says, wherever it covers something.
+    pub(super) fn shade(&mut self, absorbance: impl Fn(Point) -> f64) {
+        let mut covers = self.coverage.values.iter();
+        self.absorbance.for_each(|p, value| {
+            if let Some(cover) = covers.next().filter(|cover| **cover > 0.0) {
+                *value = cover * absorbance(p) as f32;
+            }
+        });
+    }
+
+    /// Absorbs as much as the share that it covers of a pixel, and that of something within it, say.
+    pub(super) fn layered(&mut self, inside: &[f32], absorbance: impl Fn(f32, f32) -> f32) {
+        let values = self.absorbance.values.iter_mut().zip(&self.coverage.values).zip(inside);
+        values.for_each(|((value, cover), inner)| *value = absorbance(*cover, *inner));
+    }
+
     /// Adds a stroke that absorbs so much where it covers a pixel, on top of what is there.
     pub(super) fn stroke(&mut self, stroke: &Stroke, absorbance: f64) {
         self.blend(stroke, |value, share| *value += share * absorbance as f32);

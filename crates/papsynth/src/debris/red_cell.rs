@@ -1,36 +1,24 @@
 //! Red blood cells: discs with a pale middle, and the ghosts that are left of them.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Clusters, Ground};
-use super::kind::{Kinds, Thing};
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::phantom::wobble::wobbled_circle;
-use crate::random;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
-use crate::truth::traits::Trait;
+use super::prelude::*;
 
 section! {
     /// Red blood cells, in clusters.
-    pub struct RedCells {
+    pub struct RedCells, drawn from rng as pub RedCell {
         /// Number of clusters; drawn once a field.
-        clusters: Count = Number::log_normal(0.22, 0.9), 0..=100000;
+        clusters: Count (undrawn) = Number::log_normal(0.22, 0.9), 0..=100000;
         /// Red cells of a cluster.
-        per_cluster: Count = Number::log_normal(4.0, 0.9).at_least(1.0), 1..=10000;
+        per_cluster: Count (undrawn) = Number::log_normal(4.0, 0.9).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster.
-        cluster_um: Number = Number::uniform(8.0, 25.0), 0..=1000, "µm";
+        cluster_um: Number (undrawn) = Number::uniform(8.0, 25.0), 0..=1000, "µm";
         /// Share of the clusters that lie on a cell.
-        on_cells: Number = 0.3, 0..=1;
+        on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Diameter.
         diameter_um: Number = Number::normal(7.0, 0.35), 1..=30, "µm";
         /// Absorbance of the middle relative to the rim.
         pallor: Number = Number::uniform(0.3, 0.6), 0..=1;
         /// Probability that it is a ghost that has lost its haemoglobin.
-        ghosts: Number = 0.3, 0..=1;
+        ghosts: Number (Chance as ghost: "Whether it has lost its haemoglobin.") = 0.3, 0..=1;
         /// Absorbance: haemoglobin in a disc of 2 µm absorbs 0.1 at 0.57 µm.
         absorbance: Number = Number::normal(0.10, 0.015), 0..=4;
         /// How late light comes through it; seen by bright-field optics alone.
@@ -40,26 +28,8 @@ section! {
     }
 }
 
-/// A red blood cell, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RedCell {
-    /// Diameter, µm.
-    pub diameter_um: f64,
-    /// Absorbance of the middle relative to the rim.
-    pub pallor: f64,
-    /// Whether it has lost its haemoglobin.
-    pub ghost: bool,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-    /// Its dyes where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<RedCell> for RedCells {
-    fn draw(&self, ground: &mut Ground<'_, RedCell>) {
+impl RedCells {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, RedCell>) {
         let dyes = ground.dyes(&self.dyes);
         let clusters = Clusters {
             purpose: "cluster",
@@ -68,14 +38,7 @@ impl Kinds<RedCell> for RedCells {
             members: &self.per_cluster,
             spread_um: 0.5,
         };
-        ground.strew_in_clusters(named!(self.clusters), &clusters, |_, _, rng| RedCell {
-            diameter_um: self.diameter_um.draw(rng),
-            pallor: self.pallor.draw(rng),
-            ghost: random::chance(self.ghosts.draw(rng), rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-            dyes,
-        });
+        ground.strew_in_clusters(named!(self.clusters), &clusters, |_, _, rng| RedCell { dyes, ..self.one(rng) });
     }
 }
 
@@ -86,12 +49,12 @@ const SEAM: f64 = 0.18;
 /// Where a disc is thickest, relative to its radius.
 const THICKEST: f64 = 0.68;
 
-impl Thing for RedCell {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl RedCell {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.diameter_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius_um = 0.5 * self.diameter_um;
         let squeeze = random::between(0.88, 1.0, &mut rng);
@@ -100,9 +63,7 @@ impl Thing for RedCell {
         let mut painting = site.painting(&outline, 0.0);
         painting.coverage.cover(&outline);
         let radius = site.px(radius_um);
-        let cover = &painting.coverage.values;
-        let mut index = 0;
-        painting.absorbance.for_each(|p, value| {
+        painting.shade(|p| {
             let (dx, dy) = (p[0] - site.centre[0], p[1] - site.centre[1]);
             let r = (dx * dx + dy * dy).sqrt() / radius;
             let thickness = if self.ghost {
@@ -113,8 +74,7 @@ impl Thing for RedCell {
                 let ring = (r / THICKEST).min(1.0);
                 self.pallor + (1.0 - self.pallor) * ring * ring * (3.0 - 2.0 * ring)
             };
-            *value = cover[index] * (self.absorbance * thickness) as f32;
-            index += 1;
+            self.absorbance * thickness
         });
         let mut phantom = painting.finish(self.dyes, self.phase_rad, self.absorbance);
         if self.ghost {

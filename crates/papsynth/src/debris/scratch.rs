@@ -1,29 +1,19 @@
 //! Scratches in the glass: long, thin, straight and interrupted lines.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::Stroke;
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::Point;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Scratches in the slide or in the cover glass.
-    pub struct Scratches {
+    pub struct Scratches, drawn from rng as pub Scratch {
         /// Number of scratches; drawn once a field.
-        count: Count = Number::log_normal(0.12, 0.8), 0..=10000;
+        count: Count (undrawn) = Number::log_normal(0.12, 0.8), 0..=10000;
         /// Length.
         length_um: Number = Number::uniform(20.0, 120.0), 5..=500, "µm";
         /// Width.
         width_um: Number = Number::log_normal(0.7, 0.4), 0.1..=20, "µm";
         /// How far above the cells it lies: a little below 0 is the slide's inner face, 170 the outside of a cover
         /// glass, where only wide ones are seen.
-        height_um: Number = Number::choice([-3.0, 170.0, 170.0]), -1000..=1000, "µm";
+        height_um: Number (undrawn) = Number::choice([-3.0, 170.0, 170.0]), -1000..=1000, "µm";
         /// Absorbance.
         absorbance: Number = Number::uniform(0.02, 0.08), 0..=4;
         /// How late light comes through it; seen by bright-field optics alone.
@@ -31,28 +21,10 @@ section! {
     }
 }
 
-/// A scratch, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Scratch {
-    /// Length, µm.
-    pub length_um: f64,
-    /// Width, µm.
-    pub width_um: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-}
-
-impl Kinds<Scratch> for Scratches {
-    fn draw(&self, ground: &mut Ground<'_, Scratch>) {
-        ground.strew_on_glass(named!(self.count), &self.height_um, |rng| Scratch {
-            length_um: self.length_um.draw(rng),
-            width_um: self.width_um.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-        });
+impl Scratches {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Scratch>) {
+        let height = |rng: &mut Stream| self.height_um.draw(rng);
+        ground.strew_anywhere(named!(self.count), |_, _, rng| self.one(rng), height);
     }
 }
 
@@ -62,12 +34,12 @@ const PARTS: usize = 24;
 /// Share of the parts where the point skipped.
 const SKIPPED: f64 = 0.15;
 
-impl Thing for Scratch {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Scratch {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.6 * self.length_um + self.width_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let step = self.length_um / PARTS as f64;
         let bow = 0.1 * random::normal(&mut rng) / self.length_um;
@@ -86,9 +58,7 @@ impl Thing for Scratch {
                 painting.stroke(&stroke, 0.0);
             }
         }
-        for (value, cover) in painting.absorbance.values.iter_mut().zip(&painting.coverage.values) {
-            *value = self.absorbance as f32 * cover;
-        }
+        painting.even(self.absorbance);
         painting.finish(site.dyes.speckle, self.phase_rad, self.absorbance)
     }
 }

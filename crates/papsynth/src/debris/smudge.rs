@@ -1,25 +1,14 @@
 //! Amorphous debris: greyish, granular, irregular clumps and shreds, frayed at their rims.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::Ground;
-use super::kind::{Kinds, Thing};
-use super::paint::Painting;
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::Point;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
-    pub struct Smudges {
+    pub struct Smudges, drawn from rng as pub Smudge {
         /// Number of clumps; drawn once a field.
-        count: Count = Number::log_normal(9.0, 0.8), 0..=100000;
+        count: Count (undrawn) = Number::log_normal(9.0, 0.8), 0..=100000;
         /// Share of the clumps that lie on a cell.
-        on_cells: Number = 0.25, 0..=1;
+        on_cells: Number (undrawn) = 0.25, 0..=1;
         /// Diameter of a clump.
         diameter_um: Number = Number::log_normal(6.0, 0.65).at_least(2.0).at_most(45.0), 1..=200, "µm";
         /// Length of a clump relative to its width.
@@ -39,41 +28,10 @@ section! {
     }
 }
 
-/// A clump of amorphous debris, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Smudge {
-    /// Diameter of the disc of its area before it is frayed, µm.
-    pub diameter_um: f64,
-    /// Length relative to width.
-    pub elongation: f64,
-    /// Size of its grains, µm.
-    pub grain_um: f64,
-    /// How much the grains differ, relative to the absorbance.
-    pub granularity: f64,
-    /// How ragged its outline is.
-    pub ragged: f64,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-    /// Its dyes where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<Smudge> for Smudges {
-    fn draw(&self, ground: &mut Ground<'_, Smudge>) {
+impl Smudges {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Smudge>) {
         let dyes = ground.dyes(&self.dyes);
-        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Smudge {
-            diameter_um: self.diameter_um.draw(rng),
-            elongation: self.elongation.draw(rng),
-            grain_um: self.grain_um.draw(rng),
-            granularity: self.granularity.draw(rng),
-            ragged: self.ragged.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            phase_rad: self.phase_rad.draw(rng),
-            dyes,
-        });
+        ground.strew_on_cells(named!(self.count), &self.on_cells, |rng| Smudge { dyes, ..self.one(rng) });
     }
 }
 
@@ -86,12 +44,12 @@ const WAVES: [(f64, f64); 2] = [(0.42, 0.42), (0.16, 0.22)];
 /// Width over which the outline fades, relative to the radius: a clump is thinner at its rim.
 const FADE: f64 = 0.35;
 
-impl Thing for Smudge {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Smudge {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         0.5 * self.diameter_um * self.elongation.sqrt() * (1.0 + (REACH - 1.0) * self.ragged.min(1.5))
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let radius_um = 0.5 * self.diameter_um;
         let stretch = self.elongation.sqrt();

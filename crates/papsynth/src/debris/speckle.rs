@@ -1,15 +1,6 @@
 //! Specks of dust and stain ("Speckles"): a pixel, extended by one in a random direction, then dilated.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Ground, Lie};
-use super::kind::{Kinds, Thing};
-use super::site::Site;
-use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
-use crate::phantom::tile::Tile;
-use crate::random;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// How a speck is grown from its two pixels.
@@ -23,9 +14,9 @@ section! {
 
 section! {
     /// Specks of dust and stain ("Speckles").
-    pub struct Speckles {
+    pub struct Speckles, drawn from rng as pub Speckle {
         /// Number of speckles; drawn once a field.
-        count: Count = Number::log_normal(6.0, 0.7), 0..=1000000;
+        count: Count (undrawn) = Number::log_normal(6.0, 0.7), 0..=1000000;
         /// How it is grown from its two pixels.
         form: SpeckForm = SpeckForm::Round;
         /// How often a speckle is grown by a pixel to all sides (binary dilation).
@@ -34,48 +25,26 @@ section! {
         absorbance: Number = Number::log_normal(0.09, 0.6), 0..=4;
         /// How late light comes through a speck: the halo that changes sign with focus. Seen by bright-field optics
         /// alone.
-        phase_rad: Number = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
+        phase_rad: Number (given f64 as phase_rad: "How late light comes through it, radians.") = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
     }
 }
 
-/// A speck of dust or stain, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Speckle {
-    /// How it was grown.
-    pub form: SpeckForm,
-    /// How often it was grown by a pixel.
-    pub dilations: usize,
-    /// Absorbance.
-    pub absorbance: f64,
-    /// How late light comes through it, radians.
-    pub phase_rad: f64,
-}
-
-impl Kinds<Speckle> for Speckles {
-    fn draw(&self, ground: &mut Ground<'_, Speckle>) {
-        for number in 0..ground.count(named!(self.count)) {
-            let mut rng = ground.stream(number, "body");
-            let centre_um = ground.anywhere(&mut rng);
-            let speckle = Speckle {
-                form: self.form,
-                dilations: self.dilations.draw_count(&mut rng),
-                absorbance: self.absorbance.draw(&mut rng),
-                phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
-            };
-            let depth_um = random::normal(&mut rng);
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-            ground.add(number, 0, lie, speckle);
-        }
+impl Speckles {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Speckle>) {
+        let speckle = |ground: &Ground<'_, Speckle>, number: u64, rng: &mut Stream| Speckle {
+            phase_rad: self.phase_rad.draw(&mut ground.stream(number, "phase")),
+            ..self.one(rng)
+        };
+        ground.strew_anywhere(named!(self.count), speckle, random::normal);
     }
 }
 
-impl Thing for Speckle {
-    fn reach_um(&self, pixel_um: f64) -> f64 {
+impl Speckle {
+    pub(super) fn reach_um(&self, pixel_um: f64) -> f64 {
         (self.dilations as f64 + 3.0) * pixel_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let pixel = site.oversampling as f64;
         // Its pixels are those of the image, whatever grid it is drawn on.

@@ -1,31 +1,18 @@
 //! Trichomonads: pale pear-shaped flagellates with a small, spindle-shaped nucleus.
 
-use serde::{Deserialize, Serialize};
-
-use super::ground::{Clusters, Ground};
-use super::kind::{Kinds, Thing};
-use super::paint::{Painting, Stroke};
-use super::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::Point;
-use crate::phantom::wobble::smooth;
-use crate::random;
-use crate::recipe::dyes::DyeAmounts;
-use crate::recipe::number::{Count, Number};
-use crate::recipe::section::{named, section};
+use super::prelude::*;
 
 section! {
     /// Trichomonads, pale pear-shaped flagellates.
-    pub struct Trichomonads {
+    pub struct Trichomonads, drawn from rng as pub Trichomonad {
         /// Number of groups; drawn once a field.
-        groups: Count = Number::log_normal(0.07, 0.9), 0..=100000;
+        groups: Count (undrawn) = Number::log_normal(0.07, 0.9), 0..=100000;
         /// Trichomonads of a group.
-        per_group: Count = Number::log_normal(5.0, 0.7).at_least(1.0), 1..=10000;
+        per_group: Count (undrawn) = Number::log_normal(5.0, 0.7).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a group.
-        group_um: Number = Number::uniform(12.0, 30.0), 0..=1000, "µm";
+        group_um: Number (undrawn) = Number::uniform(12.0, 30.0), 0..=1000, "µm";
         /// Share of the groups that lie on a cell.
-        on_cells: Number = 0.4, 0..=1;
+        on_cells: Number (undrawn) = 0.4, 0..=1;
         /// Length.
         length_um: Number = Number::normal(12.0, 1.0), 2..=60, "µm";
         /// Width relative to the length.
@@ -39,24 +26,8 @@ section! {
     }
 }
 
-/// A trichomonad, its numbers drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Trichomonad {
-    /// Length, µm.
-    pub length_um: f64,
-    /// Width relative to it.
-    pub width: f64,
-    /// Absorbance of the body.
-    pub absorbance: f64,
-    /// Absorbance of the nucleus above the body.
-    pub nucleus: f64,
-    /// Dyes of the body where its absorbance is 1.
-    pub dyes: dye_spectra::Amounts,
-}
-
-impl Kinds<Trichomonad> for Trichomonads {
-    fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
+impl Trichomonads {
+    pub(super) fn draw(&self, ground: &mut Ground<'_, Trichomonad>) {
         let dyes = ground.dyes(&self.dyes);
         let clusters = Clusters {
             purpose: "group",
@@ -65,13 +36,7 @@ impl Kinds<Trichomonad> for Trichomonads {
             members: &self.per_group,
             spread_um: 0.5,
         };
-        ground.strew_in_clusters(named!(self.groups), &clusters, |_, _, rng| Trichomonad {
-            length_um: self.length_um.draw(rng),
-            width: self.width.draw(rng),
-            absorbance: self.absorbance.draw(rng),
-            nucleus: self.nucleus.draw(rng),
-            dyes,
-        });
+        ground.strew_in_clusters(named!(self.groups), &clusters, |_, _, rng| Trichomonad { dyes, ..self.one(rng) });
     }
 }
 
@@ -90,12 +55,12 @@ const GRAIN_UM: f64 = 0.4;
 const FLAGELLUM_UM: f64 = 0.25;
 const FLAGELLUM: f64 = 0.3;
 
-impl Thing for Trichomonad {
-    fn reach_um(&self, _pixel_um: f64) -> f64 {
+impl Trichomonad {
+    pub(super) fn reach_um(&self, _pixel_um: f64) -> f64 {
         1.1 * self.length_um
     }
 
-    fn phantom(&self, site: &Site<'_>) -> Phantom {
+    pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let (a, b) = (0.5 * self.length_um, 0.5 * self.length_um * self.width);
         let corners: Vec<Point> = (0..CORNERS)
@@ -120,12 +85,12 @@ impl Thing for Trichomonad {
         painting.fill(&outline, self.absorbance);
         let look = Look::clouds(site.px(GRAIN_UM), &mut rng);
         painting.texture(site.pools.clouds(), &look, GRAIN);
-        let mut hairs = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
+        let mut hairs = painting.blank();
         let half_width = site.px(0.5 * FLAGELLUM_UM);
         for pair in threads.iter().flat_map(|thread| thread.windows(2)) {
             hairs.stroke(&Stroke::even(pair[0], pair[1], half_width), FLAGELLUM * self.absorbance);
         }
-        let mut nucleus = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
+        let mut nucleus = painting.blank();
         let (at, tilt) = ([0.42 * a, 0.2 * b * random::normal(&mut rng)], 0.4 * random::normal(&mut rng));
         let reach = 0.15 * self.length_um;
         let tip =
@@ -135,8 +100,7 @@ impl Thing for Trichomonad {
             let half_widths = [thick, 0.35 * thick];
             nucleus.stroke(&Stroke { ends: [middle, tip(side)], half_widths }, 0.0);
         }
-        let both = nucleus.absorbance.values.iter_mut().zip(&nucleus.coverage.values);
-        both.for_each(|(value, cover)| *value = self.nucleus as f32 * cover);
+        nucleus.even(self.nucleus);
         // Flagella are no part of its outline: nobody would draw it round them.
         painting
             .finish(self.dyes, 0.0, self.absorbance)

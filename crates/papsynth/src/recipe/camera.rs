@@ -2,6 +2,7 @@
 
 use super::number::{Count, Number};
 use super::section::section;
+use crate::words::words;
 use ccd_noise::{Blooming, CameraParams, ReadNoise};
 
 section! {
@@ -90,31 +91,19 @@ section! {
     }
 }
 
-/// A named camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CameraPreset {
-    /// The paper's simulator: 8 bits, 70 electrons a grey level, read noise of one grey level.
-    Paper,
-    /// The paper's camera, a cooled interline CCD of 12 bits.
-    Orca05g,
-    /// A scientific CMOS camera of 16 bits.
-    Scmos,
+words! {
+    /// A named camera.
+    pub enum CameraPreset {
+        /// The paper's simulator: 8 bits, 70 electrons a grey level, read noise of one grey level.
+        Paper = "paper",
+        /// The paper's camera, a cooled interline CCD of 12 bits.
+        Orca05g = "orca-05g",
+        /// A scientific CMOS camera of 16 bits.
+        Scmos = "scmos",
+    }
 }
 
 impl CameraPreset {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Paper, Self::Orca05g, Self::Scmos];
-
-    /// Its name, as the command line knows it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Orca05g => "orca-05g",
-            Self::Scmos => "scmos",
-        }
-    }
-
     /// What it is, in a line.
     #[must_use]
     pub fn summary(self) -> &'static str {
@@ -125,25 +114,15 @@ impl CameraPreset {
         }
     }
 
-    /// The preset of a name.
-    #[must_use]
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|preset| preset.name() == name)
-    }
-
     /// The camera; where its numbers come from, `ccd_noise::CameraParams` says.
     #[must_use]
     pub fn camera(self) -> Camera {
-        let params = match self {
-            Self::Paper => CameraParams::paper(),
-            Self::Orca05g => CameraParams::orca_05g(),
-            Self::Scmos => CameraParams::scmos(),
+        let (pixel_um, params) = match self {
+            Self::Paper => (6.45, CameraParams::paper()),
+            Self::Orca05g => (6.45, CameraParams::orca_05g()),
+            Self::Scmos => (6.5, CameraParams::scmos()),
         };
-        let pixel_um = match self {
-            Self::Paper | Self::Orca05g => 6.45.into(),
-            Self::Scmos => 6.5.into(),
-        };
-        Camera { pixel_um, ..Camera::of(&params) }
+        Camera { pixel_um: pixel_um.into(), ..Camera::of(&params) }
     }
 }
 

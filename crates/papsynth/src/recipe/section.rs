@@ -50,41 +50,31 @@ impl Declared<'_> {
     }
 }
 
-/// A part of a recipe whose numbers are declared: a section, a number, or a word.
+/// A part of a recipe whose numbers are declared: a section, a number, or a word or a text, which have none.
 pub(crate) trait Part {
     /// Lists the numbers of the part, which stands at `path`. `bounds` are those of the field, if it is a number.
-    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>);
+    fn list<'a>(&'a self, _path: &str, _bounds: Option<Bounds>, _found: &mut Vec<Declared<'a>>) {}
 }
 
-impl Part for Number {
-    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
-        let value = Value::Real(Cow::Borrowed(self));
-        found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
-    }
-}
-
-impl Part for f64 {
-    fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
-        let value = Value::Real(Cow::Owned(Number::Fixed(*self)));
-        found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
-    }
-}
-
-macro_rules! whole {
-    ($($Type:ty),*) => {
+macro_rules! numbers {
+    ($($Type:ty: $number:ident => $value:expr,)*) => {
         $(impl Part for $Type {
             fn list<'a>(&'a self, path: &str, bounds: Option<Bounds>, found: &mut Vec<Declared<'a>>) {
-                let value = Value::Whole(*self as u64);
-                found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value, bounds }));
+                let $number = self;
+                found.extend(bounds.map(|bounds| Declared { path: path.to_owned(), value: $value, bounds }));
             }
         })*
     };
 }
-whole!(u32, u64, usize);
-
-impl Part for String {
-    fn list<'a>(&'a self, _: &str, _: Option<Bounds>, _: &mut Vec<Declared<'a>>) {}
+numbers! {
+    Number: number => Value::Real(Cow::Borrowed(number)),
+    f64: number => Value::Real(Cow::Owned(Number::Fixed(*number))),
+    u32: number => Value::Whole((*number).into()),
+    u64: number => Value::Whole(*number),
+    usize: number => Value::Whole(*number as u64),
 }
+
+impl Part for String {}
 
 /// The dotted path of a field of the part at `path`.
 pub(crate) fn within(path: &str, field: &str) -> String {
@@ -97,11 +87,14 @@ pub(crate) fn within(path: &str, field: &str) -> String {
 /// or the type of a word, a text or another section, which have no range; a section needs no default of its own.
 ///
 /// With `drawn as pub Name`, the struct `Name` holds one drawn value for each field, and `draw` draws each from the stream
-/// named after the field's dotted path. A field marked `(undrawn)` is left out, one marked `(last)` follows the others.
+/// named after the field's dotted path. With `drawn from rng as pub Name`, `one` draws them from one stream, field after
+/// field; dyes are left at zero there, and set by the caller. A field marked `(undrawn)` is left out, one marked `(last)`
+/// follows the others. `(Count as name: "Meaning.")` gives the drawn value a name of its own, `Chance` in place of `Count`
+/// says whether it happened. What is `(given Type as name: "Meaning.")`, and what is listed after `also`, the caller sets.
 macro_rules! section {
-    ($(#[$meta:meta])* pub struct $Name:ident $(, drawn as $visible:vis $Drawn:ident)? {
-        $($(#[$about:meta])* $field:ident: $Kind:ident $(($mark:ident))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
-    }) => {
+    ($(#[$meta:meta])* pub struct $Name:ident $(, drawn $(from $source:ident)? as $visible:vis $Drawn:ident)? {
+        $($(#[$about:meta])* $field:ident: $Kind:ident $(($($mark:tt)*))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
+    } $(also { $($(#[$more:meta])* $extra:ident: $Type:ident,)* })?) => {
         #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
         #[serde(default, deny_unknown_fields)]
         $(#[$meta])*
@@ -136,9 +129,9 @@ macro_rules! section {
             }
         }
 
-        section!(@drawn $Name ($($visible $Drawn)?) [] [] $({
-            [$(#[$about])*] $field $Kind ($($mark)?) ($($($low)?)?)
-        })*);
+        section!(@drawn $Name ($(($($source)?) $visible $Drawn)?) [] [] $({
+            [$(#[$about])* $($($(#[doc = concat!("In ", $unit, ".")])?)?)?] $field $Kind ($($($mark)*)?) ($($($low)?)?)
+        })* $($({ [$(#[$more])*] $extra $Type () given })*)?);
     };
 
     ($(#[$meta:meta])* pub enum $Name:ident { $($(#[$about:meta])* $Word:ident,)* }) => {
@@ -147,15 +140,7 @@ macro_rules! section {
         #[serde(rename_all = "kebab-case")]
         pub enum $Name { $($(#[$about])* $Word,)* }
 
-        impl $crate::recipe::section::Part for $Name {
-            fn list<'a>(
-                &'a self,
-                _: &str,
-                _: Option<$crate::recipe::section::Bounds>,
-                _: &mut Vec<$crate::recipe::section::Declared<'a>>,
-            ) {
-            }
-        }
+        impl $crate::recipe::section::Part for $Name {}
     };
 
     ($(#[$meta:meta])* pub enum $Name:ident, by default $Default:ident {
@@ -205,34 +190,58 @@ macro_rules! section {
         section!(@drawn $Name $drawn [$($done)*] [$($last)*] $($rest)*);
     };
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident (last) $low:tt } $($rest:tt)*) => {
-        section!(@drawn $Name $drawn [$($done)*] [$($last)* { $about $field $Kind $low }] $($rest)*);
+        section!(@drawn $Name $drawn [$($done)*] [$($last)* { $about $field $field $Kind $low }] $($rest)*);
     };
-    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident () $low:tt } $($rest:tt)*) => {
-        section!(@drawn $Name $drawn [$($done)* { $about $field $Kind $low }] [$($last)*] $($rest)*);
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident (given $Type:ident as $own:ident: $doc:literal) $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)* { [#[doc = $doc]] $own $field $Type given }] $last $($rest)*);
     };
-    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*]) => {
-        section!(@struct $Name $drawn $($done)* $($last)*);
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident ($How:ident as $own:ident: $doc:literal) $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)* { [#[doc = $doc]] $own $field $How $low }] $last $($rest)*);
     };
-    (@struct $Name:ident ($visible:vis $Drawn:ident) $({ [$(#[$about:meta])*] $field:ident $Kind:ident $low:tt })*) => {
-        #[doc = concat!("A [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ") with its numbers drawn.")]
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident () $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)* { $about $field $field $Kind $low }] $last $($rest)*);
+    };
+    (@drawn $Name:ident ($source:tt $visible:vis $Drawn:ident) [$({ [$(#[$about:meta])*] $own:ident $field:ident $Kind:ident $low:tt })*] []) => {
+        #[doc = concat!("What is drawn from [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ").")]
         #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
-        $visible struct $Drawn { $($(#[$about])* pub $field: section!(@value $Kind),)* }
+        $visible struct $Drawn { $($(#[$about])* pub $own: section!(@value $source $Kind),)* }
 
+        section!(@draw $source $Name $Drawn $({ $own $field $Kind $low })*);
+    };
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*]) => {
+        section!(@drawn $Name $drawn [$($done)* $($last)*] []);
+    };
+    (@draw () $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:ident $low:tt })*) => {
         impl $Name {
             /// Draws each number from the stream named after its place: `path` is that of the section.
             pub(crate) fn draw(&self, path: &str, stream: impl Fn(&str) -> $crate::key::Stream) -> $Drawn {
                 let stream = |field: &str| stream(&$crate::recipe::section::within(path, field));
-                $Drawn { $($field: section!(@draw $Kind $low self.$field, &mut stream(stringify!($field))),)* }
+                $Drawn { $($own: section!(@one () $Kind $low self.$field, &mut stream(stringify!($field))),)* }
             }
         }
     };
-    (@value Number) => { f64 };
-    (@value Count) => { u32 };
-    (@value $Kind:ident) => { $Kind };
-    (@draw Number $low:tt $number:expr, $rng:expr) => { $number.draw($rng) };
-    (@draw Count ($low:literal) $number:expr, $rng:expr) => { ($number.draw_count($rng) as u32).max($low) };
-    (@draw $Kind:ident $low:tt $value:expr, $rng:expr) => { $value };
+    (@draw (rng) $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:ident $low:tt })*) => {
+        impl $Name {
+            /// Draws the numbers of one object.
+            fn one(&self, rng: &mut $crate::key::Stream) -> $Drawn {
+                $Drawn { $($own: section!(@one (rng) $Kind $low self.$field, rng),)* }
+            }
+        }
+    };
+    (@value $source:tt Number) => { f64 };
+    (@value () Count) => { u32 };
+    (@value (rng) Count) => { usize };
+    (@value (rng) Chance) => { bool };
+    (@value (rng) DyeAmounts) => { dye_spectra::Amounts };
+    (@value $source:tt $Kind:ident) => { $Kind };
+    (@one (rng) $Kind:ident given $number:expr, $rng:expr) => { Default::default() };
+    (@one $source:tt Number $low:tt $number:expr, $rng:expr) => { $number.draw($rng) };
+    (@one () Count ($low:literal) $number:expr, $rng:expr) => { ($number.draw_count($rng) as u32).max($low) };
+    (@one (rng) Count ($low:literal) $number:expr, $rng:expr) => { $number.draw_count($rng).max($low) };
+    (@one (rng) Chance $low:tt $number:expr, $rng:expr) => { $crate::random::chance($number.draw($rng), $rng) };
+    (@one (rng) DyeAmounts $low:tt $number:expr, $rng:expr) => { Default::default() };
+    (@one $source:tt $Kind:ident $low:tt $value:expr, $rng:expr) => { $value };
 }
 
 /// The name of a number and the number itself: `named!(recipe.slide.depth_um)` names it `slide.depth_um`, and

@@ -116,23 +116,15 @@ impl Part for Cells {
     }
 }
 
-/// Cells of these classes, so many of each.
-pub(super) fn mix<const N: usize>(counts: [(&str, Number); N]) -> Cells {
-    let tints = |class: &str| if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
-    let mix = |(class, count): (&str, Number)| {
-        (class.to_owned(), CellMix { count, tints: tints(class), ..CellMix::default() })
-    };
-    counts.into_iter().map(mix).collect()
-}
-
 /// The cells of the default slide.
 pub(super) fn default_cells() -> Cells {
-    mix([
-        ("intermediate", Number::uniform(8.0, 24.0)),
-        ("superficial", Number::uniform(2.0, 10.0)),
-        ("parabasal", Number::uniform(0.0, 1.5)),
-        ("metaplastic", Number::uniform(0.0, 1.5)),
-    ])
+    let cells =
+        [("intermediate", 8.0, 24.0), ("superficial", 2.0, 10.0), ("parabasal", 0.0, 1.5), ("metaplastic", 0.0, 1.5)];
+    let mix = |(class, least, most): (&str, f64, f64)| {
+        let tints = if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
+        (class.to_owned(), CellMix { count: Number::uniform(least, most), tints, ..CellMix::default() })
+    };
+    cells.map(mix).into()
 }
 
 section! {
@@ -162,14 +154,6 @@ section! {
         size: Count = 1, 1..=1000;
         /// Distance between the middles of neighbours, relative to their diameter: below 1 they overlap.
         distance: Number = Number::uniform(0.75, 0.95), 0.2..=3;
-    }
-}
-
-impl Group {
-    /// A group of a form, of so many cells.
-    #[must_use]
-    pub fn of(form: GroupForm, size: Number) -> Self {
-        Self { form, size, ..Self::default() }
     }
 }
 

@@ -3,6 +3,8 @@
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
 
+use crate::words::words;
+
 /// An epithelial cell, its numbers drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -152,35 +154,16 @@ pub struct NucleusBody {
     pub nucleoli: usize,
 }
 
-/// The tint that a cytoplasm has taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Tint {
-    /// Blue-green.
-    Cyanophilic,
-    /// Pink.
-    Eosinophilic,
-    /// Orange.
-    Orangeophilic,
-}
-
-impl Tint {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Cyanophilic, Self::Eosinophilic, Self::Orangeophilic];
-
-    /// The tint of that name.
-    #[must_use]
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|tint| tint.name() == name)
-    }
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cyanophilic => "cyanophilic",
-            Self::Eosinophilic => "eosinophilic",
-            Self::Orangeophilic => "orangeophilic",
-        }
+words! {
+    /// The tint that a cytoplasm has taken.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Tint {
+        /// Blue-green.
+        Cyanophilic = "cyanophilic",
+        /// Pink.
+        Eosinophilic = "eosinophilic",
+        /// Orange.
+        Orangeophilic = "orangeophilic",
     }
 }

@@ -1,5 +1,7 @@
 //! Parts of objects, and the groups within which they hide each other.
 
+use crate::words::words;
+
 /// Coverage from which on a pixel belongs to a mask.
 pub const COVERED: f32 = 0.5;
 
@@ -15,29 +17,17 @@ pub enum Part {
     Whole,
 }
 
-/// The groups within which an object is nearer to the objective than another, each with a label map of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Group {
-    /// The cytoplasm of cells.
-    Cytoplasm,
-    /// The nuclei of cells.
-    Nucleus,
-    /// Everything that is no epithelial cell.
-    Debris,
-}
-
-impl Group {
-    /// All groups, in the order of their label maps.
-    pub const ALL: [Self; 3] = [Self::Cytoplasm, Self::Nucleus, Self::Debris];
-
-    /// The name of the group, as it stands in file names.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cytoplasm => "cytoplasm",
-            Self::Nucleus => "nucleus",
-            Self::Debris => "debris",
-        }
+words! {
+    /// The groups within which an object is nearer to the objective than another, each with a label map of its own, in the
+    /// order of these; names are those of files.
+    #[derive(PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Group {
+        /// The cytoplasm of cells.
+        Cytoplasm = "cytoplasm",
+        /// The nuclei of cells.
+        Nucleus = "nucleus",
+        /// Everything that is no epithelial cell.
+        Debris = "debris",
     }
 }

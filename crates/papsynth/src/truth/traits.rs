@@ -5,55 +5,38 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-macro_rules! traits {
-    ($($(#[$doc:meta])* $Name:ident = $name:literal,)*) => {
-        /// A variant that the shape of an object shows.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-        #[serde(rename_all = "kebab-case")]
-        pub enum Trait {
-            $($(#[$doc])* $Name,)*
-        }
+use crate::words::words;
 
-        impl Trait {
-            /// All traits, in the order in which they are written.
-            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$Name),*];
-
-            /// The name of the trait.
-            #[must_use]
-            pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$Name => $name,)*
-                }
-            }
-        }
-    };
-}
-
-traits! {
-    /// Part of the cell lies flat on it.
-    Flap = "flap",
-    /// Part of the cell is rolled up.
-    Rolled = "rolled",
-    /// Both sides of the cell are folded to its middle.
-    Folded = "folded",
-    /// The cytoplasm is cleared around the nucleus.
-    Koilocytic = "koilocytic",
-    /// The cytoplasm holds keratohyalin granules.
-    Granular = "granular",
-    /// The nucleus is small, dark and without structure.
-    Pyknotic = "pyknotic",
-    /// The nucleus is wrinkled.
-    Wrinkled = "wrinkled",
-    /// Bacteria cover the cell.
-    Clue = "clue",
-    /// A red blood cell that has lost its haemoglobin.
-    Ghost = "ghost",
-    /// A pseudohypha.
-    Hypha = "hypha",
-    /// A yeast.
-    Yeast = "yeast",
-    /// A leukocyte with a smudged nucleus.
-    Degenerated = "degenerated",
+words! {
+    /// A variant that the shape of an object shows. They are written in the order in which they are listed.
+    #[derive(PartialOrd, Ord, Hash, Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Trait {
+        /// Part of the cell lies flat on it.
+        Flap = "flap",
+        /// Part of the cell is rolled up.
+        Rolled = "rolled",
+        /// Both sides of the cell are folded to its middle.
+        Folded = "folded",
+        /// The cytoplasm is cleared around the nucleus.
+        Koilocytic = "koilocytic",
+        /// The cytoplasm holds keratohyalin granules.
+        Granular = "granular",
+        /// The nucleus is small, dark and without structure.
+        Pyknotic = "pyknotic",
+        /// The nucleus is wrinkled.
+        Wrinkled = "wrinkled",
+        /// Bacteria cover the cell.
+        Clue = "clue",
+        /// A red blood cell that has lost its haemoglobin.
+        Ghost = "ghost",
+        /// A pseudohypha.
+        Hypha = "hypha",
+        /// A yeast.
+        Yeast = "yeast",
+        /// A leukocyte with a smudged nucleus.
+        Degenerated = "degenerated",
+    }
 }
 
 /// The traits of an object. As text their names stand between semicolons, in the order of [`Trait::ALL`].
@@ -97,10 +80,7 @@ impl TryFrom<String> for Traits {
     type Error = UnknownTrait;
 
     fn try_from(text: String) -> Result<Self, UnknownTrait> {
-        let named = |name: &str| {
-            let found = Trait::ALL.into_iter().find(|one| one.name() == name);
-            found.ok_or_else(|| UnknownTrait(name.to_owned()))
-        };
+        let named = |name: &str| Trait::by_name(name).ok_or_else(|| UnknownTrait(name.to_owned()));
         text.split(';').filter(|name| !name.is_empty()).map(named).collect()
     }
 }

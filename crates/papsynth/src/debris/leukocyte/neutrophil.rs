@@ -1,15 +1,7 @@
 //! Neutrophils: a lobed nucleus in a pale, ragged cytoplasm that is often drawn out to one side.
 
 use super::Leukocyte;
-use crate::debris::paint::{Painting, Stroke};
-use crate::debris::site::Site;
-use crate::key::Stream;
-use crate::phantom::piece::Phantom;
-use crate::phantom::pools::Look;
-use crate::phantom::tile::{Point, Tile};
-use crate::phantom::wobble::{placed, smooth, wobbled_circle};
-use crate::random;
-use crate::truth::traits::Trait;
+use crate::debris::prelude::*;
 
 /// Corners of a cytoplasm's outline before it is smoothed, and points between two of them.
 const CORNERS: usize = 14;
@@ -80,7 +72,7 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let look = Look::clouds(site.px(VACUOLE_UM), &mut rng);
     painting.texture(site.pools.clouds(), &look, VACUOLES);
 
-    let mut nucleus = Painting { coverage: painting.coverage.blank(), absorbance: painting.coverage.blank() };
+    let mut nucleus = painting.blank();
     for shape in &shapes {
         nucleus.coverage.cover(shape);
     }
@@ -166,7 +158,7 @@ fn lobes(leukocyte: &Leukocyte, cell_radius: f64, rng: &mut Stream) -> Vec<Lobe>
 /// The cytoplasm, 1 inside and darker along its border.
 fn border(coverage: &Tile, outline: &[Point], site: &Site<'_>) -> Tile {
     let middle = fsd_shape::centroid(outline);
-    let radius = (crate::phantom::tile::area(outline) / core::f64::consts::PI).sqrt();
+    let radius = (area(outline) / core::f64::consts::PI).sqrt();
     let shrink = (1.0 - site.px(BORDER_UM) / radius).max(0.0);
     let inner: Vec<Point> = outline
         .iter()
@@ -197,21 +189,14 @@ fn domed(nucleus: &mut Painting, shapes: &[Vec<Point>], leukocyte: &Leukocyte) {
     /// Lobes that lie over each other hide each other's stain in part.
     const THICKEST: f64 = 1.3;
     let rim = if leukocyte.degenerated { SMUDGED_RIM } else { RIM };
-    let balls: Vec<(Point, f64)> = shapes
-        .iter()
-        .map(|lobe| (fsd_shape::centroid(lobe), crate::phantom::tile::area(lobe) / core::f64::consts::PI))
-        .collect();
-    let cover = &nucleus.coverage.values;
-    let mut index = 0;
-    nucleus.absorbance.for_each(|p, value| {
+    let balls: Vec<(Point, f64)> =
+        shapes.iter().map(|lobe| (fsd_shape::centroid(lobe), area(lobe) / core::f64::consts::PI)).collect();
+    nucleus.shade(|p| {
         let chord = |(centre, square): &(Point, f64)| {
             let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
             (1.0 - (dx * dx + dy * dy) / square).max(0.0).sqrt()
         };
-        if cover[index] > 0.0 {
-            let thickness = balls.iter().map(chord).sum::<f64>().min(THICKEST);
-            *value = cover[index] * (leukocyte.absorbance * (rim + (1.0 - rim) * 1.2 * thickness)) as f32;
-        }
-        index += 1;
+        let thickness = balls.iter().map(chord).sum::<f64>().min(THICKEST);
+        leukocyte.absorbance * (rim + (1.0 - rim) * 1.2 * thickness)
     });
 }

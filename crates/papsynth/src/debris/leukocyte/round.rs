@@ -1,12 +1,7 @@
 //! The paper's white blood cells: one perturbed circle.
 
-use rand_core::Rng;
-
 use super::Leukocyte;
-use crate::debris::site::Site;
-use crate::phantom::piece::Phantom;
-use crate::phantom::tile::{Point, Tile, area};
-use crate::phantom::wobble::{placed, textured, wobbled_circle};
+use crate::debris::prelude::*;
 
 /// Size of the cells of the Perlin noise inside a nucleus, relative to its radius.
 const NOISE_CELL: f64 = 0.55;
