@@ -1,11 +1,11 @@
 //! A field as grey levels, and where in it a patch may be taken.
 
-use papsynth_dataset::read::{LevelImage, Stack};
+use papsynth_dataset::read::{LevelImage, Limits, Stack};
 use portable_numerics::random::below;
 use rand_core::Rng;
 
 use crate::error::Error;
-use crate::fields::{Field, bytes, limits};
+use crate::fields::{Field, bytes};
 
 /// Rows and columns at the border of a field that no patch holds, on either side: where planes were combined, or an image
 /// was put straight, they may be black.
@@ -58,7 +58,7 @@ impl Raw {
     /// Reads a field. Of an image in colour, green: the channel that sees most of the stain, and the nearest to the 570 nm of the
     /// paper. Of a stack, the plane in the middle.
     pub(crate) fn read(field: &Field) -> Result<Self, Error> {
-        let limits = limits();
+        let limits = Limits::default();
         let bytes = bytes(&field.path, limits.max_file_bytes)?;
         let refuse = |problem| papsynth_dataset::Error::Input { path: field.path.clone(), problem };
         let is_stack = field.frame.as_ref().is_some_and(|frame| frame.summary.planes_um.len() > 1);

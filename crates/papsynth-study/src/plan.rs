@@ -1,15 +1,15 @@
 //! Which patch is shown in which trial, and the patches themselves.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
+use papsynth_dataset::read::Limits;
 use portable_numerics::random::shuffle;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::design::{Grey, Side, Stage, StudyParams, order};
 use crate::error::Error;
-use crate::fields::{Field, Root, bytes, limits};
+use crate::fields::{Field, Frame, Root, bytes};
 use crate::key::{Key, hex};
 use crate::parameters::{Objects, Parameters, varied};
 use crate::patch;
@@ -78,7 +78,7 @@ pub(crate) struct Plan {
     pub(crate) notes: Vec<String>,
 }
 
-/// The two folders that were given.
+/// The two folders that were given, in the order of [`Side::ALL`].
 pub(crate) struct Folders {
     roots: [Root; 2],
     fields: [Vec<Field>; 2],
@@ -89,21 +89,6 @@ impl Folders {
         let roots = [Root::new(real)?, Root::new(synthetic)?];
         let fields = [roots[0].fields()?, roots[1].fields()?];
         Ok(Self { roots, fields })
-    }
-
-    fn root(&self, side: Side) -> &Root {
-        &self.roots[place(side)]
-    }
-
-    fn fields(&self, side: Side) -> &[Field] {
-        &self.fields[place(side)]
-    }
-}
-
-fn place(side: Side) -> usize {
-    match side {
-        Side::Real => 0,
-        Side::Synthetic => 1,
     }
 }
 
@@ -116,38 +101,43 @@ impl Plan {
         let hashes = chosen.iter().map(|(_, field)| hash(field)).collect::<Result<Vec<_>, _>>()?;
         let key = Key::new(params.seed, &params.subject, hashes.iter());
         let orders = order(params, &mut key.stream("order", 0));
-        let needed =
-            Side::BOTH.map(|side| orders.iter().flat_map(|o| &o.sides).filter(|shown| **shown == side).count());
+        let needed = Side::ALL.map(|side| orders.iter().flat_map(|(_, sides)| sides).filter(|s| **s == side).count());
         let reduce = reductions(params, &chosen, &mut notes);
         let (fields, places) = survey(params, &chosen, hashes, &reduce, needed, &key)?;
 
         let mut hands = [Vec::new(), Vec::new()];
-        for side in Side::BOTH {
-            let (hand, needed) = (&mut hands[place(side)], needed[place(side)]);
+        for side in Side::ALL {
+            let (hand, needed) = (&mut hands[side as usize], needed[side as usize]);
             let mut turns: Vec<usize> = (0..fields.len()).filter(|index| fields[*index].side == side).collect();
-            shuffle(&mut turns, &mut key.stream("turns", place(side)));
+            shuffle(&mut turns, &mut key.stream("turns", side as usize));
             *hand = deal(&turns, &places, needed);
             if hand.len() < needed {
-                let (side, fields, found) = (side.name(), turns.len(), hand.len());
-                return Err(Error::TooFew { side, fields, found, needed });
+                return Err(Error::Refused(format!(
+                    "{}: {} fields give {} patches with something on them that do not overlap much, {needed} are needed; \
+                     expected more or larger fields, fewer trials or smaller patches",
+                    side.name(),
+                    turns.len(),
+                    hand.len()
+                )));
             }
-            shuffle(hand, &mut key.stream("patches", place(side)));
+            shuffle(hand, &mut key.stream("patches", side as usize));
         }
-        let known = Known::read(folders, &chosen, &mut notes);
+        let known = known(folders, &chosen, &mut notes);
         let mut patch = |side: Side| {
-            let (field, [x_px, y_px]) = hands[place(side)].pop()?;
+            let (field, [x_px, y_px]) = hands[side as usize].pop()?;
             let reduce = fields[field].reduce;
-            let parameters =
-                known.of(field, [x_px, y_px].map(|at| at as f64 * reduce), params.patch_px as f64 * reduce);
+            let (mut parameters, objects) = (known[field].0.clone(), &known[field].1);
+            if let Some((frame, objects)) = objects {
+                let place = [x_px, y_px].map(|at| at as f64 * reduce);
+                parameters.extend(objects.of_patch(frame, place, params.patch_px as f64 * reduce));
+            }
             Some(Patch { side, field, x_px, y_px, parameters })
         };
-        let trials = orders
-            .into_iter()
-            .map(|order| Trial {
-                stage: order.stage,
-                patches: order.sides.into_iter().filter_map(&mut patch).collect(),
-            })
-            .collect();
+        let mut trial = |(stage, sides): (Stage, Vec<Side>)| Trial {
+            stage,
+            patches: sides.into_iter().filter_map(&mut patch).collect(),
+        };
+        let trials = orders.into_iter().map(&mut trial).collect();
         Ok(Self { fields, trials, notes })
     }
 
@@ -191,7 +181,7 @@ fn patch_number(trial: usize, slot: usize) -> usize {
 impl FieldRecord {
     /// The field as it is shown, before noise.
     fn picture(&self, params: &StudyParams, folders: &Folders) -> Result<Picture, Error> {
-        let field = folders.fields(self.side).iter().find(|field| field.name == self.name);
+        let field = folders.fields[self.side as usize].iter().find(|field| field.name == self.name);
         let raw = Raw::read(field.ok_or_else(|| self.changed(folders))?)?;
         if hex(&Sha256::digest(&raw.bytes)) != self.sha256 {
             return Err(self.changed(folders));
@@ -206,11 +196,8 @@ impl FieldRecord {
     }
 
     fn changed(&self, folders: &Folders) -> Error {
-        let path = folders.root(self.side).path().join(&self.name);
-        Error::folder(
-            &path,
-            "has changed since the study of this subject began; --subject with another name begins a new one",
-        )
+        let what = "has changed since the study of this subject began; --subject with another name begins a new one";
+        Error::folder(&folders.roots[self.side as usize].given.join(&self.name), what)
     }
 }
 
@@ -222,17 +209,17 @@ fn full_scale(bits: u32) -> f32 {
 }
 
 fn hash(field: &Field) -> Result<String, Error> {
-    Ok(hex(&Sha256::digest(bytes(&field.path, limits().max_file_bytes)?)))
+    Ok(hex(&Sha256::digest(bytes(&field.path, Limits::default().max_file_bytes)?)))
 }
 
 /// The fields that are shown: as many of each side as are asked for, or all.
 fn choose<'a>(params: &StudyParams, folders: &'a Folders, notes: &mut Vec<String>) -> Vec<(Side, &'a Field)> {
     let mut chosen = Vec::new();
-    for side in Side::BOTH {
-        let all = folders.fields(side);
+    for side in Side::ALL {
+        let all = &folders.fields[side as usize];
         let key = Key::new(params.seed, "", all.iter().map(|field| field.name.as_bytes()));
         let mut indices: Vec<usize> = (0..all.len()).collect();
-        shuffle(&mut indices, &mut key.stream("fields", place(side)));
+        shuffle(&mut indices, &mut key.stream("fields", side as usize));
         indices.truncate(params.fields);
         indices.sort_unstable();
         if all.len() < params.fields {
@@ -265,11 +252,11 @@ fn survey(
             None => full_scale(8),
         };
         if full_scale == UNKNOWN {
-            let deepest = &mut deepest[place(*side)];
+            let deepest = &mut deepest[*side as usize];
             *deepest = deepest.max(raw.picture.most());
         }
         let picture = raw.picture.reduced(reduce[index]);
-        places.push(picture.places(params.patch_px, needed[place(*side)], &mut key.stream("places", index)));
+        places.push(picture.places(params.patch_px, needed[*side as usize], &mut key.stream("places", index)));
         fields.push(FieldRecord {
             side: *side,
             name: field.name.clone(),
@@ -281,7 +268,7 @@ fn survey(
         });
     }
     for field in fields.iter_mut().filter(|field| field.full_scale == UNKNOWN) {
-        let most = deepest[place(field.side)];
+        let most = deepest[field.side as usize];
         field.full_scale = BITS.map(full_scale).into_iter().find(|full| *full >= most).unwrap_or(most);
     }
     Ok((fields, places))
@@ -289,8 +276,9 @@ fn survey(
 
 /// How much each field is reduced, so that all have pixels of one size: that of the coarsest.
 fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<String>) -> Vec<f64> {
+    let stated = [params.real_pixel_um, params.synthetic_pixel_um];
     let own = |side: Side, field: &Field| {
-        params.pixel_um(side).or_else(|| field.frame.as_ref().map(|frame| frame.summary.pixel_um))
+        stated[side as usize].or_else(|| field.frame.as_ref().map(|frame| frame.summary.pixel_um))
     };
     let sizes: Option<Vec<f64>> = chosen.iter().map(|(side, field)| own(*side, field)).collect();
     let Some(sizes) = sizes else {
@@ -300,7 +288,7 @@ fn reductions(params: &StudyParams, chosen: &[(Side, &Field)], notes: &mut Vec<S
     let coarsest = sizes.iter().copied().fold(0.0, f64::max);
     let reduce: Vec<f64> =
         sizes.iter().map(|size| if coarsest / size < 1.0 + SAME_PIXEL { 1.0 } else { coarsest / size }).collect();
-    for side in Side::BOTH {
+    for side in Side::ALL {
         let finer = chosen.iter().zip(&reduce).filter(|((own, _), reduce)| *own == side && **reduce > 1.0).count();
         if finer > 0 {
             notes.push(format!("{}: {finer} fields are resampled to pixels of {coarsest} µm", side.name()));
@@ -317,46 +305,32 @@ fn deal(turns: &[usize], places: &[Places], needed: usize) -> Vec<(usize, [usize
     all.take(needed).collect()
 }
 
-/// What is known of the fields, for patches.
-struct Known<'a> {
-    objects: BTreeMap<usize, (&'a Field, Objects)>,
-    varied: Vec<Parameters>,
-}
-
-impl<'a> Known<'a> {
-    /// Reads what data sets know. Without it nothing is missing but the breakdown, so that it is a note and no error.
-    fn read(folders: &Folders, chosen: &[(Side, &'a Field)], notes: &mut Vec<String>) -> Self {
-        let mut objects = BTreeMap::new();
-        for (index, (side, field)) in chosen.iter().enumerate() {
-            let Some(frame) = &field.frame else { continue };
-            match Objects::read(folders.root(*side), frame) {
-                Ok(found) => {
-                    objects.insert(index, (*field, found));
-                }
-                Err(error) => notes.push(format!("the objects of {} are not known: {error}", field.name)),
-            }
+/// What data sets know of each field: in what its recipe differs from those of others, and its objects. Without them nothing
+/// is missing but the breakdown, so that it is a note and no error.
+fn known<'a>(
+    folders: &Folders,
+    chosen: &[(Side, &'a Field)],
+    notes: &mut Vec<String>,
+) -> Vec<(Parameters, Option<(&'a Frame, Objects)>)> {
+    let mut known = Vec::with_capacity(chosen.len());
+    for side in Side::ALL {
+        // Real fields were chosen first.
+        let fields: Vec<&Field> = chosen.iter().filter(|(own, _)| *own == side).map(|(_, field)| *field).collect();
+        for (field, varied) in fields.iter().zip(varied(&fields)) {
+            let objects = field.frame.as_ref().and_then(|frame| {
+                let found = Objects::read(&folders.roots[side as usize], frame);
+                let note = |error: &Error| notes.push(format!("the objects of {} are not known: {error}", field.name));
+                found.inspect_err(note).ok().map(|objects| (frame, objects))
+            });
+            known.push((varied, objects));
         }
-        let mut all = vec![Parameters::new(); chosen.len()];
-        for side in Side::BOTH {
-            let own: Vec<usize> = (0..chosen.len()).filter(|index| chosen[*index].0 == side).collect();
-            let fields: Vec<&Field> = own.iter().map(|index| chosen[*index].1).collect();
-            own.iter().zip(varied(&fields)).for_each(|(index, parameters)| all[*index] = parameters);
-        }
-        Self { objects, varied: all }
     }
-
-    fn of(&self, field: usize, place: [f64; 2], side: f64) -> Parameters {
-        let mut parameters = self.varied[field].clone();
-        if let Some((Field { frame: Some(frame), .. }, objects)) = self.objects.get(&field) {
-            parameters.extend(objects.of_patch(frame, place, side));
-        }
-        parameters
-    }
+    known
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
     use std::fs;
 
     use super::*;
@@ -447,9 +421,10 @@ mod tests {
         let scratch = Scratch::new("plan-few");
         let folders = study_folders(&scratch, 1, 1);
         let error = Plan::draw(&StudyParams { trials: 2000, ..params() }, &folders).unwrap_err();
-        assert!(matches!(error, Error::TooFew { side: "real", fields: 1, needed: 1001, .. }), "{error}");
+        let error = error.to_string();
+        assert!(error.starts_with("real: 1 fields give ") && error.contains("1001 are needed"), "{error}");
         let error = Plan::draw(&StudyParams { patch_px: 1024, ..params() }, &folders).unwrap_err();
-        assert!(matches!(error, Error::TooFew { found: 0, .. }), "{error}");
+        assert!(error.to_string().contains("give 0 patches"), "{error}");
     }
 
     #[test]

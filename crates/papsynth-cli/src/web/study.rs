@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
 
 fn announcement(session: &Session, server: &Server) -> String {
     let state = session.state();
-    let [real, synthetic] = Side::BOTH.map(|side| session.fields(side));
+    let [real, synthetic] = Side::ALL.map(|side| session.fields(side));
     let done = match state.answered {
         0 => String::new(),
         answered => format!(", {answered} of them answered"),
