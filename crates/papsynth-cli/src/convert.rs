@@ -4,14 +4,13 @@ use papsynth_dataset::Progress;
 
 use crate::args::Convert;
 use crate::exit::{self, Failure};
-use crate::interrupt::Interrupt;
 use crate::words::counted;
 
 pub(crate) fn run(args: &Convert) -> Result<(), Failure> {
     let layout = args.files.layout(args.format.clone());
-    let interrupt = Interrupt::watch()?;
+    let stop = exit::watch()?;
     let report = |_: Progress| ();
-    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, interrupt.flag(), &report)?;
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &report)?;
     let out = args.out.display();
     if outcome.stopped {
         let message = format!("stopped; every file in {out} is whole");

@@ -10,7 +10,7 @@ use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known
 use rayon::prelude::*;
 
 use crate::args;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::pool;
 use crate::text_file::may_replace_in;
 
@@ -62,7 +62,7 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
 }
 
 fn refuse(error: Error) -> Failure {
-    Failure::input(Complaint::new(error.to_string()))
+    Failure::input(error)
 }
 
 /// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
@@ -165,9 +165,7 @@ fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Fail
             let factor = pixel_um / own_um;
             let picture = picture(file)?;
             let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
-            gauge
-                .measure(&picture)
-                .map_err(|error| Failure::input(Complaint::new(format!("{}: {error}", file.path().display()))))
+            gauge.measure(&picture).map_err(|error| Failure::input(format!("{}: {error}", file.path().display())))
         })
         .collect();
     fields.into_iter().collect()

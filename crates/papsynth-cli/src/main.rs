@@ -8,11 +8,9 @@ mod calibrate;
 mod convert;
 mod excerpt;
 mod exit;
-mod findings;
 mod generate;
 mod init;
 mod inspect;
-mod interrupt;
 #[cfg(feature = "judge")]
 mod judge;
 #[cfg(feature = "learn")]
@@ -25,7 +23,6 @@ mod plan;
 mod preview;
 mod profile;
 mod recipe_file;
-mod render;
 mod report;
 mod rerender;
 mod setup;
@@ -54,14 +51,14 @@ fn main() -> ExitCode {
         Err(error) => {
             // Help and version arrive here too, with code 0; a closed pipe is no failure.
             let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { exit::Exit::Input.code() } else { 0 });
+            return ExitCode::from(if error.use_stderr() { exit::INPUT } else { 0 });
         }
     };
     let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
     match place::check(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            let code = failure.exit().code();
+            let code = failure.code();
             if json {
                 // Whoever reads JSON reads it to the end, or closed the pipe.
                 let _ = report::event(&failure.json());
@@ -78,7 +75,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Init(args) => init::run(&args),
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
-        Verb::Render(args) => render::run(*args),
+        Verb::Render(args) => preview::render(*args),
         #[cfg(feature = "learn")]
         Verb::Learn(args) => learn::run(&args),
         #[cfg(feature = "calibrate")]
@@ -101,7 +98,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         #[cfg(feature = "web")]
         Verb::Study(args) => web::study::run(&args),
         #[cfg(feature = "web")]
-        Verb::View(args) => web::view::run(&args),
+        Verb::View(args) => web::view(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))

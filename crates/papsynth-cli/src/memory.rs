@@ -45,20 +45,11 @@ pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let number: f64 = text[..end].parse().map_err(|_| wrong())?;
     let unit = text[end..].trim_start().to_ascii_lowercase();
-    let power = match unit.chars().next() {
-        None | Some('b') => 0,
-        Some('k') => 1,
-        Some('m') => 2,
-        Some('g') => 3,
-        Some('t') => 4,
-        Some(_) => return Err(wrong()),
+    let (prefix, base) = match unit.strip_suffix("ib").filter(|prefix| !prefix.is_empty()) {
+        Some(prefix) => (prefix, 1024.0),
+        None => unit.strip_suffix('b').map_or((unit.as_str(), 1024.0), |prefix| (prefix, 1000.0)),
     };
-    let base = match unit.get(1..).filter(|_| power > 0) {
-        Some("b") => 1000.0,
-        Some("" | "ib") => 1024.0,
-        None if unit.is_empty() || unit == "b" => 1.0,
-        _ => return Err(wrong()),
-    };
+    let power = ["", "k", "m", "g", "t"].iter().position(|known| *known == prefix).ok_or_else(wrong)?;
     let bytes = (0..power).fold(number, |bytes: f64, _| bytes * base);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within these bounds")]
     if (1.0..9e15).contains(&bytes) { Ok(bytes as u64) } else { Err(wrong()) }

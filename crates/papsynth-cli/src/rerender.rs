@@ -3,15 +3,13 @@
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use papsynth::Threads;
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share, frames_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, frames_of, truth_differs};
 use toml::Table;
 
 use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, Failure};
-use crate::interrupt::Interrupt;
-use crate::setup::Setup;
+use crate::setup::{Setup, run_of};
 use crate::words::runs;
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
@@ -37,8 +35,8 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
         ));
     }
     let (layout, _) = args.layout.layout(0);
-    let interrupt = Interrupt::watch()?;
-    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
+    let stop = exit::watch()?;
+    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, stop)?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
         return Err(Failure::wrong(
             format!("the truth is another: {difference}"),
@@ -48,13 +46,8 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     if args.quiet {
         return Ok(());
     }
-    let out = args.out.display();
-    exit::print(&format!(
-        "{out}: {} frames made, {} were there; the truth is that of {}\n",
-        outcome.made,
-        outcome.kept,
-        args.dir.display()
-    ))
+    let (out, dir, Outcome { made, kept, .. }) = (args.out.display(), args.dir.display(), outcome);
+    exit::print(&format!("{out}: {made} frames made, {kept} were there; the truth is that of {dir}\n"))
 }
 
 /// The engine of the data set's recipe, with what is set over it or without.
@@ -96,20 +89,10 @@ pub(crate) fn render(
     out: &std::path::Path,
     stop: &AtomicBool,
 ) -> Result<Outcome, Failure> {
-    let map = setup.map.as_ref();
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout };
-    let dataset = Dataset::create_or_resume(out, &info)?;
+    let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
     let mut sum = Outcome { kept: 0, made: 0, stopped: false };
     for frames in frames {
-        let run = Run {
-            frames: frames.clone(),
-            share: Share::ALL,
-            at_once: setup.threads,
-            threads: Threads::One,
-            check: Check::Sizes,
-            stop,
-            profile: None,
-        };
+        let run = run_of(frames.clone(), setup.threads, stop);
         let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
         sum.kept += outcome.kept;
         sum.made += outcome.made;

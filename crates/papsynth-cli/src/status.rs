@@ -3,11 +3,10 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Dataset, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Home, shards_to_make};
 
 use crate::args::{Merge, Status, check_of};
 use crate::exit::{self, Failure};
-use crate::place;
 use crate::words::{counted, runs};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
@@ -17,7 +16,7 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
         let close = (!there.is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
         return tell(args, &runs(&there.missing), there.shards, close.as_deref());
     }
-    let dataset = Dataset::open(&place::home(&args.dir)?)?;
+    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
         return Err(Failure::wrong(
@@ -51,7 +50,7 @@ fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) ->
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
-    let dataset = Dataset::open(&place::home(&args.dir)?)?;
+    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
     let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {

@@ -7,8 +7,7 @@ use std::path::Path;
 use papsynth_dataset::{Dataset, images_of, write_file};
 
 use crate::args::Sweep;
-use crate::exit::{self, Complaint, Failure};
-use crate::interrupt::Interrupt;
+use crate::exit::{self, Failure};
 use crate::rerender::render;
 use crate::setup::Setup;
 use crate::text_file;
@@ -40,7 +39,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
     let Some(count) = count.filter(|count| *count <= MOST) else {
-        return Err(Failure::input(Complaint::new(format!("more than {MOST} combinations; vary fewer at once"))));
+        return Err(Failure::input(format!("more than {MOST} combinations; vary fewer at once")));
     };
     let (layout, _) = args.layout.layout(args.frames);
     // What one combination cannot be made of is told before any is made.
@@ -48,15 +47,17 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
     is_own(&args.out, count)?;
     let frames = 0..args.frames;
-    let interrupt = Interrupt::watch()?;
-    let mut table = csv_line(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
+    let stop = exit::watch()?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    // Writing to memory cannot fail, and all lines are of one length.
+    let _ = table.write_record(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
     for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
         let name = set_name(number);
         let out = args.out.join(&name);
-        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
+        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, stop)?;
         for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
             let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
-            table.push_str(&csv_line(fixed.into_iter().chain(values.iter().copied())));
+            let _ = table.write_record(fixed.into_iter().chain(values.iter().copied()));
         }
         if !args.quiet {
             let set: Vec<String> =
@@ -65,7 +66,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
         }
     }
     let path = args.out.join(TABLE);
-    write_file(&path, table.as_bytes())?;
+    write_file(&path, &table.into_inner().unwrap_or_default())?;
     if args.quiet { Ok(()) } else { exit::print(&format!("Look at: {}\n", path.display())) }
 }
 
@@ -79,7 +80,7 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Err(error) if error.kind() == ErrorKind::NotADirectory => {
-            return Err(Failure::input(Complaint::new(format!("{}: is a file; a folder is wanted", out.display()))));
+            return Err(Failure::input(format!("{}: is a file; a folder is wanted", out.display())));
         }
         Err(error) => return Err(Failure::file("read", out, &error)),
     };
@@ -105,14 +106,14 @@ fn set_name(number: usize) -> String {
 }
 
 fn axis(text: &str) -> Result<Axis, Failure> {
-    let wrong = || Failure::input(Complaint::new(format!("--vary {text}: expected FIELD=A,B,…")));
+    let wrong = || Failure::input(format!("--vary {text}: expected FIELD=A,B,…"));
     let (field, values) = text.split_once('=').ok_or_else(wrong)?;
     let values = parts(values);
     if field.trim().is_empty() || values.iter().any(String::is_empty) {
         return Err(wrong());
     }
     if let Some(twice) = values.iter().enumerate().find(|(number, value)| values[..*number].contains(value)) {
-        return Err(Failure::input(Complaint::new(format!("--vary {text}: {} stands there twice", twice.1))));
+        return Err(Failure::input(format!("--vary {text}: {} stands there twice", twice.1)));
     }
     Ok(Axis { field: field.trim().to_owned(), values })
 }
@@ -160,15 +161,6 @@ fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure>
     Setup::load(&engine, None)
 }
 
-/// A line of a table; a value with a comma or a quote is quoted.
-fn csv_line<'a>(values: impl Iterator<Item = &'a str>) -> String {
-    let cell = |value: &str| match value.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", value.replace('"', "\"\"")),
-        false => value.to_owned(),
-    };
-    format!("{}\n", values.map(cell).collect::<Vec<_>>().join(","))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -181,7 +173,6 @@ mod tests {
         assert_eq!(all[1], ["1", "y"]);
         assert_eq!(all[5], ["2", "z"]);
         assert!(axis("a").is_err() && axis("a=").is_err() && axis("=1").is_err());
-        assert_eq!(csv_line(["a", "b,c", "d\"e"].into_iter()), "a,\"b,c\",\"d\"\"e\"\n");
     }
 
     #[test]

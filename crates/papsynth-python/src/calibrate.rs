@@ -3,16 +3,12 @@
 use papsynth_calibrate::{
     Calibration, Edge, EdgeAt, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt, Window,
 };
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::array::{Given, nth, pixels, pixels_within};
+use crate::error::wrong;
 use crate::pool;
-
-fn wrong(error: impl std::fmt::Display) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
 
 /// What `papsynth.calibrate_microscope` gives, as JSON.
 ///

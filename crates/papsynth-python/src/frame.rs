@@ -8,7 +8,6 @@ use papsynth::Plane;
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
 use papsynth_dataset::{Column, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -298,7 +297,7 @@ pub(crate) fn restored(
             "this frame was pickled in version {version} of its form; this papsynth reads {}",
             pickled::VERSION
         );
-        return Err(PyValueError::new_err(message));
+        return Err(error::wrong(message));
     }
     let ((seed, index, slide), (pixel_um, planes_um, bits, [width, height])) = (key, scale);
     let [image, stack, noise_free] = arrays;

@@ -1,16 +1,12 @@
 //! How much synthetic fields are like real ones.
 
 use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::array::{Given, nth, pixels, points};
+use crate::error::wrong;
 use crate::pool;
-
-fn wrong(error: impl std::fmt::Display) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
 
 /// The report of `papsynth.judge`, as JSON.
 ///

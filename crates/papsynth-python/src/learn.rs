@@ -1,11 +1,11 @@
 //! Classes of cells, learned from images and outlines.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::array::{Given, nth, pixels, pixels_within, points};
 use crate::engine::read_model;
+use crate::error::wrong;
 
 /// A model with a class that is learned, as JSON.
 ///
@@ -53,7 +53,7 @@ pub(crate) fn learn(
     let cytoplasm_outlines = outlines("cytoplasm_outlines", cytoplasm_outlines)?;
     if nuclei.is_empty() && nucleus_outlines.is_empty() && cytoplasm_outlines.is_empty() {
         let message = "nuclei, nucleus_outlines, cytoplasm_outlines: none is given; expected some material";
-        return Err(PyValueError::new_err(message));
+        return Err(wrong(message));
     }
     let material =
         Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cytoplasm_outlines };
@@ -66,7 +66,7 @@ pub(crate) fn learn(
         donors: if numbers_only { Donors::NumbersOnly } else { Donors::Keep },
     };
     let learned = py.detach(|| papsynth::learn::learn(&base, &material, &params));
-    Ok(learned.map_err(|error| PyValueError::new_err(error.to_string()))?.to_json())
+    Ok(learned.map_err(|error| wrong(error))?.to_json())
 }
 
 fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<NucleusImage> {
@@ -75,7 +75,7 @@ fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<Nucle
     let (mask, mask_width) = pixels_within(&format!("{name}[1]"), mask, [0.0, 1.0])?;
     if (light.len(), width) != (mask.len(), mask_width) {
         let [image, mask] = [(&light, width), (&mask, mask_width)].map(|(values, width)| (values.len() / width, width));
-        return Err(PyValueError::new_err(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
+        return Err(wrong(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
     }
     let mask = mask.into_iter().map(|inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect();
     Ok(NucleusImage { name, light, mask, width })
@@ -87,7 +87,7 @@ fn outlines(name: &str, outlines: Option<Vec<Given<'_>>>) -> PyResult<Vec<Vec<[f
         let name = nth(name, number);
         let outline = points(&name, outline)?;
         match outline.len() {
-            0..3 => Err(PyValueError::new_err(format!("{name}: {} points; expected 3 or more", outline.len()))),
+            0..3 => Err(wrong(format!("{name}: {} points; expected 3 or more", outline.len()))),
             _ => Ok(outline),
         }
     };

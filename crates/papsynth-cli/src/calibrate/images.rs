@@ -9,7 +9,7 @@ use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams,
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
 /// The subfolder of dark frames.
 const DARK: &str = "dark";
@@ -39,7 +39,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
             Error::Window { .. } => {
                 "--window X,Y,W,H: left and top from 0, width and height from 8 pixels, inside the image"
             }
-            _ => return Failure::input(Complaint::new(format!("--stack {name}: {error}"))),
+            _ => return Failure::input(format!("--stack {name}: {error}")),
         };
         Failure::wrong(format!("--stack {name}: {error}"), help)
     })
@@ -88,13 +88,13 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
             .map(|(name, image)| Frame { name, grey: &image.grey, width: image.width })
             .collect();
         flats.add(name, &frames, *light).map_err(|error| match &error {
-            Error::Sizes { .. } => Failure::wrong(error.to_string(), "all flats and darks must be of one size"),
+            Error::Sizes { .. } => Failure::wrong(error, "all flats and darks must be of one size"),
             Error::Bits { .. } => Failure::wrong(
                 format!("--bits is {bits}, but {error}"),
                 "give the bits of the camera's converter, 8 to 16",
             ),
-            Error::Level { .. } => Failure::wrong(error.to_string(), "a level is two frames or more of the same light"),
-            _ => Failure::input(Complaint::new(error.to_string())),
+            Error::Level { .. } => Failure::wrong(error, "a level is two frames or more of the same light"),
+            _ => Failure::input(error),
         })?;
     }
     flats.map_or(Err(Error::Camera(NoDark)), |(flats, _)| flats.camera()).map_err(|error| {

@@ -10,12 +10,10 @@ use papsynth_dataset::{Check, Share};
 
 use crate::args::{SlideFinalize, SlideMake, check_of};
 use crate::exit::{self, Failure};
-use crate::findings;
-use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
-use crate::share;
+use crate::verify::{judge, print_findings};
 use crate::words::counted;
 
 pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
@@ -29,11 +27,8 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     setup.threads = fitting(&args, &setup, shard_px)?;
     let seed = args.engine.seed;
     let slide = setup.slide(seed, args.slide)?;
-    let share = match args.share.shard {
-        Some(shards) => share::of(shards)?,
-        None => Share::ALL,
-    };
-    let interrupt = Interrupt::watch()?;
+    let share = args.share.share()?;
+    let stop = exit::watch()?;
     #[cfg(feature = "parquet")]
     let objects_parquet = !args.no_parquet;
     #[cfg(not(feature = "parquet"))]
@@ -43,7 +38,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
     let check = check_of(args.verify);
-    let run = SlideRun { share, threads, check, stop: interrupt.flag() };
+    let run = SlideRun { share, threads, check, stop };
     let bar = Bar::start(args.quiet);
     let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
         let [done, all] = progress.done;
@@ -126,7 +121,7 @@ pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     } else if findings.is_empty() {
         exit::print(&format!("{}: whole\n", dir.display()))?;
     } else {
-        findings::print(&findings)?;
+        print_findings(&findings)?;
     }
-    findings::judge(dir, &findings)
+    judge(dir, &findings)
 }

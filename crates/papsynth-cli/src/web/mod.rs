@@ -1,12 +1,12 @@
 //! Pages on this machine.
 
 pub(crate) mod study;
-pub(crate) mod view;
 
 use std::process::{Command, Stdio};
 
-use papsynth_web::Error;
+use papsynth_web::Server;
 
+use crate::args::View;
 use crate::exit::{self, Failure};
 
 /// Opens a page with what the system opens pages with; if it cannot, the address stands above.
@@ -24,8 +24,15 @@ fn open(address: &str) {
     }
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::of(&error, error.is_io())
+/// `papsynth view`: a data set or a slide in the browser.
+pub(crate) fn view(args: &View) -> Result<(), Failure> {
+    let view = papsynth_web::View::open(&args.dir)?;
+    let server = Server::bind(args.port.unwrap_or(0))?;
+    let stop = exit::watch()?;
+    let address = server.address();
+    exit::print(&format!("{}: a {}\nOpen {address} in a browser. Ctrl-C ends.\n", args.dir.display(), view.kind()))?;
+    if args.open {
+        open(&address);
     }
+    Ok(server.run(view, stop, |_| ())?)
 }

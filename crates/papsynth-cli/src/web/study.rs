@@ -1,12 +1,11 @@
 //! `papsynth study`: can people tell?
 
-use papsynth_study::{Error, Interval, Pool, Session, Side, StudyParams, Summary, breakdown_table, table};
-use papsynth_web::{Server, serve_study};
+use papsynth_study::{Interval, Pool, Session, Side, StudyParams, Summary, breakdown_table, table};
+use papsynth_web::{Error, Server, serve_study};
 
 use super::open;
 use crate::args::Study;
 use crate::exit::{self, Complaint, Failure};
-use crate::interrupt::Interrupt;
 
 pub(crate) fn run(args: &Study) -> Result<(), Failure> {
     let (Some(real), Some(synthetic)) = (&args.real, &args.synthetic) else {
@@ -26,12 +25,12 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
         real_pixel_um: args.pixel_um,
         synthetic_pixel_um: args.synthetic_pixel_um,
     };
-    let session = Session::open(&params, real, synthetic, &args.out)?;
+    let session = Session::open(&params, real, synthetic, &args.out).map_err(Error::from)?;
     let server = match args.port {
         Some(port) => Server::bind(port)?,
         None => Server::bind_near(session.port())?,
     };
-    let interrupt = Interrupt::watch()?;
+    let stop = exit::watch()?;
     let folder = session.folder().display().to_string();
     session.notes().iter().for_each(|note| exit::note(note));
     exit::print(&announcement(&session, &server))?;
@@ -39,7 +38,7 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
         open(&server.address());
     }
     let mut all_answered = session.is_finished();
-    serve_study(server, session, interrupt.flag(), |session| {
+    serve_study(server, session, stop, |session| {
         all_answered = true;
         // Whoever closed the pipe reads the page or the files.
         let _ = exit::print(&format!(
@@ -84,7 +83,7 @@ fn claim(trials: u64) -> String {
 
 /// All subjects in a folder.
 fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
-    let pool = Pool::read(folder)?;
+    let pool = Pool::read(folder).map_err(Error::from)?;
     if as_json {
         return exit::print(&format!("{}\n", serde_json::to_string_pretty(&pool).unwrap_or_default()));
     }
@@ -112,10 +111,4 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
         text.push_str(&format!("\nright answers by parameter\n{breakdown}"));
     }
     exit::print(&text)
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::of(&error, error.is_io())
-    }
 }

@@ -1,4 +1,7 @@
-//! HTTP on loopback.
+//! HTTP on 127.0.0.1, for pages of this machine alone.
+
+mod gate;
+mod message;
 
 use std::convert::Infallible;
 use std::io;
@@ -16,9 +19,9 @@ use hyper::{Method, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::sync::Semaphore;
 
-use super::gate::Gate;
-use super::message::{LONGEST_BODY, Reply, Request};
 use crate::error::Error;
+use gate::Gate;
+pub use message::{JSON, LONGEST_BODY, Reply, Request};
 
 /// How often it is looked whether the server is to end.
 const LOOK: Duration = Duration::from_millis(100);

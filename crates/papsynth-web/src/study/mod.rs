@@ -1,4 +1,5 @@
-//! What is answered to a request. No network and no files of the study's folders: everything that can be sent lies in memory.
+//! The visual study: what is answered to a request. No network and no files of the study's folders: everything that can be
+//! sent lies in memory.
 
 use std::sync::atomic::AtomicBool;
 
@@ -65,33 +66,7 @@ pub fn serve_study(
 
 impl Site for Study {
     fn reply(&mut self, request: &Request) -> Reply {
-        if let Some(file) = page::file(&PAGE, request.target) {
-            return if request.method == "GET" { file } else { Reply::method("GET") };
-        }
-        match (request.method, request.target) {
-            ("GET", "/state") => Reply::json(&self.session.state()),
-            ("GET", "/result") if self.session.is_finished() => Reply::json(&self.session.summary()),
-            ("GET", "/result") => Reply::refusal(409, "there is no result before the last answer"),
-            ("GET", target) if target.starts_with(PATCH) => self.patch(&target[PATCH.len()..]),
-            ("POST", "/shown") => match request.json::<Shown>() {
-                Ok(Shown { patch, exposure }) => {
-                    let outcome = self.session.shown(&patch, exposure);
-                    self.after(outcome)
-                }
-                Err(refusal) => refusal,
-            },
-            ("POST", "/answer") => match request.json::<Said>() {
-                Ok(Said { patch, answer, response_ms }) => {
-                    let outcome = self.session.answer(&patch, answer, response_ms);
-                    self.after(outcome)
-                }
-                Err(refusal) => refusal,
-            },
-            (_, "/state" | "/result") => Reply::method("GET"),
-            (_, "/shown" | "/answer") => Reply::method("POST"),
-            (_, target) if target.starts_with(PATCH) => Reply::method("GET"),
-            _ => Reply::refusal(404, "there is nothing here"),
-        }
+        page::file(&PAGE, request).unwrap_or_else(|| self.answer(request).unwrap_or_else(|refusal| refusal))
     }
 }
 
@@ -102,26 +77,38 @@ impl Study {
         Self { session }
     }
 
-    fn patch(&mut self, name: &str) -> Reply {
-        match self.session.patch(name) {
-            Ok(png) => Reply::png(png.to_vec()),
-            Err(refusal) => refused(refusal),
-        }
-    }
-
-    /// What is asked next, or why what came was not taken.
-    fn after(&self, outcome: Result<(), Refusal>) -> Reply {
-        match outcome {
-            Ok(()) => Reply::json(&self.session.state()),
-            Err(refusal) => refused(refusal),
+    fn answer(&mut self, request: &Request) -> Result<Reply, Reply> {
+        match (request.method, request.target) {
+            ("GET", "/state") => Ok(Reply::json(&self.session.state())),
+            ("GET", "/result") if self.session.is_finished() => Ok(Reply::json(&self.session.summary())),
+            ("GET", "/result") => Err(Reply::refusal(409, "there is no result before the last answer")),
+            ("GET", target) if target.starts_with(PATCH) => {
+                Ok(Reply::png(self.session.patch(&target[PATCH.len()..])?.to_vec()))
+            }
+            ("POST", "/shown") => {
+                let Shown { patch, exposure } = request.json()?;
+                self.session.shown(&patch, exposure)?;
+                Ok(Reply::json(&self.session.state()))
+            }
+            ("POST", "/answer") => {
+                let Said { patch, answer, response_ms } = request.json()?;
+                self.session.answer(&patch, answer, response_ms)?;
+                Ok(Reply::json(&self.session.state()))
+            }
+            (_, "/state" | "/result") => Err(Reply::method("GET")),
+            (_, "/shown" | "/answer") => Err(Reply::method("POST")),
+            (_, target) if target.starts_with(PATCH) => Err(Reply::method("GET")),
+            _ => Err(Reply::refusal(404, "there is nothing here")),
         }
     }
 }
 
-fn refused(refusal: Refusal) -> Reply {
-    match refusal {
-        Refusal::Stale => Reply::refusal(409, "this is not what is asked now"),
-        Refusal::Nonsense => Reply::refusal(400, "this is nothing that the page sends"),
-        Refusal::NotWritten(error) => Reply::refusal(500, &format!("it could not be kept: {error}")),
+impl From<Refusal> for Reply {
+    fn from(refusal: Refusal) -> Self {
+        match refusal {
+            Refusal::Stale => Self::refusal(409, "this is not what is asked now"),
+            Refusal::Nonsense => Self::refusal(400, "this is nothing that the page sends"),
+            Refusal::NotWritten(error) => Self::refusal(500, &format!("it could not be kept: {error}")),
+        }
     }
 }

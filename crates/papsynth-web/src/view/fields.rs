@@ -7,11 +7,10 @@ use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
 use papsynth_dataset::{Dataset, FramePlace, FrameSummary};
 use serde_json::{Value, json};
 
-use super::encode::png;
 use super::grid::Grid;
 use super::labels::{Ids, colour_text};
 use super::levels::Levels;
-use super::source::{At, Picture, Source, check_pixel, check_plane};
+use super::source::{At, Picture, Source, check_pixel, check_plane, png};
 use crate::server::Reply;
 
 /// Side of a tile, px.

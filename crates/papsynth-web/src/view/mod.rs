@@ -1,4 +1,12 @@
-//! What is answered to the page.
+//! Data sets and slides, with their truth over them: what is answered to the page.
+
+mod fields;
+mod grid;
+mod labels;
+mod levels;
+#[cfg(feature = "zarr")]
+mod slide;
+mod source;
 
 use std::path::Path;
 
@@ -6,11 +14,11 @@ use papsynth::truth::Group;
 use papsynth_dataset::Dataset;
 use serde_json::json;
 
-use super::fields::Fields;
-use super::source::{At, Source};
 use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Site};
+use fields::Fields;
+use source::{At, Source};
 
 /// The files of the page.
 const PAGE: [File; 4] = [
@@ -69,13 +77,11 @@ impl View {
 
 impl Site for View {
     fn reply(&mut self, request: &Request) -> Reply {
-        match request.method {
-            "GET" => match page::file(&PAGE, request.target) {
-                Some(file) => file,
-                None => self.answer(request.target).unwrap_or_else(|refusal| refusal),
-            },
-            _ => Reply::method("GET"),
+        if request.method != "GET" {
+            return Reply::method("GET");
         }
+        let answer = || self.answer(request.target).unwrap_or_else(|refusal| refusal);
+        page::file(&PAGE, request).unwrap_or_else(answer)
     }
 }
 
@@ -91,15 +97,19 @@ fn source(path: &Path) -> Result<Box<dyn Source>, Error> {
     }
     if !path.join("manifest.json").is_file() {
         let what = if path.is_dir() { "holds neither a data set nor a slide" } else { "there is no such folder" };
-        return Err(Error::folder(path, format!("{what}; expected a folder of `papsynth generate` or `slide make`")));
+        return Err(folder(path, format!("{what}; expected a folder of `papsynth generate` or `slide make`")));
     }
     let dataset = Dataset::open(path)?;
     let formats = &dataset.layout().formats;
     let needs: Option<Vec<&str>> = formats.iter().map(|format| format.needs()).collect();
     match needs.as_deref() {
-        Some([feature, ..]) => Err(Error::folder(path, format!("{} needs {}", formats[0].name(), built_with(feature)))),
+        Some([feature, ..]) => Err(folder(path, format!("{} needs {}", formats[0].name(), built_with(feature)))),
         _ => Ok(Box::new(Fields::new(dataset))),
     }
+}
+
+fn folder(path: &Path, message: String) -> Error {
+    papsynth_dataset::Error::Folder { path: path.to_owned(), message }.into()
 }
 
 fn built_with(feature: &str) -> String {
@@ -108,12 +118,12 @@ fn built_with(feature: &str) -> String {
 
 #[cfg(feature = "zarr")]
 fn slide(path: &Path) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(super::slide::Slide::new(papsynth_dataset::slide::SlideSet::open(path)?)))
+    Ok(Box::new(slide::Slide::new(papsynth_dataset::slide::SlideSet::open(path)?)))
 }
 
 #[cfg(not(feature = "zarr"))]
 fn slide(path: &Path) -> Result<Box<dyn Source>, Error> {
-    Err(Error::folder(path, format!("a slide needs {}", built_with("zarr"))))
+    Err(folder(path, format!("a slide needs {}", built_with("zarr"))))
 }
 
 /// A number as the page writes it: digits alone, and not too many.
