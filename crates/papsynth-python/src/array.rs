@@ -70,7 +70,6 @@ pub(crate) fn points(name: &str, points: &Given<'_>) -> PyResult<Vec<[f64; 2]>> 
     Ok(values.as_chunks::<2>().0.to_vec())
 }
 
-/// One of a list.
 pub(crate) fn nth(name: &str, number: usize) -> String {
     format!("{name}[{number}]")
 }

@@ -21,13 +21,10 @@ use crate::error::wrong;
 use crate::frame::Frame;
 use crate::{convert, error, pool};
 
-/// Largest recipe that is read.
 const LARGEST_RECIPE: u64 = 1 << 20;
 
-/// Largest model that is read.
 const LARGEST_MODEL: u64 = 1 << 28;
 
-/// Largest scene that is read.
 const LARGEST_SCENE: u64 = 1 << 30;
 
 /// Makes the images of one recipe.
@@ -53,12 +50,10 @@ const LARGEST_SCENE: u64 = 1 << 30;
 pub(crate) struct Engine {
     pub(crate) engine: Arc<papsynth::Engine>,
     pub(crate) model: Model,
-    /// The map that the recipe names.
     pub(crate) map: Option<InputFile>,
     pub(crate) source: String,
 }
 
-/// What stops a rendering.
 enum Stop {
     Engine(papsynth::Error),
     Python(PyErr),
@@ -205,7 +200,6 @@ fn render(engine: &papsynth::Engine, scene: Scene, threads: Threads) -> Result<p
     Ok(papsynth::Frame { planes, finished })
 }
 
-/// A recipe, and where it comes from.
 pub(crate) struct Source {
     pub(crate) recipe: Recipe,
     /// Files that it names are relative to this.
@@ -300,12 +294,7 @@ pub(crate) fn recipe_schema() -> String {
     Recipe::schema().to_string()
 }
 
-/// A recipe with everything that was left out, as TOML.
-///
-/// Parameters
-/// ----------
-/// recipe : None, str, os.PathLike or dict
-///     As of `Engine`.
+/// A recipe, as of `Engine`, with everything that was left out, as TOML.
 #[pyfunction]
 #[pyo3(signature = (recipe=None))]
 pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<String> {

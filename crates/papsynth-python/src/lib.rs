@@ -7,7 +7,6 @@ mod convert;
 mod engine;
 mod error;
 mod frame;
-mod judge;
 mod learn;
 mod pickled;
 mod pool;
@@ -30,8 +29,7 @@ mod _native {
         calibrate::{calibrate_camera, calibrate_microscope},
         engine::{Engine, identity, recipe_schema, resolve},
         frame::{Frame, restored},
-        judge::judge,
-        learn::learn,
+        learn::{judge, learn},
         pool::after_fork,
         sets::{generate, merge, missing, shards, verify},
         techniques::{cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture},

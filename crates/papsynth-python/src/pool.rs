@@ -8,7 +8,6 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::wrong;
 
-/// Most threads of a pool.
 const MOST: usize = 1024;
 
 /// The pool of the process of that number, with so many threads.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use papsynth::Threads;
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Home, Layout, Progress, Run, Share, shards_to_make};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{IntoPyDict, PyDict, PyList};
 
 use crate::engine::Engine;
 use crate::error::{self, wrong};
@@ -19,40 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Most frames whose shards are listed.
 const MOST_FRAMES: u64 = 1_000_000_000;
 
-/// Makes the frames of a data set that are not whole there, or a part of them.
-///
-/// Parameters
-/// ----------
-/// engine : Engine
-/// out : str or os.PathLike
-///     New, empty, or a data set of the same recipe, seed and formats.
-/// frames : int
-///     Frames that there will be in all, by all parts.
-/// seed : int
-/// shard : tuple of int
-///     (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
-/// formats : list of str
-///     Such as "folder" or "webdataset", as of the command line.
-/// frames_per_shard : int, optional
-///     Frames that are written and made again together; by default as of the command line.
-/// threads : int
-///     Frames that are made side by side.
-/// verify : bool
-///     Whether files that are there are read, rather than their sizes compared.
-/// progress : callable, optional
-///     Called with the index of each frame that is done.
-///
-/// Returns
-/// -------
-/// dict
-///     Numbers of frames that were "kept" and "made".
-///
-/// Raises
-/// ------
-/// OSError
-///     If the system refuses to write; what is written is whole, and the same call goes on.
-/// ValueError
-///     If the folder holds something else.
+/// What `papsynth.generate` does, where what is given is described: numbers of frames that were "kept" and "made".
 #[pyfunction]
 #[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -138,10 +105,7 @@ pub(crate) fn generate<'py>(
         papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
         other => error::dataset(&other),
     })?;
-    let told = PyDict::new(py);
-    told.set_item("kept", outcome.kept)?;
-    told.set_item("made", outcome.made)?;
-    Ok(told)
+    [("kept", outcome.kept), ("made", outcome.made)].into_py_dict(py)
 }
 
 fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
@@ -173,18 +137,7 @@ pub(crate) fn shards(frames: u64, formats: Option<Vec<String>>, frames_per_shard
     Ok(frames.div_ceil(layout(formats, frames_per_shard)?.frames_per_shard))
 }
 
-/// Closes a data set: fails on any gap, writes the files about all frames.
-///
-/// Parameters
-/// ----------
-/// out : str or os.PathLike
-/// frames : int
-///     Frames that must be there.
-///
-/// Returns
-/// -------
-/// str
-///     The root hash: two data sets of one root hash are the same.
+/// What `papsynth.merge` does: the root hash.
 #[pyfunction]
 pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<String> {
     let gaps = missing(py, out.clone(), frames)?;
@@ -211,12 +164,7 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
     Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 
-/// Reads every file of a data set.
-///
-/// Returns
-/// -------
-/// dict
-///     "root", the root hash or None; numbers of "frames" and "files"; "findings", a list of (path, what is wrong).
+/// What `papsynth.verify` gives, where it is described.
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {

@@ -13,7 +13,6 @@ use crate::error::wrong;
 /// Most pixels of an image that is made here.
 const MOST_PIXELS: usize = 1 << 30;
 
-/// Most points of an outline.
 const MOST_POINTS: usize = 1 << 20;
 
 /// Most points of an outline that a cell is made of.
@@ -505,16 +504,12 @@ fn transmittance<'py>(
     light_green: Option<Given<'py>>,
     orange_g: Option<Given<'py>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    use dye_spectra::{Colour, ColourParams, DYES, Dye};
-    let given = [
-        (Dye::Haematein, "haematein", haematein),
-        (Dye::EosinY, "eosin_y", eosin_y),
-        (Dye::LightGreen, "light_green", light_green),
-        (Dye::OrangeG, "orange_g", orange_g),
-    ];
+    use dye_spectra::{Colour, ColourParams, DYES};
+    // In the order of `Dye::ALL`, without the last of them, which is neutral.
+    let given = [("haematein", haematein), ("eosin_y", eosin_y), ("light_green", light_green), ("orange_g", orange_g)];
     let mut planes: [Vec<f32>; DYES] = Default::default();
     let mut shape: Option<[usize; 2]> = None;
-    for (dye, name, plane) in given {
+    for ((name, plane), place) in given.into_iter().zip(&mut planes) {
         let Some(plane) = plane else { continue };
         let (values, width) = pixels_within(name, &plane, NOT_NEGATIVE)?;
         let own = [values.len() / width, width];
@@ -522,9 +517,7 @@ fn transmittance<'py>(
             return Err(wrong(format!("{name}: {own:?} is another shape than that of the others")));
         }
         shape = Some(own);
-        if let Some(place) = Dye::ALL.iter().position(|known| *known == dye) {
-            planes[place] = values;
-        }
+        *place = values;
     }
     let Some([rows, width]) = shape else {
         return Err(wrong("at least one dye is needed"));
