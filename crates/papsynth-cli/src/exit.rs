@@ -19,14 +19,18 @@ const IO: u8 = 74;
 const INTERRUPTED: u8 = 130;
 
 /// What is wrong, and where.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
 pub(crate) struct Complaint {
     message: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     help: Option<String>,
-    excerpt: Option<Excerpt>,
-    /// What the complaint sums up; each is reported on its own.
-    related: Vec<Complaint>,
+    #[serde(rename = "at", skip_serializing_if = "Option::is_none")]
     place: Option<Place>,
+    /// What the complaint sums up; each is reported on its own.
+    #[serde(rename = "because", skip_serializing_if = "Vec::is_empty")]
+    related: Vec<Complaint>,
+    #[serde(skip)]
+    excerpt: Option<Excerpt>,
 }
 
 impl Complaint {
@@ -34,7 +38,6 @@ impl Complaint {
         Self { message: message.to_string(), help: None, excerpt: None, related: Vec::new(), place: None }
     }
 
-    /// Adds what would help.
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
@@ -57,23 +60,8 @@ impl Complaint {
             _ => Self { related: complaints, ..Self::new(heading) },
         }
     }
-
-    fn json(&self) -> serde_json::Value {
-        let mut value = serde_json::json!({ "message": self.message });
-        if let Some(help) = &self.help {
-            value["help"] = help.as_str().into();
-        }
-        if let Some(place) = &self.place {
-            value["at"] = serde_json::json!(place);
-        }
-        if !self.related.is_empty() {
-            value["because"] = self.related.iter().map(Self::json).collect();
-        }
-        value
-    }
 }
 
-/// A complaint and the exit code it ends the program with.
 #[derive(Debug)]
 pub(crate) struct Failure {
     code: u8,
@@ -138,7 +126,7 @@ impl Failure {
 
     /// The same as a JSON object.
     pub(crate) fn json(&self) -> serde_json::Value {
-        let mut value = self.complaint.json();
+        let mut value = serde_json::json!(self.complaint);
         value["event"] = "error".into();
         value["exit"] = self.code.into();
         value
@@ -180,7 +168,7 @@ pub(crate) fn watch() -> Result<&'static AtomicBool, Failure> {
 }
 
 /// Says on standard error what is no failure and may surprise.
-pub(crate) fn note(text: &str) {
+pub(crate) fn note(text: impl Display) {
     // Whoever has closed it does not want to know.
     let _ = writeln!(io::stderr().lock(), "note: {text}");
 }

@@ -2,7 +2,7 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::memory::{Fit, Need, shown};
+use papsynth_dataset::memory::{Fit, Need};
 use papsynth_dataset::{Dataset, Error, Home, Layout, Progress as Step, Run, Share};
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
 
     if chosen && !args.quiet {
         let most = LayoutArgs::MOST_IN_FOLDERS;
-        exit::note(&format!(
+        exit::note(format!(
             "more than {most} frames are written as webdataset, in tar files; --format folder forces single files"
         ));
     }
@@ -75,18 +75,15 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
 
 /// How the run goes with the memory that it may use; of `few` shards, if there are fewer than threads.
 fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, Failure> {
-    let need = Need::of(&setup.recipe.recipe, layout);
-    let (shared, at_once) = (few.is_some() && setup.threads > 1, few.map_or(setup.threads, |_| 1));
-    let budget = memory::budget(args.max_memory);
-    let Some(fit) = need.fit(at_once, shared, budget) else {
-        return Err(memory::refuse(&need, &setup.recipe.recipe, budget.unwrap_or_default(), args.max_memory.is_some()));
-    };
-    if (fit.at_once, fit.shared) != (at_once, shared) {
-        let all = setup.threads;
-        let may = shown(budget.unwrap_or_default() as f64);
-        exit::note(&format!("{} of {all} threads make frames, so that they fit into {may}", fit.at_once));
-    }
-    Ok(fit)
+    let recipe = &setup.recipe.recipe;
+    let need = Need::of(recipe, layout);
+    let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
+    memory::fit(&need, setup.threads, wanted, args.max_memory, |budget| {
+        let source = if args.max_memory.is_some() { "--max-memory" } else { "80 % of what is available" };
+        let help = "smaller fields, fewer cells, one plane, grey light and less oversampling need less; \
+                    --max-memory allows more";
+        Failure::wrong(format!("{} ({source})", need.too_large(recipe, budget)), help)
+    })
 }
 
 /// A frame of the right size that cannot be read.

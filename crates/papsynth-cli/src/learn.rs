@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Learn) -> Result<(), Failure> {
         source: args.source.clone().unwrap_or_else(|| source(args)),
         donors: if args.numbers_only { Donors::NumbersOnly } else { Donors::Keep },
     };
-    let model = learn(&base, &material, &params).map_err(|error| Failure::input(error))?;
+    let model = learn(&base, &material, &params).map_err(Failure::input)?;
     write_file(&args.out, model.to_json().as_bytes())?;
     let read = [
         (nuclei.len(), "images of nuclei"),

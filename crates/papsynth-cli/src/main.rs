@@ -1,11 +1,9 @@
 #![doc = include_str!("../README.md")]
 #![deny(unsafe_code)]
 
-mod allocator;
 mod args;
 #[cfg(feature = "calibrate")]
 mod calibrate;
-mod convert;
 mod excerpt;
 mod exit;
 mod generate;
@@ -32,7 +30,6 @@ mod status;
 mod submit;
 mod sweep;
 mod text_file;
-mod verify;
 #[cfg(feature = "web")]
 mod web;
 mod words;
@@ -45,7 +42,7 @@ use args::{Cli, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
-    allocator::settle();
+    memory::settle();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -85,18 +82,18 @@ fn run(verb: Verb) -> Result<(), Failure> {
         #[cfg(feature = "judge")]
         Verb::Match(args) => match_fields::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
-        Verb::Verify(args) => verify::run(&args),
-        Verb::Convert(args) => convert::run(&args),
+        Verb::Verify(args) => status::verify(&args),
+        Verb::Convert(args) => rerender::convert(&args),
         Verb::Rerender(args) => rerender::run(&args),
         Verb::Sweep(args) => sweep::run(&args),
         Verb::Plan(args) => plan::run(&args),
         Verb::Submit(args) => submit::run(&args),
         Verb::Status(args) => status::run(&args),
         Verb::Merge(args) => status::merge(&args),
-        Verb::Clean(args) => verify::clean(&args),
+        Verb::Clean(args) => status::clean(&args),
         Verb::Slide(args) => slide::run(args.verb),
         #[cfg(feature = "web")]
-        Verb::Study(args) => web::study::run(&args),
+        Verb::Study(args) => web::study(&args),
         #[cfg(feature = "web")]
         Verb::View(args) => web::view(&args),
         Verb::Schema(_) => {

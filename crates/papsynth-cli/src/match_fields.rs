@@ -27,7 +27,6 @@ const WINDOWS: usize = 8;
 /// Fewest recipes of a table.
 const LEAST_RECIPES: usize = 30;
 
-/// Rounds of the search.
 const ROUNDS: usize = 8;
 const QUICK_ROUNDS: usize = 3;
 
@@ -103,7 +102,6 @@ fn refuse(error: &Error, real: &std::path::Path) -> Failure {
     }
 }
 
-/// What was found, as a table.
 fn told(fit: &Fit) -> String {
     let begun = if fit.extended {
         "these fields are fused: begun from the preset as a scanner that fuses planes shows it\n"

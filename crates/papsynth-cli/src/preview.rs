@@ -15,7 +15,6 @@ use crate::text_file;
 /// Pixels between the two halves.
 const GAP: usize = 8;
 
-/// Grey of the gap.
 const GAP_GREY: u8 = 255;
 
 pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
@@ -49,7 +48,6 @@ fn beside(plane: &Plane, finished: &Finished) -> Picture {
     Picture { width: 2 * width + GAP, rgb }
 }
 
-/// Largest scene that is read.
 const LARGEST_SCENE: u64 = 1 << 30;
 
 /// `papsynth render`: the image of one scene.

@@ -15,7 +15,6 @@ use crate::text_file;
 /// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
 const LARGEST: u64 = 1 << 20;
 
-/// Most faults that are listed.
 const MOST_FAULTS: usize = 12;
 
 /// A recipe, and where its fields were written.
@@ -38,7 +37,6 @@ struct Sources {
 /// A `--set a.b=value`.
 #[derive(Debug)]
 struct Set {
-    /// As it was given.
     argument: Arc<String>,
     /// The key before its `=`.
     key: String,
@@ -46,7 +44,6 @@ struct Set {
     value_at: usize,
     /// What it sets, as a table of tables.
     table: Table,
-    /// The path it sets.
     path: Vec<String>,
 }
 

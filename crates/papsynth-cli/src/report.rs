@@ -16,7 +16,6 @@ use crate::words::counted;
 /// Lines that a run prints at most, however many frames it makes.
 const MOST_LINES: u64 = 100;
 
-/// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Style {
     Bar,
@@ -97,7 +96,6 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
     }
@@ -152,7 +150,6 @@ impl Bar {
         }
     }
 
-    /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
     }

@@ -1,16 +1,16 @@
-//! `papsynth rerender`: the same scenes under another microscope.
+//! `papsynth rerender` and `papsynth convert`: a data set of another, under another microscope or in other formats.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Dataset, Layout, Outcome, frames_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, Progress, frames_of, truth_differs};
 use toml::Table;
 
-use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
+use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, Failure};
 use crate::setup::{Setup, run_of};
-use crate::words::runs;
+use crate::words::{counted, runs};
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
@@ -20,7 +20,9 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let frames = frames_of(&source)?;
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
-    if before.recipe.recipe.to_toml() != source_recipe(&source)? {
+    let path = source.path().join("recipe.toml");
+    let recipe = std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))?;
+    if before.recipe.recipe.to_toml() != recipe {
         return Err(Failure::wrong(
             format!("{}: this program reads its recipe otherwise", args.dir.display()),
             "a data set is rendered again by the release that made it",
@@ -50,6 +52,24 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     exit::print(&format!("{out}: {made} frames made, {kept} were there; the truth is that of {dir}\n"))
 }
 
+/// `papsynth convert`: a data set in other formats.
+pub(crate) fn convert(args: &Convert) -> Result<(), Failure> {
+    let layout = args.files.layout(args.format.clone());
+    let stop = exit::watch()?;
+    let report = |_: Progress| ();
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &report)?;
+    let out = args.out.display();
+    if outcome.stopped {
+        let message = format!("stopped; every file in {out} is whole");
+        return Err(Failure::stopped(message, "write"));
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
+    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.made, "frame", "frames")))
+}
+
 /// The engine of the data set's recipe, with what is set over it or without.
 fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, Failure> {
     let engine = EngineArgs {
@@ -62,17 +82,11 @@ fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, Failure> {
         },
         model: Some(args.dir.join("model.json")),
         seed,
-        threads: Some(u16::try_from(args::threads(args.threads)).unwrap_or(u16::MAX)),
+        threads: args.threads,
     };
     Setup::load(&engine, None)
 }
 
-fn source_recipe(source: &Dataset) -> Result<String, Failure> {
-    let path = source.path().join("recipe.toml");
-    std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))
-}
-
-/// Names of the sections in which two recipes differ.
 fn changed_sections(before: &Recipe, after: &Recipe) -> Vec<String> {
     let table = |recipe: &Recipe| -> Table { toml::from_str(&recipe.to_toml()).unwrap_or_default() };
     let (before, after) = (table(before), table(after));

@@ -11,7 +11,7 @@ use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Share};
 
-use crate::args::EngineArgs;
+use crate::args::{EngineArgs, threads};
 use crate::exit::{self, Failure};
 use crate::recipe_file::RecipeFile;
 use crate::text_file;
@@ -19,7 +19,6 @@ use crate::text_file;
 /// Largest model that is read: it may hold the textures of thousands of nuclei.
 const LARGEST_MODEL: u64 = 1 << 28;
 
-/// All that frames are made from.
 #[derive(Debug)]
 pub(crate) struct Setup {
     pub(crate) recipe: RecipeFile,
@@ -41,10 +40,8 @@ impl Setup {
             .map_err(|error| Failure::new(error.is_io(), recipe.complaint("layout.path", error.to_string())))?;
         inputs.profile = profile;
         let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
-        for note in recipe.recipe.notes() {
-            exit::note(&note.to_string());
-        }
-        Ok(Self { recipe, model, map, engine, threads: args.threads() })
+        recipe.recipe.notes().iter().for_each(exit::note);
+        Ok(Self { recipe, model, map, engine, threads: threads(args.threads) })
     }
 
     /// What a data set of a seed is made of.
@@ -53,7 +50,6 @@ impl Setup {
         DatasetInfo { recipe, model: &self.model, seed, map, layout }
     }
 
-    /// A slide of a seed.
     pub(crate) fn slide(&self, seed: u64, number: u64) -> Result<papsynth::Slide<'_>, Failure> {
         self.engine.slide(seed, number).map_err(|error| self.recipe.refuse(&error))
     }
@@ -86,7 +82,7 @@ pub(crate) fn run_of(frames: Range<u64>, at_once: usize, stop: &AtomicBool) -> R
 /// Threads of their own, as many as asked for, or one a core.
 #[cfg(feature = "judge")]
 pub(crate) fn pool(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(crate::args::threads(asked)).build();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(asked)).build();
     pool.map_err(|error| Failure::input(format!("cannot start threads: {error}")))
 }
 

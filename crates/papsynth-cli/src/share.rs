@@ -8,7 +8,6 @@ use crate::exit::Failure;
 /// Which shards to make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shards {
-    /// Those of this share.
     Given(Share),
     /// Those that the environment of a Slurm array or of a Kubernetes job says; of how many, where it does not say.
     Environment(Option<u64>),
@@ -35,7 +34,6 @@ impl ShareArgs {
     }
 }
 
-/// A share of the shards.
 fn parse_share(text: &str) -> Result<Shards, String> {
     let expected = "expected I/N with 0 ≤ I < N, such as 0/4, or `auto`, or `auto/N`";
     let number = |part: &str| part.trim().parse::<u64>().map_err(|e| format!("{part:?}: {e}; {expected}"));

@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
         _ => {
             let out = &generate.out;
             if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
-                exit::note(&format!(
+                exit::note(format!(
                     "{} lies in the pod and is lost with it; the volume is mounted at /data, and addresses of object stores need none",
                     out.display()
                 ));
@@ -58,7 +58,7 @@ fn check_here(generate: &Generate) -> Result<(), Failure> {
                     "leave it out; what follows it is meant",
                 ));
             }
-            exit::note(&format!("{} is not on this machine; the tasks must find it", path.display()));
+            exit::note(format!("{} is not on this machine; the tasks must find it", path.display()));
             Ok(())
         }
         _ => Setup::load(&generate.engine, None).map(drop),

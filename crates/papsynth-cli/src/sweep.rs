@@ -12,16 +12,12 @@ use crate::rerender::render;
 use crate::setup::Setup;
 use crate::text_file;
 
-/// Most combinations of a sweep.
 const MOST: usize = 10_000;
 
-/// The name of the table.
 const TABLE: &str = "sweep.csv";
 
-/// Its first columns.
 const COLUMNS: [&str; 4] = ["set", "image", "slide", "file"];
 
-/// A field and the values that it takes.
 struct Axis {
     field: String,
     values: Vec<String>,
@@ -43,7 +39,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     };
     let (layout, _) = args.layout.layout(args.frames);
     // What one combination cannot be made of is told before any is made.
-    let combinations: Vec<Vec<&str>> = (0..count).map(|number| combination(&axes, number)).collect();
+    let combinations = combinations(&axes);
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
     is_own(&args.out, count)?;
     let frames = 0..args.frames;
@@ -100,7 +96,6 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The name of a data set of a sweep.
 fn set_name(number: usize) -> String {
     format!("{number:04}")
 }
@@ -140,19 +135,15 @@ fn parts(text: &str) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
-/// The values of a combination: the last axis changes first.
-fn combination(axes: &[Axis], mut number: usize) -> Vec<&str> {
-    let mut values: Vec<&str> = axes
-        .iter()
-        .rev()
-        .map(|axis| {
-            let value = &axis.values[number % axis.values.len()];
-            number /= axis.values.len();
-            value.as_str()
-        })
-        .collect();
-    values.reverse();
-    values
+/// The values of every combination: the last axis changes first.
+fn combinations(axes: &[Axis]) -> Vec<Vec<&str>> {
+    let mut all = vec![Vec::new()];
+    for axis in axes {
+        let each =
+            |before: &Vec<_>| axis.values.iter().map(|value| [&before[..], &[value.as_str()]].concat()).collect();
+        all = all.iter().flat_map(|before| -> Vec<_> { each(before) }).collect();
+    }
+    all
 }
 
 fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure> {
@@ -168,10 +159,8 @@ mod tests {
     #[test]
     fn every_combination_comes_once() {
         let axes = [axis("a.b=1,2").unwrap(), axis("c = x, y ,z").unwrap()];
-        let all: Vec<Vec<&str>> = (0..6).map(|number| combination(&axes, number)).collect();
-        assert_eq!(all[0], ["1", "x"]);
-        assert_eq!(all[1], ["1", "y"]);
-        assert_eq!(all[5], ["2", "z"]);
+        let expected = [["1", "x"], ["1", "y"], ["1", "z"], ["2", "x"], ["2", "y"], ["2", "z"]];
+        assert_eq!(combinations(&axes), expected);
         assert!(axis("a").is_err() && axis("a=").is_err() && axis("=1").is_err());
     }
 

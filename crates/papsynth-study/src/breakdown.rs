@@ -15,7 +15,6 @@ const FEW_VALUES: usize = 3;
 /// Texts of more kinds than this are not broken down by: what is left in each group says nothing.
 const MOST_TEXTS: usize = 12;
 
-/// What the breakdown by field is called.
 pub(crate) const FIELD: &str = "field";
 
 /// Right answers where a parameter had one value, or lay between two.

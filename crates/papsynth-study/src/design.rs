@@ -104,8 +104,7 @@ pub struct StudyParams {
     pub training: usize,
     /// How long a patch is shown, ms, 50 to 60000. Default 2000 (the paper's).
     pub exposure_ms: u32,
-    /// Standard deviation of the Gaussian noise that is added to every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (the
-    /// paper's).
+    /// Standard deviation of the Gaussian noise on every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (the paper's).
     pub noise_dn: f64,
     /// Side of a patch, pixels, 32 to 1024. Default 200 (the paper's).
     pub patch_px: usize,
@@ -117,8 +116,7 @@ pub struct StudyParams {
     pub grey: Grey,
     /// Size of a real pixel, µm, 0.01 to 100; nothing if it is not known. Default nothing (ours).
     pub real_pixel_um: Option<f64>,
-    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if it is not known, or a papsynth data set knows it. Default nothing
-    /// (ours).
+    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if nobody or the data set knows it. Default nothing (ours).
     pub synthetic_pixel_um: Option<f64>,
 }
 

@@ -11,13 +11,11 @@ use papsynth_dataset::{FrameSummary, Problem, ShardRecord};
 
 use crate::error::Error;
 
-/// What says that a folder is a data set.
 const MANIFEST: &str = "manifest.json";
 
 /// Largest record, recipe or table that is read, bytes.
 const LARGEST_TEXT: u64 = 1 << 26;
 
-/// A field that may be shown.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
     /// Its path below the folder that was given, with `/` between folders.
@@ -28,12 +26,9 @@ pub(crate) struct Field {
     pub(crate) frame: Option<Frame>,
 }
 
-/// A frame of a data set.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
-    /// The folder of the data set.
     pub(crate) root: PathBuf,
-    /// The frame in a few numbers.
     pub(crate) summary: FrameSummary,
     /// The recipe of the data set, a line a field.
     pub(crate) recipe: Arc<BTreeMap<String, toml::Value>>,
@@ -127,7 +122,6 @@ impl Root {
         Ok(())
     }
 
-    /// A text in the folder.
     pub(crate) fn text(&self, path: &Path) -> Result<String, Error> {
         let bytes = bytes(&self.inside(path)?, LARGEST_TEXT)?;
         String::from_utf8(bytes).map_err(|_| Error::folder(path, "is no text; UTF-8 is expected"))
@@ -191,7 +185,7 @@ mod tests {
     fn pictures_are_listed_in_their_natural_order() {
         let scratch = Scratch::new("fields");
         for name in ["f10.png", "f9.png", "f1.png", ".hidden.png"] {
-            fs::write(scratch.join(name), picture(1, 64, 64)).unwrap();
+            picture(&scratch.join(name), 1, [64, 64]);
         }
         fs::write(scratch.join("notes.txt"), "no picture").unwrap();
         let fields = Root::new(scratch.path()).unwrap().fields().unwrap();
@@ -199,8 +193,7 @@ mod tests {
         assert!(fields.iter().all(|f| f.frame.is_none()));
         // Pictures may lie in a folder of that name.
         let below = Scratch::new("fields-images");
-        fs::create_dir_all(below.join("images")).unwrap();
-        fs::write(below.join("images/a.png"), picture(1, 64, 64)).unwrap();
+        picture(&below.join("images/a.png"), 1, [64, 64]);
         assert_eq!(Root::new(below.path()).unwrap().fields().unwrap()[0].name, "images/a.png");
     }
 
@@ -229,8 +222,8 @@ mod tests {
         let (folder, elsewhere) = (scratch.join("folder"), scratch.join("folder-elsewhere"));
         fs::create_dir_all(&folder).unwrap();
         fs::create_dir_all(&elsewhere).unwrap();
-        fs::write(folder.join("a.png"), picture(1, 64, 64)).unwrap();
-        fs::write(elsewhere.join("secret.png"), picture(2, 64, 64)).unwrap();
+        picture(&folder.join("a.png"), 1, [64, 64]);
+        picture(&elsewhere.join("secret.png"), 2, [64, 64]);
         symlink(folder.join("a.png"), folder.join("b.png")).unwrap();
         // The folder itself may be a link.
         symlink(&folder, scratch.join("link")).unwrap();

@@ -7,7 +7,6 @@ mod error;
 mod fields;
 mod key;
 mod parameters;
-mod patch;
 mod picture;
 mod plan;
 mod results;

@@ -12,8 +12,7 @@ use crate::error::Error;
 use crate::fields::{Field, Frame, Root, bytes};
 use crate::key::{Key, hex};
 use crate::parameters::{Objects, Parameters, varied};
-use crate::patch;
-use crate::picture::{Picture, Places, Raw};
+use crate::picture::{self, Picture, Places, Raw};
 
 /// Pixel sizes that differ by less than this part are the same.
 const SAME_PIXEL: f64 = 0.005;
@@ -27,39 +26,31 @@ const BITS: [u32; 5] = [8, 10, 12, 14, 16];
 /// Stands for a full scale until all fields of the side have been seen.
 const UNKNOWN: f32 = 0.0;
 
-/// A field that patches are taken from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FieldRecord {
     pub(crate) side: Side,
-    /// Its path in the folder.
     pub(crate) name: String,
     /// Of its file, hexadecimal.
     pub(crate) sha256: String,
     /// The level of white of its camera.
     pub(crate) full_scale: f32,
-    /// The level of its bright glass.
     pub(crate) glass: f32,
     /// How many of its pixels go on the length of one that is shown.
     pub(crate) reduce: f64,
 }
 
-/// A patch of a field.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Patch {
     pub(crate) side: Side,
-    /// Which of the plan's fields.
     pub(crate) field: usize,
     /// Left, in pixels as they are shown.
     pub(crate) x_px: usize,
-    /// Top.
     pub(crate) y_px: usize,
-    /// What is known of it.
     pub(crate) parameters: Parameters,
 }
 
-/// A trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Trial {
@@ -68,7 +59,6 @@ pub(crate) struct Trial {
     pub(crate) patches: Vec<Patch>,
 }
 
-/// All that a study shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Plan {
@@ -112,12 +102,10 @@ impl Plan {
             shuffle(&mut turns, &mut key.stream("turns", side as usize));
             *hand = deal(&turns, &places, needed);
             if hand.len() < needed {
+                let (side, fields, found) = (side.name(), turns.len(), hand.len());
                 return Err(Error::Refused(format!(
-                    "{}: {} fields give {} patches with something on them that do not overlap much, {needed} are needed; \
-                     expected more or larger fields, fewer trials or smaller patches",
-                    side.name(),
-                    turns.len(),
-                    hand.len()
+                    "{side}: {fields} fields give {found} patches with something on them that do not overlap much, \
+                     {needed} are needed; expected more or larger fields, fewer trials or smaller patches"
                 )));
             }
             shuffle(hand, &mut key.stream("patches", side as usize));
@@ -160,7 +148,7 @@ impl Plan {
                     let levels = levels.ok_or_else(|| record.changed(folders))?;
                     let mut rng = key.stream("noise", patch_number(number, slot));
                     shown[number][slot] =
-                        patch::png(&patch::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
+                        picture::png(&picture::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
                 }
             }
         }
@@ -331,11 +319,10 @@ fn known<'a>(
 #[cfg(test)]
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
-    use std::fs;
 
     use super::*;
     use crate::design::Task;
-    use crate::support::{Scratch, picture, study_folders};
+    use crate::support::{Scratch, exposed, picture, study_folders};
 
     fn params() -> StudyParams {
         StudyParams { trials: 12, patch_px: 48, ..StudyParams::default() }
@@ -377,7 +364,7 @@ mod tests {
         assert_ne!(sides(&first), sides(&draw(&other)));
         assert_ne!(sides(&first), sides(&draw(&StudyParams { seed: 3, ..params() })));
         // The same names, other pixels.
-        fs::write(scratch.join("real/f0.png"), picture(99, 300, 240)).unwrap();
+        picture(&scratch.join("real/f0.png"), 99, [300, 240]);
         let changed = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
         assert_ne!(first, Plan::draw(&params(), &changed).unwrap());
         let error = first.patches(&params(), &changed).unwrap_err().to_string();
@@ -392,10 +379,8 @@ mod tests {
         let plan = Plan::draw(&few, &folders).unwrap();
         let names = |plan: &Plan| plan.fields.iter().map(|f| (f.side, f.name.clone())).collect::<Vec<_>>();
         assert_eq!(plan.fields.len(), 6);
-        assert_eq!(
-            names(&plan),
-            names(&Plan::draw(&StudyParams { subject: "2".to_owned(), ..few.clone() }, &folders).unwrap())
-        );
+        let other = StudyParams { subject: "2".to_owned(), ..few.clone() };
+        assert_eq!(names(&plan), names(&Plan::draw(&other, &folders).unwrap()));
         assert_ne!(names(&plan), names(&Plan::draw(&StudyParams { seed: 1, ..few }, &folders).unwrap()));
         assert!(!plan.notes.iter().any(|note| note.contains("fields are there")));
     }
@@ -406,11 +391,9 @@ mod tests {
         let folders = study_folders(&scratch, 4, 4);
         let pairs = StudyParams { task: Task::TwoAlternatives, ..params() };
         let plan = Plan::draw(&pairs, &folders).unwrap();
-        assert!(
-            plan.trials
-                .iter()
-                .all(|trial| { trial.patches.len() == 2 && trial.patches[0].side != trial.patches[1].side })
-        );
+        for Trial { patches, .. } in &plan.trials {
+            assert!(patches.len() == 2 && patches[0].side != patches[1].side);
+        }
         let key = plan.key(&pairs);
         let names: BTreeSet<String> = (0..14).flat_map(|t| [0, 1].map(|slot| plan.patch_name(&key, t, slot))).collect();
         assert_eq!(names.len(), 28);
@@ -438,11 +421,8 @@ mod tests {
             let wanted = if field.side == Side::Real { 1.0 } else { 0.33 / 0.25 };
             assert_eq!(field.reduce, wanted);
         }
-        assert!(
-            plan.notes.iter().any(|note| note == "synthetic: 2 fields are resampled to pixels of 0.33 µm"),
-            "{:?}",
-            plan.notes
-        );
+        let told = "synthetic: 2 fields are resampled to pixels of 0.33 µm";
+        assert!(plan.notes.iter().any(|note| note == told), "{:?}", plan.notes);
         plan.patches(&both, &folders).unwrap();
         let one = StudyParams { real_pixel_um: Some(0.33), ..few };
         assert!(Plan::draw(&one, &folders).unwrap().fields.iter().all(|field| field.reduce == 1.0));
@@ -467,10 +447,9 @@ mod tests {
     fn deep_pictures_are_scaled_by_their_camera() {
         assert_eq!([8, 12, 16].map(full_scale), [255.0, 4095.0, 65535.0]);
         let scratch = Scratch::new("plan-deep");
-        crate::support::write_deep(&scratch.join("real/a.png"), 300, 240, 3500);
-        crate::support::write_deep(&scratch.join("real/b.png"), 300, 240, 900);
-        fs::create_dir_all(scratch.join("synthetic")).unwrap();
-        fs::write(scratch.join("synthetic/a.png"), picture(1, 300, 240)).unwrap();
+        exposed(&scratch.join("real/a.png"), 1, [300, 240], 3500, 16);
+        exposed(&scratch.join("real/b.png"), 1, [300, 240], 900, 16);
+        picture(&scratch.join("synthetic/a.png"), 1, [300, 240]);
         let folders = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
         let plan = Plan::draw(&StudyParams { trials: 4, ..params() }, &folders).unwrap();
         // One camera of 12 bits took both.

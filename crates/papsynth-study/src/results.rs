@@ -29,7 +29,6 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of these counts.
     pub(crate) fn new(subject: &str, counts: Counts, task: Task) -> Self {
         Self {
             subject: subject.to_owned(),
@@ -41,7 +40,6 @@ impl Row {
         }
     }
 
-    /// The row of what was said.
     fn of(subject: &str, judged: &[Judged], task: Task) -> Self {
         let mut counts = Counts::default();
         judged.iter().for_each(|one| counts.count(one.is_positive(), one.answered.answer.is_positive()));

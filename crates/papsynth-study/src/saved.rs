@@ -12,10 +12,8 @@ use crate::plan::{Patch, Plan, Trial};
 /// What says that a file is the state of a study.
 const FORMAT: &str = "papsynth-study";
 
-/// Version of the layout of that file.
 const VERSION: u32 = 1;
 
-/// The program that wrote it.
 const WRITER: &str = concat!("papsynth-study ", env!("CARGO_PKG_VERSION"));
 
 /// Largest state that is read, bytes.
@@ -24,7 +22,6 @@ const LARGEST_STATE: u64 = 1 << 28;
 /// Longest time that is believed, ms: eleven days.
 const LONGEST_MS: f64 = 1e9;
 
-/// The file that it is kept in.
 pub(crate) const STATE: &str = "session.json";
 
 /// How a patch was shown, as the page measured it.
@@ -51,7 +48,6 @@ pub(crate) fn is_time(ms: f64) -> bool {
     (0.0..=LONGEST_MS).contains(&ms)
 }
 
-/// A trial that was answered.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Answered {
@@ -63,7 +59,6 @@ pub(crate) struct Answered {
     pub(crate) showings: u32,
 }
 
-/// What is known of the trial under way.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct UnderWay {
@@ -140,7 +135,6 @@ impl Saved {
         self.answers.len() == self.plan.trials.len()
     }
 
-    /// The trials that were answered.
     pub(crate) fn answered(&self) -> impl Iterator<Item = Judged<'_>> {
         let pairs = self.plan.trials.iter().zip(&self.answers);
         pairs.map(|(trial, answered)| Judged { plan: &self.plan, trial, answered })

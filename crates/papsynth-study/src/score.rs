@@ -26,7 +26,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts one answer.
     pub(crate) fn count(&mut self, is_positive: bool, said_positive: bool) {
         let cell = match (is_positive, said_positive) {
             (true, true) => &mut self.tp,
@@ -309,16 +308,6 @@ mod tests {
         // What is printed are the predictive values of the same counts.
         assert_eq!(rounded(37.0 / (37.0 + 31.0), 100.0), 0.54);
         assert_eq!(rounded(24.0 / (24.0 + 26.0), 100.0), 0.48);
-    }
-
-    #[test]
-    fn the_paper_s_subjects_pooled() {
-        let pooled = (0..6).map(row).fold(Counts::default(), Counts::plus);
-        let accuracy = pooled.accuracy();
-        assert_eq!(accuracy, Proportion { hits: 482, of: 708 });
-        assert_eq!(rounded(accuracy.value().unwrap(), 1000.0), 0.681);
-        let Interval { low, high } = accuracy.wilson();
-        assert_eq!([rounded(low, 1000.0), rounded(high, 1000.0)], [0.646, 0.714]);
     }
 
     #[test]

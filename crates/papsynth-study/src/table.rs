@@ -8,7 +8,7 @@ use crate::design::{Side, Task};
 use crate::parameters::Value;
 use crate::results::Row;
 use crate::saved::{Answered, Saved};
-use crate::score::{Interval, Proportion};
+use crate::score::{Counts, Interval, Proportion};
 
 /// Every trial that was answered, as a table; nothing if none was.
 pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
@@ -76,19 +76,14 @@ pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
         "subject", "TP", "FP", "TN", "FN", "sensitivity", "specificity", "accuracy", "d′", "c"
     );
     for row in rows {
-        let Row { subject, counts, detection, .. } = row;
+        let Row { subject, counts: Counts { tp, fp, tn, fn_ }, detection, .. } = row;
+        // No minus before 0.00.
+        let [d_prime, criterion] = [detection.d_prime, detection.criterion].map(|number| number + 0.0);
         let [sensitivity, specificity, accuracy] =
             [row.sensitivity, row.specificity, row.accuracy].map(|proportion| fraction(&proportion));
         let _ = writeln!(
             out,
-            "{subject:<wide$}  {:>4}  {:>4}  {:>4}  {:>4}   {sensitivity:<15}   {specificity:<15}   {accuracy:<15}  {:>5.2}  {:>5.2}",
-            counts.tp,
-            counts.fp,
-            counts.tn,
-            counts.fn_,
-            // No minus before 0.00.
-            detection.d_prime + 0.0,
-            detection.criterion + 0.0,
+            "{subject:<wide$}  {tp:>4}  {fp:>4}  {tn:>4}  {fn_:>4}   {sensitivity:<15}   {specificity:<15}   {accuracy:<15}  {d_prime:>5.2}  {criterion:>5.2}"
         );
     }
     out
@@ -130,7 +125,6 @@ pub fn breakdown_table(groups: &[Group]) -> String {
 mod tests {
     use super::*;
     use crate::breakdown::short;
-    use crate::score::Counts;
 
     #[test]
     fn tables_show_the_numbers_as_papers_do() {

@@ -2,14 +2,13 @@
 
 #[cfg(feature = "calibrate")]
 mod calibrate;
-mod engine;
 mod generate;
 #[cfg(feature = "judge")]
 mod judge;
-mod layout;
 #[cfg(feature = "learn")]
 mod learn;
 mod sets;
+mod shared;
 mod slide;
 mod values;
 #[cfg(feature = "web")]
@@ -29,14 +28,13 @@ use LeftOut as Completions;
 use LeftOut as Learn;
 #[cfg(feature = "calibrate")]
 pub(crate) use calibrate::Calibrate;
-pub(crate) use engine::{EngineArgs, RecipeArgs, threads};
 pub(crate) use generate::{Generate, Preview, Render};
 #[cfg(feature = "judge")]
 pub(crate) use judge::{Judge, Match};
-pub(crate) use layout::LayoutArgs;
 #[cfg(feature = "learn")]
 pub(crate) use learn::Learn;
 pub(crate) use sets::{Clean, Convert, Inspect, Merge, Plan, Rerender, Status, Submit, Sweep, Verify, check_of};
+pub(crate) use shared::{EngineArgs, LayoutArgs, RecipeArgs, threads};
 pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]
 pub(crate) use slide::{SlideFinalize, SlideMake};

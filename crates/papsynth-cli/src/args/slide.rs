@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::engine::EngineArgs;
+use super::shared::EngineArgs;
 use super::values::parse_pair;
 use crate::memory::parse_size;
 use crate::share::ShareArgs;

@@ -10,7 +10,6 @@ use crate::error::Error;
 use crate::page::{self, CSS, File, HTML, JS};
 use crate::server::{Reply, Request, Server, Site};
 
-/// The files of the page.
 const PAGE: [File; 3] = [
     ("/", HTML, include_str!("page/index.html")),
     ("/study.css", CSS, include_str!("page/study.css")),
@@ -20,7 +19,6 @@ const PAGE: [File; 3] = [
 /// Where patches are asked for, before their name.
 const PATCH: &str = "/patch/";
 
-/// A report that patches were seen.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Shown {
@@ -28,19 +26,12 @@ struct Shown {
     exposure: Exposure,
 }
 
-/// An answer.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Said {
     patch: String,
     answer: Answer,
     response_ms: f64,
-}
-
-/// A study, as a page shows it.
-#[derive(Debug)]
-pub struct Study {
-    session: Session,
 }
 
 /// Serves a study until `stop` is set. `finished` is called once when everything has been answered, at once if it has been
@@ -56,50 +47,40 @@ pub fn serve_study(
 ) -> Result<(), Error> {
     session.set_port(server.port())?;
     let mut told = false;
-    server.run(Study::new(session), stop, |study| {
-        if !told && study.session.is_finished() {
+    server.run(session, stop, |session| {
+        if !told && session.is_finished() {
             told = true;
-            finished(&study.session);
+            finished(session);
         }
     })
 }
 
-impl Site for Study {
+impl Site for Session {
     fn reply(&mut self, request: &Request) -> Reply {
-        page::file(&PAGE, request).unwrap_or_else(|| self.answer(request).unwrap_or_else(|refusal| refusal))
+        page::file(&PAGE, request).unwrap_or_else(|| answer(self, request).unwrap_or_else(|refusal| refusal))
     }
 }
 
-impl Study {
-    /// The study of a session.
-    #[must_use]
-    pub fn new(session: Session) -> Self {
-        Self { session }
-    }
-
-    fn answer(&mut self, request: &Request) -> Result<Reply, Reply> {
-        match (request.method, request.target) {
-            ("GET", "/state") => Ok(Reply::json(&self.session.state())),
-            ("GET", "/result") if self.session.is_finished() => Ok(Reply::json(&self.session.summary())),
-            ("GET", "/result") => Err(Reply::refusal(409, "there is no result before the last answer")),
-            ("GET", target) if target.starts_with(PATCH) => {
-                Ok(Reply::png(self.session.patch(&target[PATCH.len()..])?.to_vec()))
-            }
-            ("POST", "/shown") => {
-                let Shown { patch, exposure } = request.json()?;
-                self.session.shown(&patch, exposure)?;
-                Ok(Reply::json(&self.session.state()))
-            }
-            ("POST", "/answer") => {
-                let Said { patch, answer, response_ms } = request.json()?;
-                self.session.answer(&patch, answer, response_ms)?;
-                Ok(Reply::json(&self.session.state()))
-            }
-            (_, "/state" | "/result") => Err(Reply::method("GET")),
-            (_, "/shown" | "/answer") => Err(Reply::method("POST")),
-            (_, target) if target.starts_with(PATCH) => Err(Reply::method("GET")),
-            _ => Err(Reply::refusal(404, "there is nothing here")),
+fn answer(session: &mut Session, request: &Request) -> Result<Reply, Reply> {
+    match (request.method, request.target) {
+        ("GET", "/state") => Ok(Reply::json(&session.state())),
+        ("GET", "/result") if session.is_finished() => Ok(Reply::json(&session.summary())),
+        ("GET", "/result") => Err(Reply::refusal(409, "there is no result before the last answer")),
+        ("GET", target) if target.starts_with(PATCH) => Ok(Reply::png(session.patch(&target[PATCH.len()..])?.to_vec())),
+        ("POST", "/shown") => {
+            let Shown { patch, exposure } = request.json()?;
+            session.shown(&patch, exposure)?;
+            Ok(Reply::json(&session.state()))
         }
+        ("POST", "/answer") => {
+            let Said { patch, answer, response_ms } = request.json()?;
+            session.answer(&patch, answer, response_ms)?;
+            Ok(Reply::json(&session.state()))
+        }
+        (_, "/state" | "/result") => Err(Reply::method("GET")),
+        (_, "/shown" | "/answer") => Err(Reply::method("POST")),
+        (_, target) if target.starts_with(PATCH) => Err(Reply::method("GET")),
+        _ => Err(Reply::refusal(404, "there is nothing here")),
     }
 }
 

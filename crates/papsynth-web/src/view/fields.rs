@@ -22,7 +22,6 @@ const KEPT: usize = 3;
 /// Bytes of decoded planes that are kept at most, but for one plane, however large it is.
 const MOST_BYTES: usize = 1 << 28;
 
-/// A data set that is shown.
 pub(crate) struct Fields {
     dataset: Dataset,
     places: Vec<FramePlace>,
@@ -103,7 +102,6 @@ impl Fields {
         }
     }
 
-    /// The frame with its truth read.
     fn with_truth(&mut self, picture: usize) -> Result<(&Frame, &[Shown]), Reply> {
         let frame = self.frame(picture)?;
         if frame.objects.is_none() {
@@ -145,10 +143,6 @@ impl Frame {
 }
 
 impl Source for Fields {
-    fn kind(&self) -> &'static str {
-        "data set"
-    }
-
     fn count(&mut self) -> Result<usize, Reply> {
         // It may be growing.
         self.places = self.dataset.places()?;

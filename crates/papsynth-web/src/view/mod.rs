@@ -20,7 +20,6 @@ use crate::server::{Reply, Request, Site};
 use fields::Fields;
 use source::{At, Source};
 
-/// The files of the page.
 const PAGE: [File; 4] = [
     ("/", HTML, include_str!("page/index.html")),
     ("/view.css", CSS, include_str!("page/view.css")),
@@ -31,6 +30,7 @@ const PAGE: [File; 4] = [
 /// A data set or a slide, as a page shows it. Nothing is written, and of what is read a few frames are kept.
 pub struct View {
     title: String,
+    kind: &'static str,
     source: Box<dyn Source>,
 }
 
@@ -40,20 +40,21 @@ impl View {
     /// # Errors
     /// If it holds neither, or what a build without that feature cannot show, or cannot be read.
     pub fn open(path: &Path) -> Result<Self, Error> {
-        Ok(Self { title: title(path), source: source(path)? })
+        let (kind, source) = source(path)?;
+        Ok(Self { title: title(path), kind, source })
     }
 
     /// What is shown: "data set" or "slide".
     #[must_use]
     pub fn kind(&self) -> &'static str {
-        self.source.kind()
+        self.kind
     }
 
     fn answer(&mut self, target: &str) -> Result<Reply, Reply> {
         let words: Vec<&str> = target.split('/').skip(1).take(7).collect();
         match words[..] {
             ["info"] => {
-                let (kind, pictures) = (self.source.kind(), self.source.count()?);
+                let (kind, pictures) = (self.kind, self.source.count()?);
                 let groups = Group::ALL.map(Group::name);
                 Ok(Reply::json(&json!({ "title": self.title, "kind": kind, "pictures": pictures, "groups": groups })))
             }
@@ -85,13 +86,13 @@ impl Site for View {
     }
 }
 
-/// The name of the folder.
 fn title(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     whole.file_name().unwrap_or(whole.as_os_str()).to_string_lossy().into_owned()
 }
 
-fn source(path: &Path) -> Result<Box<dyn Source>, Error> {
+/// What lies in a folder: "data set" or "slide".
+fn source(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     if path.join("slide.json").is_file() {
         return slide(path);
     }
@@ -104,7 +105,7 @@ fn source(path: &Path) -> Result<Box<dyn Source>, Error> {
     let needs: Option<Vec<&str>> = formats.iter().map(|format| format.needs()).collect();
     match needs.as_deref() {
         Some([feature, ..]) => Err(folder(path, format!("{} needs {}", formats[0].name(), built_with(feature)))),
-        _ => Ok(Box::new(Fields::new(dataset))),
+        _ => Ok(("data set", Box::new(Fields::new(dataset)))),
     }
 }
 
@@ -117,12 +118,12 @@ fn built_with(feature: &str) -> String {
 }
 
 #[cfg(feature = "zarr")]
-fn slide(path: &Path) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(slide::Slide::new(papsynth_dataset::slide::SlideSet::open(path)?)))
+fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
+    Ok(("slide", Box::new(slide::Slide::new(papsynth_dataset::slide::SlideSet::open(path)?))))
 }
 
 #[cfg(not(feature = "zarr"))]
-fn slide(path: &Path) -> Result<Box<dyn Source>, Error> {
+fn slide(path: &Path) -> Result<(&'static str, Box<dyn Source>), Error> {
     Err(folder(path, format!("a slide needs {}", built_with("zarr"))))
 }
 

@@ -16,7 +16,6 @@ use crate::server::Reply;
 /// Side of a tile, px: that of a chunk, which is decoded whole.
 const TILE: usize = 512;
 
-/// A slide that is shown.
 pub(crate) struct Slide {
     set: SlideSet,
 }
@@ -38,10 +37,6 @@ impl Slide {
 }
 
 impl Source for Slide {
-    fn kind(&self) -> &'static str {
-        "slide"
-    }
-
     fn count(&mut self) -> Result<usize, Reply> {
         Ok(1)
     }

@@ -8,11 +8,7 @@ use serde_json::Value;
 use super::grid::Grid;
 use crate::server::Reply;
 
-/// A folder that is shown.
 pub(crate) trait Source: Send {
-    /// What it is called: "data set" or "slide".
-    fn kind(&self) -> &'static str;
-
     /// How many pictures there are now.
     fn count(&mut self) -> Result<usize, Reply>;
 
@@ -29,7 +25,6 @@ pub(crate) trait Source: Send {
     fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply>;
 }
 
-/// Which tile.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct At {
     pub(crate) level: usize,
@@ -59,7 +54,6 @@ impl Picture {
     }
 }
 
-/// That a plane is there.
 pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
     if plane < planes {
         return Ok(());
@@ -67,7 +61,6 @@ pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
     Err(Reply::refusal(404, &format!("there is no plane {plane}; the last is {}", planes.saturating_sub(1))))
 }
 
-/// That a pixel is there.
 pub(crate) fn check_pixel(x: usize, y: usize, width: usize, height: usize) -> Result<(), Reply> {
     if x < width && y < height {
         return Ok(());

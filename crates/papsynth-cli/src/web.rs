@@ -1,13 +1,43 @@
-//! `papsynth study`: can people tell?
+//! Pages on this machine.
 
-use papsynth_study::{Interval, Pool, Session, Side, StudyParams, Summary, breakdown_table, table};
+use std::process::{Command, Stdio};
+
+use papsynth_study::{Group, Interval, Pool, Row, Session, Side, State, StudyParams, Summary, breakdown_table, table};
 use papsynth_web::{Error, Server, serve_study};
 
-use super::open;
-use crate::args::Study;
+use crate::args::{Study, View};
 use crate::exit::{self, Complaint, Failure};
 
-pub(crate) fn run(args: &Study) -> Result<(), Failure> {
+/// Opens a page with what the system opens pages with; if it cannot, the address stands above.
+fn open(address: &str) {
+    let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
+        "macos" => ("open", &[]),
+        // The empty word is the title of a window.
+        "windows" => ("cmd", &["/C", "start", ""]),
+        _ => ("xdg-open", &[]),
+    };
+    let mut command = Command::new(program);
+    command.args(arguments).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if let Err(error) = command.spawn() {
+        exit::note(format!("no browser could be opened: {error}"));
+    }
+}
+
+/// `papsynth view`: a data set or a slide in the browser.
+pub(crate) fn view(args: &View) -> Result<(), Failure> {
+    let view = papsynth_web::View::open(&args.dir)?;
+    let server = Server::bind(args.port.unwrap_or(0))?;
+    let stop = exit::watch()?;
+    let address = server.address();
+    exit::print(&format!("{}: a {}\nOpen {address} in a browser. Ctrl-C ends.\n", args.dir.display(), view.kind()))?;
+    if args.open {
+        open(&address);
+    }
+    Ok(server.run(view, stop, |_| ())?)
+}
+
+/// `papsynth study`: can people tell?
+pub(crate) fn study(args: &Study) -> Result<(), Failure> {
     let (Some(real), Some(synthetic)) = (&args.real, &args.synthetic) else {
         return args.results.as_deref().map_or(Ok(()), |folder| pooled(folder, args.json));
     };
@@ -41,10 +71,8 @@ pub(crate) fn run(args: &Study) -> Result<(), Failure> {
     serve_study(server, session, stop, |session| {
         all_answered = true;
         // Whoever closed the pipe reads the page or the files.
-        let _ = exit::print(&format!(
-            "\n{}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n",
-            results(&session.summary())
-        ));
+        let results = results(&session.summary());
+        let _ = exit::print(&format!("\n{results}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n"));
     })?;
     if all_answered {
         return Ok(());
@@ -60,28 +88,27 @@ fn announcement(session: &Session, server: &Server) -> String {
         0 => String::new(),
         answered => format!(", {answered} of them answered"),
     };
+    let (State { training, trials, .. }, address) = (state, server.address());
     format!(
-        "{} trials for practice and {} that count{done}; {real} real and {synthetic} synthetic fields\n\
-         Open {} in a browser. Ctrl-C ends; the same command goes on.\n",
-        state.training,
-        state.trials,
-        server.address()
+        "{training} trials for practice and {trials} that count{done}; {real} real and {synthetic} synthetic fields\n\
+         Open {address} in a browser. Ctrl-C ends; the same command goes on.\n"
     )
 }
 
 fn results(summary: &Summary) -> String {
-    let breakdown = breakdown_table(&summary.breakdown);
-    let by = if breakdown.is_empty() { String::new() } else { format!("\nright answers by parameter\n{breakdown}") };
-    format!("{}{}{by}", table([&summary.row, &summary.random]), claim(summary.claim.trials))
+    told([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
 }
 
-fn claim(trials: u64) -> String {
+fn told<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
+    let breakdown = breakdown_table(breakdown);
+    let by = if breakdown.is_empty() { String::new() } else { format!("\nright answers by parameter\n{breakdown}") };
     format!(
-        "Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n"
+        "{}Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n\
+         {means}{by}",
+        table(rows)
     )
 }
 
-/// All subjects in a folder.
 fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
     let pool = Pool::read(folder).map_err(Error::from)?;
     if as_json {
@@ -89,7 +116,6 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
     }
     pool.notes.iter().for_each(|note| exit::note(note));
     let rows = pool.subjects.iter().chain([&pool.random, &pool.pooled]);
-    let mut text = format!("{}{}", table(rows), claim(pool.claim.trials));
     let means = [
         ("sensitivity", pool.mean_sensitivity),
         ("specificity", pool.mean_specificity),
@@ -102,13 +128,10 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
             Some(format!("{name} {mean:.3} ({low:.3} to {high:.3})"))
         })
         .collect();
-    if !means.is_empty() {
-        // The interval over subjects tells of other subjects, Wilson's of other patches for the same ones.
-        text.push_str(&format!("Means over subjects, with intervals of 95 % by Student's t: {}.\n", means.join(", ")));
-    }
-    let breakdown = breakdown_table(&pool.breakdown);
-    if !breakdown.is_empty() {
-        text.push_str(&format!("\nright answers by parameter\n{breakdown}"));
-    }
-    exit::print(&text)
+    // The interval over subjects tells of other subjects, Wilson's of other patches for the same ones.
+    let means = match means.is_empty() {
+        true => String::new(),
+        false => format!("Means over subjects, with intervals of 95 % by Student's t: {}.\n", means.join(", ")),
+    };
+    exit::print(&told(rows, pool.claim.trials, &means, &pool.breakdown))
 }
