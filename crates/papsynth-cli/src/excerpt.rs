@@ -27,7 +27,6 @@ impl Display for Place {
     }
 }
 
-/// A part of a text that is shown.
 #[derive(Debug)]
 pub(crate) struct Excerpt {
     name: String,

@@ -1,51 +1,43 @@
-//! How the program ends: exit codes, error reports, and text on standard output.
+//! How the program ends: exit codes, error reports, Ctrl-C, and text on standard output.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::excerpt::{self, Excerpt, Place};
 
-/// Why the program ends before it is done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Exit {
-    /// Usage, recipe or input: trying again will not help.
-    Input,
-    /// Input/output: trying again may help.
-    Io,
-    /// Stopped by the user.
-    Interrupted,
-}
+/// Usage, recipe or input: trying again will not help. As shells use it for usage.
+pub(crate) const INPUT: u8 = 2;
 
-impl Exit {
-    /// The exit code: 2 as shells use it for usage, 74 as `EX_IOERR` of sysexits.h, 130 as 128 + SIGINT.
-    pub(crate) fn code(self) -> u8 {
-        match self {
-            Self::Input => 2,
-            Self::Io => 74,
-            Self::Interrupted => 130,
-        }
-    }
-}
+/// Input/output: trying again may help. `EX_IOERR` of sysexits.h.
+const IO: u8 = 74;
+
+/// Stopped by the user: 128 + SIGINT.
+const INTERRUPTED: u8 = 130;
 
 /// What is wrong, and where.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
 pub(crate) struct Complaint {
     message: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
     help: Option<String>,
-    excerpt: Option<Excerpt>,
-    /// What the complaint sums up; each is reported on its own.
-    related: Vec<Complaint>,
+    #[serde(rename = "at", skip_serializing_if = "Option::is_none")]
     place: Option<Place>,
+    /// What the complaint sums up; each is reported on its own.
+    #[serde(rename = "because", skip_serializing_if = "Vec::is_empty")]
+    related: Vec<Complaint>,
+    #[serde(skip)]
+    excerpt: Option<Excerpt>,
 }
 
 impl Complaint {
-    pub(crate) fn new(message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, excerpt: None, related: Vec::new(), place: None }
+    pub(crate) fn new(message: impl Display) -> Self {
+        Self { message: message.to_string(), help: None, excerpt: None, related: Vec::new(), place: None }
     }
 
-    /// Adds what would help.
     pub(crate) fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
@@ -62,57 +54,38 @@ impl Complaint {
     }
 
     /// Several complaints under one heading; one alone stands for itself.
-    pub(crate) fn all(heading: impl Into<String>, mut complaints: Vec<Self>) -> Self {
+    pub(crate) fn all(heading: &str, mut complaints: Vec<Self>) -> Self {
         match complaints.len() {
             1 => complaints.remove(0),
             _ => Self { related: complaints, ..Self::new(heading) },
         }
     }
-
-    fn json(&self) -> serde_json::Value {
-        let mut value = serde_json::json!({ "message": self.message });
-        if let Some(help) = &self.help {
-            value["help"] = help.as_str().into();
-        }
-        if let Some(place) = &self.place {
-            value["at"] = serde_json::json!(place);
-        }
-        if !self.related.is_empty() {
-            value["because"] = self.related.iter().map(Self::json).collect();
-        }
-        value
-    }
 }
 
-/// A complaint and the exit code it ends the program with.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    exit: Exit,
+    code: u8,
     complaint: Box<Complaint>,
 }
 
 impl Failure {
-    pub(crate) fn input(complaint: Complaint) -> Self {
-        Self { exit: Exit::Input, complaint: Box::new(complaint) }
+    /// Whether the system failed, so that trying again may help.
+    pub(crate) fn new(is_io: bool, complaint: Complaint) -> Self {
+        Self { code: if is_io { IO } else { INPUT }, complaint: Box::new(complaint) }
     }
 
-    pub(crate) fn io(complaint: Complaint) -> Self {
-        Self { exit: Exit::Io, complaint: Box::new(complaint) }
+    /// What the user asked for is wrong.
+    pub(crate) fn input(message: impl Display) -> Self {
+        Complaint::new(message).into()
+    }
+
+    /// The same, and what would help.
+    pub(crate) fn wrong(message: impl Display, help: impl Into<String>) -> Self {
+        Complaint::new(message).help(help).into()
     }
 
     pub(crate) fn interrupted(complaint: Complaint) -> Self {
-        Self { exit: Exit::Interrupted, complaint: Box::new(complaint) }
-    }
-
-    /// What the user asked for is wrong, and what would help.
-    pub(crate) fn wrong(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self::input(Complaint::new(message).help(help))
-    }
-
-    /// An error of a library; whether the system failed, so that trying again may help.
-    pub(crate) fn of(error: &impl std::fmt::Display, is_io: bool) -> Self {
-        let complaint = Complaint::new(error.to_string());
-        if is_io { Self::io(complaint) } else { Self::input(complaint) }
+        Self { code: INTERRUPTED, complaint: Box::new(complaint) }
     }
 
     /// The user stopped a run; running the same command again makes or writes the rest.
@@ -122,13 +95,7 @@ impl Failure {
     }
 
     /// A subcommand of a feature that this program was built without.
-    #[cfg(not(all(
-        feature = "calibrate",
-        feature = "completions",
-        feature = "judge",
-        feature = "learn",
-        feature = "web"
-    )))]
+    #[allow(dead_code, reason = "a program with all features lacks none")]
     pub(crate) fn left_out(feature: &str) -> Self {
         let message = format!("this subcommand needs a build of papsynth with `--features {feature}`");
         Self::wrong(message, "`cargo install papsynth-cli` builds all subcommands")
@@ -136,26 +103,16 @@ impl Failure {
 
     /// A file or folder that cannot be read or written: a wrong path is the user's, all else may pass.
     pub(crate) fn file(what: &str, path: &Path, error: &io::Error) -> Self {
-        let exit = match error.kind() {
-            io::ErrorKind::NotFound
-            | io::ErrorKind::IsADirectory
-            | io::ErrorKind::NotADirectory
-            | io::ErrorKind::AlreadyExists
-            | io::ErrorKind::InvalidFilename
-            | io::ErrorKind::InvalidInput => Exit::Input,
-            _ => Exit::Io,
-        };
-        Self { exit, complaint: Box::new(Complaint::new(format!("cannot {what} {}: {error}", path.display()))) }
+        use io::ErrorKind::{AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory, NotFound};
+        let is_wrong_path = matches!(
+            error.kind(),
+            NotFound | IsADirectory | NotADirectory | AlreadyExists | InvalidFilename | InvalidInput
+        );
+        Self::new(!is_wrong_path, Complaint::new(format!("cannot {what} {}: {error}", path.display())))
     }
 
-    /// What the files of a data set, or files that were read, have against it.
-    pub(crate) fn dataset(error: &papsynth_dataset::Error, complaint: Complaint) -> Self {
-        let exit = if error.is_io() { Exit::Io } else { Exit::Input };
-        Self { exit, complaint: Box::new(complaint) }
-    }
-
-    pub(crate) fn exit(&self) -> Exit {
-        self.exit
+    pub(crate) fn code(&self) -> u8 {
+        self.code
     }
 
     /// Says on standard error what went wrong; a closed standard error changes nothing.
@@ -169,21 +126,49 @@ impl Failure {
 
     /// The same as a JSON object.
     pub(crate) fn json(&self) -> serde_json::Value {
-        let mut value = self.complaint.json();
+        let mut value = serde_json::json!(self.complaint);
         value["event"] = "error".into();
-        value["exit"] = self.exit.code().into();
+        value["exit"] = self.code.into();
         value
+    }
+}
+
+impl From<Complaint> for Failure {
+    fn from(complaint: Complaint) -> Self {
+        Self::new(false, complaint)
     }
 }
 
 impl From<papsynth_dataset::Error> for Failure {
     fn from(error: papsynth_dataset::Error) -> Self {
-        Self::of(&error, error.is_io())
+        Self::new(error.is_io(), Complaint::new(error))
+    }
+}
+
+#[cfg(feature = "web")]
+impl From<papsynth_web::Error> for Failure {
+    fn from(error: papsynth_web::Error) -> Self {
+        Self::new(error.is_io(), Complaint::new(error))
+    }
+}
+
+/// Watches for Ctrl-C and what else asks a program to end: set once the user asked to stop. A second one ends the program at
+/// once: unfinished files bear no final name.
+pub(crate) fn watch() -> Result<&'static AtomicBool, Failure> {
+    static ASKED: AtomicBool = AtomicBool::new(false);
+    let stop = || {
+        if ASKED.swap(true, Ordering::SeqCst) {
+            std::process::exit(INTERRUPTED.into());
+        }
+    };
+    match ctrlc::set_handler(stop) {
+        Ok(()) => Ok(&ASKED),
+        Err(error) => Err(Failure::input(format!("cannot watch for Ctrl-C: {error}"))),
     }
 }
 
 /// Says on standard error what is no failure and may surprise.
-pub(crate) fn note(text: &str) {
+pub(crate) fn note(text: impl Display) {
     // Whoever has closed it does not want to know.
     let _ = writeln!(io::stderr().lock(), "note: {text}");
 }
@@ -207,7 +192,7 @@ mod tests {
     fn json_holds_the_place_and_the_exit_code() {
         let text = Arc::new("a = 1".to_owned());
         let one = Complaint::new("first").at("x.toml", &text, 0..1).help("try b");
-        let failure = Failure::input(Complaint::all("two", vec![one, Complaint::new("second")]));
+        let failure = Failure::from(Complaint::all("two", vec![one, Complaint::new("second")]));
         let json = failure.json();
         assert_eq!(json["exit"], 2);
         assert_eq!(json["because"][0]["at"]["line"], 1);

@@ -2,35 +2,29 @@
 
 use papsynth::Threads;
 use papsynth::key::Key;
-use papsynth_dataset::memory::{Fit, Need, shown};
-use papsynth_dataset::{Dataset, DatasetInfo, Error, Layout, Progress as Step, Run, Share};
+use papsynth_dataset::memory::{Fit, Need};
+use papsynth_dataset::{Dataset, Error, Home, Layout, Progress as Step, Run, Share};
 
 use crate::args::{Generate, LayoutArgs, check_of};
 use crate::exit::{self, Complaint, Failure};
-use crate::interrupt::Interrupt;
 use crate::memory;
-use crate::place;
 use crate::profile::Account;
-use crate::report::{self, Progress, Start};
+use crate::report::{self, Progress};
 use crate::setup::Setup;
-use crate::share;
 
 pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let account = args.profile.then(Account::open);
     let profile = account.as_ref().map(|account| account.profile.clone());
-    let home = place::home(&args.out)?;
+    let home = Home::at(&args.out)?;
     let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
     let count = frames.end - frames.start;
     let (layout, chosen) = args.layout.layout(frames.end);
     if let Some(message) = layout.refusal_of(&frames) {
-        return Err(Failure::input(Complaint::new(message)));
+        return Err(Failure::input(message));
     }
-    let share = match args.share.shard {
-        Some(shards) => share::of(shards)?,
-        None => Share::ALL,
-    };
+    let share = args.share.share()?;
     // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
     let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
     let few = usize::try_from(shards).ok().filter(|shards| *shards < setup.threads);
@@ -40,23 +34,20 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
 
     if chosen && !args.quiet {
         let most = LayoutArgs::MOST_IN_FOLDERS;
-        exit::note(&format!(
+        exit::note(format!(
             "more than {most} frames are written as webdataset, in tar files; --format folder forces single files"
         ));
     }
-    let interrupt = Interrupt::watch()?;
-    let map = setup.map.as_ref();
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
-    let dataset = Dataset::create_or_resume(&home, &info)?;
+    let stop = exit::watch()?;
+    let dataset = Dataset::create_or_resume(&home, &setup.info(seed, &layout))?;
     let at_once = fit.at_once;
     let (threads, working) = match fit.shared {
         true => (setup.threads_of_a_frame(), setup.threads),
         false => (Threads::One, at_once),
     };
-    let start = Start { dir: args.out.clone(), seed, frames: count, threads: working, memory: fit.bytes };
-    let progress = Progress::start(args, start)?;
+    let progress = Progress::start(args, count, working, fit.bytes)?;
     let check = check_of(args.verify);
-    let run = Run { frames, share, at_once, threads, check, stop: interrupt.flag(), profile: profile.as_deref() };
+    let run = Run { frames, share, at_once, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
         account.iter().for_each(|account| account.step(step));
         progress.step(step);
@@ -84,22 +75,19 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
 
 /// How the run goes with the memory that it may use; of `few` shards, if there are fewer than threads.
 fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, Failure> {
-    let need = Need::of(&setup.recipe.recipe, layout);
-    let (shared, at_once) = (few.is_some() && setup.threads > 1, few.map_or(setup.threads, |_| 1));
-    let budget = memory::budget(args.max_memory);
-    let Some(fit) = need.fit(at_once, shared, budget) else {
-        return Err(memory::refuse(&need, &setup.recipe.recipe, budget.unwrap_or_default(), args.max_memory.is_some()));
-    };
-    if (fit.at_once, fit.shared) != (at_once, shared) {
-        let all = setup.threads;
-        let may = shown(budget.unwrap_or_default() as f64);
-        exit::note(&format!("{} of {all} threads make frames, so that they fit into {may}", fit.at_once));
-    }
-    Ok(fit)
+    let recipe = &setup.recipe.recipe;
+    let need = Need::of(recipe, layout);
+    let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
+    memory::fit(&need, setup.threads, wanted, args.max_memory, |budget| {
+        let source = if args.max_memory.is_some() { "--max-memory" } else { "80 % of what is available" };
+        let help = "smaller fields, fewer cells, one plane, grey light and less oversampling need less; \
+                    --max-memory allows more";
+        Failure::wrong(format!("{} ({source})", need.too_large(recipe, budget)), help)
+    })
 }
 
 /// A frame of the right size that cannot be read.
 fn damaged(error: &Error) -> Failure {
     let help = "a frame is damaged: the same command with --verify reads all files and makes such frames again";
-    Failure::dataset(error, Complaint::new(error.to_string()).help(help))
+    Failure::new(error.is_io(), Complaint::new(error).help(help))
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::ops::Range;
 
-use papsynth_dataset::{Overview, inspect};
+use papsynth_dataset::{Identity, Overview, inspect};
 
 use crate::args::{Inspect, check_of};
 use crate::exit::{self, Failure};
@@ -41,13 +41,8 @@ fn table(dir: &str, overview: &Overview) -> String {
     row("data set", dir);
     row("written by", &overview.manifest.writer);
     row("seed", &identity.seed.to_string());
-    row(
-        "versions",
-        &format!(
-            "recipe {}, model {}, stream {}",
-            identity.recipe_version, identity.model_version, identity.stream_version
-        ),
-    );
+    let Identity { recipe_version, model_version, stream_version, .. } = identity;
+    row("versions", &format!("recipe {recipe_version}, model {model_version}, stream {stream_version}"));
     row("frames", &overview.frames.to_string());
     if !overview.missing.is_empty() {
         row("missing", &listed(overview.missing.iter().map(shown)));

@@ -6,11 +6,11 @@ use std::path::Path;
 use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
-use papsynth_judge::{Error, Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
+use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
 use rayon::prelude::*;
 
 use crate::args;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::pool;
 use crate::text_file::may_replace_in;
 
@@ -31,27 +31,24 @@ const LEAST: usize = 2;
 /// Giveaways that are printed.
 const PRINTED: usize = 5;
 
-/// Fields of one side.
-struct Side {
-    files: Vec<FieldFile>,
-    /// Size of a pixel of each, µm.
-    pixels_um: Vec<f64>,
-}
+/// Fields of one side, each after the size of its pixels, µm.
+type Side = Vec<(f64, FieldFile)>;
 
 pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
     may_replace_in(&args.out, &[PAGE, NUMBERS])?;
     let (real, synthetic) = sides(args)?;
-    let pixel_um = coarsest(&real, &synthetic);
+    // The size that all pixels are brought to.
+    let pixel_um = real.iter().chain(&synthetic).map(|(um, _)| *um).fold(0.0, f64::max);
     for (folder, side) in [(&args.real, &real), (&args.synthetic, &synthetic)] {
         few_slides(folder, side);
     }
     let nuclei_from = nuclei_from(args, &real, &synthetic)?;
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(refuse)?;
+    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(Failure::input)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
-    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(refuse)?;
+    let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(Failure::input)?;
     let report = pool(args.threads)?.install(|| {
         let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
-        judge.compare(&real, &synthetic).map_err(refuse)
+        judge.compare(&real, &synthetic).map_err(Failure::input)
     })?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
     numbers.push('\n');
@@ -59,10 +56,6 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
     exit::print(&told(&report, &args.out))
-}
-
-fn refuse(error: Error) -> Failure {
-    Failure::input(Complaint::new(error.to_string()))
 }
 
 /// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
@@ -82,8 +75,7 @@ fn sides(args: &args::Judge) -> Result<(Side, Side), Failure> {
         return Err(Failure::wrong(message, "give --pixel-um, the size of a pixel in micrometres"));
     };
     let side = |files: Vec<FieldFile>, given: Option<f64>, else_um: f64| {
-        let pixels_um = files.iter().map(|f| given.or(f.pixel_um).unwrap_or(else_um)).collect();
-        Side { files, pixels_um }
+        files.into_iter().map(|file| (given.or(file.pixel_um).unwrap_or(else_um), file)).collect()
     };
     Ok((side(real, args.pixel_um, of_real), side(synthetic, args.synthetic_pixel_um, of_synthetic)))
 }
@@ -120,56 +112,39 @@ fn of_groups(folder: &Path, mut files: Vec<FieldFile>, groups: &[String]) -> Res
 
 /// Fields of one slide are alike, so that a few slides are told from any others: which is no fault of theirs.
 fn few_slides(folder: &Path, side: &Side) {
-    let slides: BTreeSet<u64> = side.files.iter().filter_map(|f| f.slide).collect();
-    if !slides.is_empty() && 2 * slides.len() < side.files.len() {
-        exit::note(&format!(
-            "{}: {} fields of {} slides, which differ by their stain; more slides say more: generate with --set slide.fields=1",
-            folder.display(),
-            side.files.len(),
-            slides.len()
+    let slides: BTreeSet<u64> = side.iter().filter_map(|(_, file)| file.slide).collect();
+    if !slides.is_empty() && 2 * slides.len() < side.len() {
+        let (folder, fields, slides) = (folder.display(), side.len(), slides.len());
+        exit::note(format!(
+            "{folder}: {fields} fields of {slides} slides, which differ by their stain; more slides say more: generate with --set slide.fields=1"
         ));
     }
 }
 
-/// The size that all pixels are brought to.
-fn coarsest(real: &Side, synthetic: &Side) -> f64 {
-    real.pixels_um.iter().chain(&synthetic.pixels_um).copied().fold(0.0, f64::max)
-}
-
 /// What all fields allow, or what is asked for.
 fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<NucleiFrom, Failure> {
-    let all = |has: fn(&FieldFile) -> bool| real.files.iter().chain(&synthetic.files).find(|f| !has(f));
+    let all = |has: fn(&FieldFile) -> bool| real.iter().chain(synthetic).map(|(_, file)| file).find(|file| !has(file));
     let lacks = |from: NucleiFrom| match from {
         NucleiFrom::Masks => all(FieldFile::has_masks),
         NucleiFrom::Points => all(FieldFile::has_points),
         NucleiFrom::Search => None,
     };
-    match args.nuclei {
-        None => Ok(NucleiFrom::ALL.into_iter().rev().find(|from| lacks(*from).is_none()).unwrap_or_default()),
-        Some(from) => match lacks(from) {
-            None => Ok(from),
-            Some(file) => {
-                let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
-                Err(Failure::wrong(message, "all fields of both sides must have them"))
-            }
-        },
-    }
+    let Some(from) = args.nuclei else {
+        return Ok(NucleiFrom::ALL.into_iter().rev().find(|from| lacks(*from).is_none()).unwrap_or_default());
+    };
+    let Some(file) = lacks(from) else { return Ok(from) };
+    let message = format!("--nuclei {}: {} has none", from.name(), file.path().display());
+    Err(Failure::wrong(message, "all fields of both sides must have them"))
 }
 
 fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Failure> {
-    let fields: Vec<Result<Field, Failure>> = side
-        .files
-        .par_iter()
-        .zip(&side.pixels_um)
-        .map(|(file, own_um)| {
-            let factor = pixel_um / own_um;
-            let picture = picture(file)?;
-            let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
-            gauge
-                .measure(&picture)
-                .map_err(|error| Failure::input(Complaint::new(format!("{}: {error}", file.path().display()))))
-        })
-        .collect();
+    let measure = |(own_um, file): &(f64, FieldFile)| {
+        let factor = pixel_um / own_um;
+        let picture = picture(file)?;
+        let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
+        gauge.measure(&picture).map_err(|error| Failure::input(format!("{}: {error}", file.path().display())))
+    };
+    let fields: Vec<Result<Field, Failure>> = side.par_iter().map(measure).collect();
     fields.into_iter().collect()
 }
 
@@ -189,18 +164,14 @@ pub(crate) fn picture(file: &FieldFile) -> Result<Picture, Failure> {
     })
 }
 
-/// The verdicts in a few lines.
 fn told(report: &Report, out: &Path) -> String {
     let mut text = String::new();
     for test in &report.two_sample {
-        let r = &test.result;
-        let [low, high] = r.interval;
+        let (name, r, verdict, [low, high]) = (&test.name, &test.result, &test.verdict, test.result.interval);
+        let halves = r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}"));
         text.push_str(&format!(
-            "{:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {}: {}\n",
-            test.name,
-            r.auc,
-            r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}")),
-            test.verdict
+            "{name:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {halves}: {verdict}\n",
+            r.auc
         ));
         for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {
             text.push_str(&format!(

@@ -8,7 +8,7 @@ use papsynth_dataset::read::{Limits, components, image_files, read_label_map, re
 use papsynth_dataset::{Error, write_file};
 
 use crate::args::Learn;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::read_model;
 use crate::text_file;
 use papsynth::recipe::diagnose::{nearest, quoted};
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Learn) -> Result<(), Failure> {
         source: args.source.clone().unwrap_or_else(|| source(args)),
         donors: if args.numbers_only { Donors::NumbersOnly } else { Donors::Keep },
     };
-    let model = learn(&base, &material, &params).map_err(|error| Failure::input(Complaint::new(error.to_string())))?;
+    let model = learn(&base, &material, &params).map_err(Failure::input)?;
     write_file(&args.out, model.to_json().as_bytes())?;
     let read = [
         (nuclei.len(), "images of nuclei"),
@@ -112,7 +112,7 @@ fn traced(folder: &Path, pixel_um: f64, limits: &Limits) -> Result<Vec<Vec<Point
     let smallest_px = SMALLEST_CELL_UM2 / (pixel_um * pixel_um);
     let mut outlines = Vec::new();
     for path in image_files(folder)?.values() {
-        let refuse = |what: papsynth::Cause| Failure::input(Complaint::new(format!("{}: {what}", path.display())));
+        let refuse = |what: papsynth::Cause| Failure::input(format!("{}: {what}", path.display()));
         let labels = read_label_map(path, limits)?;
         let regions = components(&labels, limits).map_err(|problem| Error::Input { path: path.clone(), problem })?;
         for region in regions.iter().filter(|r| !r.at_border && r.mask.area() as f64 >= smallest_px) {

@@ -1,18 +1,14 @@
 #![doc = include_str!("../README.md")]
 #![deny(unsafe_code)]
 
-mod allocator;
 mod args;
 #[cfg(feature = "calibrate")]
 mod calibrate;
-mod convert;
 mod excerpt;
 mod exit;
-mod findings;
 mod generate;
 mod init;
 mod inspect;
-mod interrupt;
 #[cfg(feature = "judge")]
 mod judge;
 #[cfg(feature = "learn")]
@@ -25,7 +21,6 @@ mod plan;
 mod preview;
 mod profile;
 mod recipe_file;
-mod render;
 mod report;
 mod rerender;
 mod setup;
@@ -35,7 +30,6 @@ mod status;
 mod submit;
 mod sweep;
 mod text_file;
-mod verify;
 #[cfg(feature = "web")]
 mod web;
 mod words;
@@ -48,20 +42,20 @@ use args::{Cli, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
-    allocator::settle();
+    memory::settle();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version arrive here too, with code 0; a closed pipe is no failure.
             let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { exit::Exit::Input.code() } else { 0 });
+            return ExitCode::from(if error.use_stderr() { exit::INPUT } else { 0 });
         }
     };
     let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
     match place::check(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            let code = failure.exit().code();
+            let code = failure.code();
             if json {
                 // Whoever reads JSON reads it to the end, or closed the pipe.
                 let _ = report::event(&failure.json());
@@ -78,7 +72,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Init(args) => init::run(&args),
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
-        Verb::Render(args) => render::run(*args),
+        Verb::Render(args) => preview::render(*args),
         #[cfg(feature = "learn")]
         Verb::Learn(args) => learn::run(&args),
         #[cfg(feature = "calibrate")]
@@ -88,20 +82,20 @@ fn run(verb: Verb) -> Result<(), Failure> {
         #[cfg(feature = "judge")]
         Verb::Match(args) => match_fields::run(&args),
         Verb::Inspect(args) => inspect::run(&args),
-        Verb::Verify(args) => verify::run(&args),
-        Verb::Convert(args) => convert::run(&args),
+        Verb::Verify(args) => status::verify(&args),
+        Verb::Convert(args) => rerender::convert(&args),
         Verb::Rerender(args) => rerender::run(&args),
         Verb::Sweep(args) => sweep::run(&args),
         Verb::Plan(args) => plan::run(&args),
         Verb::Submit(args) => submit::run(&args),
         Verb::Status(args) => status::run(&args),
         Verb::Merge(args) => status::merge(&args),
-        Verb::Clean(args) => verify::clean(&args),
+        Verb::Clean(args) => status::clean(&args),
         Verb::Slide(args) => slide::run(args.verb),
         #[cfg(feature = "web")]
-        Verb::Study(args) => web::study::run(&args),
+        Verb::Study(args) => web::study(&args),
         #[cfg(feature = "web")]
-        Verb::View(args) => web::view::run(&args),
+        Verb::View(args) => web::view(&args),
         Verb::Schema(_) => {
             let schema = papsynth::recipe::Recipe::schema();
             exit::print(&format!("{schema:#}\n"))

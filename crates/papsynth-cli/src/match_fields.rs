@@ -10,7 +10,6 @@ use serde_json::json;
 
 use crate::args;
 use crate::exit::{self, Complaint, Failure};
-use crate::interrupt::Interrupt;
 use crate::judge::{fields_of, picture};
 use crate::report::Bar;
 use crate::setup::{pool, read_model};
@@ -28,7 +27,6 @@ const WINDOWS: usize = 8;
 /// Fewest recipes of a table.
 const LEAST_RECIPES: usize = 30;
 
-/// Rounds of the search.
 const ROUNDS: usize = 8;
 const QUICK_ROUNDS: usize = 3;
 
@@ -45,9 +43,9 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
     }
     if args.report.as_ref() == Some(&args.out) {
         let message = format!("--report {}: this is the file of the recipe; expected another", args.out.display());
-        return Err(Failure::input(Complaint::new(message)));
+        return Err(Failure::input(message));
     }
-    let interrupt = Interrupt::watch()?;
+    let stop = exit::watch()?;
     let model = read_model(args.model.as_deref())?;
     let files = fields_of(&args.real, &args.group)?;
     let recorded = files.iter().find_map(|f| f.pixel_um);
@@ -82,7 +80,7 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
                 bar.say(done as u64, of as u64, &format!("rounds of the search, distance {distance:.2}"));
             }
         }
-        !interrupt.flag().load(Ordering::SeqCst)
+        !stop.load(Ordering::SeqCst)
     };
     let fit =
         pool(args.threads)?.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
@@ -100,11 +98,10 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
 fn refuse(error: &Error, real: &std::path::Path) -> Failure {
     match error {
         Error::Stopped => Failure::interrupted(Complaint::new("stopped; nothing was written")),
-        other => Failure::input(Complaint::new(format!("{}: {other}", real.display()))),
+        other => Failure::input(format!("{}: {other}", real.display())),
     }
 }
 
-/// What was found, as a table.
 fn told(fit: &Fit) -> String {
     let begun = if fit.extended {
         "these fields are fused: begun from the preset as a scanner that fuses planes shows it\n"

@@ -7,11 +7,6 @@ use papsynth_dataset::Home;
 use crate::args::Verb;
 use crate::exit::Failure;
 
-/// The data set at a path or an address.
-pub(crate) fn home(path: &Path) -> Result<Home, Failure> {
-    Ok(Home::at(path)?)
-}
-
 /// An address where only folders are known would become a folder of that name, and so would one that is mistyped.
 pub(crate) fn check(verb: &Verb, words: impl IntoIterator<Item = std::ffi::OsString>) -> Result<(), Failure> {
     let words: Vec<_> = words.into_iter().collect();

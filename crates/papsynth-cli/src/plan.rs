@@ -6,13 +6,12 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use papsynth::Threads;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Progress, Run, Share};
+use papsynth_dataset::{Check, Dataset, Format, Layout, Progress};
 
 use crate::args::Plan;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::memory;
-use crate::setup::Setup;
+use crate::setup::{Setup, run_of};
 use crate::words::size;
 
 /// Student's t for a two-sided interval of 95 %, for 1, 2, … degrees of freedom; beyond the table that of the normal distribution.
@@ -20,7 +19,7 @@ const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.2
 
 pub(crate) fn run(args: &Plan) -> Result<(), Failure> {
     if args.per_core_hour.is_some_and(|price| !(price >= 0.0 && price.is_finite())) {
-        return Err(Failure::input(Complaint::new("--per-core-hour: a price of 0 or more is expected")));
+        return Err(Failure::input("--per-core-hour: a price of 0 or more is expected"));
     }
     let setup = Setup::load(&args.engine, None)?;
     let (layout, _) = args.layout.layout(args.frames);
@@ -43,19 +42,10 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
     // The first frame also makes what later ones keep: it is not counted.
     let frames = 0..args.samples + 1;
     let layout = Layout { frames_per_shard: 1, ..layout.clone() };
-    let (map, seed) = (setup.map.as_ref(), args.engine.seed);
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout: &layout };
-    let dataset = Dataset::create_or_resume(&scratch.0, &info)?;
+    let dataset = Dataset::create_or_resume(&scratch.0, &setup.info(args.engine.seed, &layout))?;
     let times = Mutex::new(vec![Instant::now()]);
-    let run = Run {
-        frames: frames.clone(),
-        share: Share::ALL,
-        at_once: 1,
-        threads: Threads::One,
-        check: Check::Sizes,
-        stop: &AtomicBool::new(false),
-        profile: None,
-    };
+    let stop = AtomicBool::new(false);
+    let run = run_of(frames.clone(), 1, &stop);
     let report = |_: Progress| times.lock().unwrap_or_else(|e| e.into_inner()).push(Instant::now());
     dataset.generate(&setup.engine, &run, &report).map_err(|error| setup.failure(error))?;
     let times = times.into_inner().unwrap_or_else(|e| e.into_inner());
@@ -94,33 +84,17 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
         let _ = writeln!(out, "{name:<14}{value}");
     };
     row("frames", format!("{} in {shards} shards of {} ({layout})", args.frames, layout.frames_per_shard));
-    row(
-        "a frame",
-        format!(
-            "{:.0} ms on one thread, {:.0} to {:.0} (95 %, {count} frames)",
-            1e3 * mean,
-            1e3 * (mean - half).max(0.0),
-            1e3 * (mean + half)
-        ),
-    );
-    row("all", format!("{:.2} core hours, {:.2} to {:.2}", hours(mean), hours(mean - half), hours(mean + half)));
+    let [ms, low, high] = [mean, (mean - half).max(0.0), mean + half].map(|seconds| 1e3 * seconds);
+    row("a frame", format!("{ms:.0} ms on one thread, {low:.0} to {high:.0} (95 %, {count} frames)"));
+    let [all, low, high] = [mean, mean - half, mean + half].map(hours);
+    row("all", format!("{all:.2} core hours, {low:.2} to {high:.2}"));
     let tasks = args.tasks.unwrap_or(1).min(shards);
     // The slowest task has the most shards; each of its threads makes whole ones.
     let most = shards.div_ceil(tasks).div_ceil(setup.threads as u64) * layout.frames_per_shard;
-    row(
-        "wall time",
-        format!("{} on {tasks} x {} threads", duration(mean * most.min(args.frames) as f64), setup.threads),
-    );
+    let wall = duration(mean * most.min(args.frames) as f64);
+    row("wall time", format!("{wall} on {tasks} x {} threads", setup.threads));
     if let Some(price) = args.per_core_hour {
-        row(
-            "price",
-            format!(
-                "{:.2}, {:.2} to {:.2}",
-                price * hours(mean),
-                price * hours(mean - half),
-                price * hours(mean + half)
-            ),
-        );
+        row("price", format!("{:.2}, {:.2} to {:.2}", price * all, price * low, price * high));
     }
     let each = |bytes: u64| bytes as f64 / samples.count as f64;
     for (format, bytes) in &samples.bytes {

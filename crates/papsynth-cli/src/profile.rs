@@ -50,7 +50,6 @@ impl Account {
         self.profile.spent(stage).as_secs_f64() * 1e3 / self.frames.load(Ordering::Relaxed).max(1) as f64
     }
 
-    /// The account as a table.
     pub(crate) fn table(&self, threads: usize) -> String {
         let rows = Stage::ALL.map(|stage| (stage.name(), self.milliseconds_a_frame(stage)));
         let all: f64 = rows.iter().map(|row| row.1).sum();
@@ -67,7 +66,6 @@ impl Account {
         text
     }
 
-    /// The same as JSON.
     pub(crate) fn event(&self, threads: usize) -> serde_json::Value {
         let stages =
             Stage::ALL.map(|stage| json!({ "stage": stage.name(), "ms_a_frame": self.milliseconds_a_frame(stage) }));

@@ -15,7 +15,6 @@ use crate::text_file;
 /// Largest recipe that is read: a thousand times the largest that `papsynth init` prints would still fit.
 const LARGEST: u64 = 1 << 20;
 
-/// Most faults that are listed.
 const MOST_FAULTS: usize = 12;
 
 /// A recipe, and where its fields were written.
@@ -38,7 +37,6 @@ struct Sources {
 /// A `--set a.b=value`.
 #[derive(Debug)]
 struct Set {
-    /// As it was given.
     argument: Arc<String>,
     /// The key before its `=`.
     key: String,
@@ -46,7 +44,6 @@ struct Set {
     value_at: usize,
     /// What it sets, as a table of tables.
     table: Table,
-    /// The path it sets.
     path: Vec<String>,
 }
 
@@ -57,21 +54,12 @@ impl RecipeFile {
         let (mut base, file, folder) = match &args.recipe {
             None => (args.preset.unwrap_or(Preset::Lbc).recipe(), None, PathBuf::new()),
             Some(path) => {
-                let (name, text) = text_file::read(path, LARGEST, "a recipe, a few kilobytes of text")?;
-                let text = Arc::new(text);
-                let sources = Sources { file: Some((name.clone(), Arc::clone(&text))), sets: Vec::new() };
-                let base = diagnose::read(&text)
-                    .map_err(|faults| Failure::input(sources.complaint(faults, "the recipe cannot be read")))?;
-                let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-                (base, Some((name, text)), folder)
+                let (recipe, file) = read(path, "a recipe", "the recipe cannot be read")?;
+                (recipe, Some(file), path.parent().map(Path::to_path_buf).unwrap_or_default())
             }
         };
         for path in &args.with {
-            let (name, text) = text_file::read(path, LARGEST, "sections of a recipe, a few kilobytes of text")?;
-            let text = Arc::new(text);
-            let sources = Sources { file: Some((name, Arc::clone(&text))), sets: Vec::new() };
-            let found = diagnose::read(&text)
-                .map_err(|faults| Failure::input(sources.complaint(faults, "these sections cannot be read")))?;
+            let (found, (_, text)) = read(path, "sections of a recipe", "these sections cannot be read")?;
             let sections: Table = toml::from_str(&text).unwrap_or_default();
             base.replace(&found, |section| sections.contains_key(section));
         }
@@ -81,7 +69,7 @@ impl RecipeFile {
         let sources = Sources { file, sets };
         let recipe = sources
             .overlay(base)
-            .map_err(|faults| Failure::input(sources.complaint(faults, "what is set does not fit the recipe")))?;
+            .map_err(|faults| Failure::from(sources.complaint(faults, "what is set does not fit the recipe")))?;
         let found = Self { recipe, folder, sources };
         match found.recipe.problems() {
             problems if problems.is_empty() => Ok(found),
@@ -94,7 +82,7 @@ impl RecipeFile {
         let faults = diagnose::unknown_classes(&self.recipe, model);
         match faults.is_empty() {
             true => Ok(()),
-            false => Err(Failure::input(self.sources.complaint(faults, "the model lacks classes"))),
+            false => Err(Failure::from(self.sources.complaint(faults, "the model lacks classes"))),
         }
     }
 
@@ -115,15 +103,25 @@ impl RecipeFile {
                     .collect::<Vec<_>>();
                 (fields, "the recipe asks for what cannot be")
             }
-            papsynth::Error::Layout(_) => return Failure::input(self.complaint("layout", error.to_string())),
-            other => return Failure::input(Complaint::new(other.to_string())),
+            papsynth::Error::Layout(_) => return Failure::from(self.complaint("layout", error.to_string())),
+            other => return Failure::input(other),
         };
         let faults = fields.into_iter().map(|(field, message)| {
             let path: Vec<String> = field.split('.').map(str::to_owned).collect();
             let meaning = schema.at(&path).and_then(|section| section.meaning()).map(|m| format!("the field: {m}"));
             Fault { path, span: None, message, help: meaning }
         });
-        Failure::input(self.sources.complaint(faults.collect(), heading))
+        Failure::from(self.sources.complaint(faults.collect(), heading))
+    }
+}
+
+/// The recipe of a file, and the name and the text of that.
+fn read(path: &Path, what: &str, heading: &str) -> Result<(Recipe, (String, Arc<String>)), Failure> {
+    let (name, text) = text_file::read(path, LARGEST, &format!("{what}, a few kilobytes of text"))?;
+    let file = (name, Arc::new(text));
+    match diagnose::read(&file.1) {
+        Ok(recipe) => Ok((recipe, file)),
+        Err(faults) => Err(Sources { file: Some(file), sets: Vec::new() }.complaint(faults, heading).into()),
     }
 }
 
@@ -180,7 +178,7 @@ impl Set {
         let text = Arc::new(argument.to_owned());
         let wrong = |message: &str, span| {
             let help = "write it like --set field.width_px=512 or --set 'slide.depth_um={ uniform = [2, 6] }'";
-            Failure::input(Complaint::new(message).at("--set", &text, span).help(help))
+            Failure::from(Complaint::new(message).at("--set", &text, span).help(help))
         };
         let Some((key, value)) = argument.split_once('=') else {
             return Err(wrong("expected a field and its value with `=` between them", 0..argument.len()));

@@ -1,7 +1,7 @@
 //! How far the work is: a bar on a terminal, lines elsewhere, JSON, or nothing.
 
 use std::io::{self, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -16,7 +16,6 @@ use crate::words::counted;
 /// Lines that a run prints at most, however many frames it makes.
 const MOST_LINES: u64 = 100;
 
-/// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Style {
     Bar,
@@ -42,38 +41,23 @@ impl Style {
     }
 }
 
-/// What a run is about to do.
-#[derive(Debug)]
-pub(crate) struct Start {
-    /// Folder of the data set.
-    pub(crate) dir: PathBuf,
-    /// Seed of the data set.
-    pub(crate) seed: u64,
-    /// Frames that are asked for.
-    pub(crate) frames: u64,
-    /// Threads that work.
-    pub(crate) threads: usize,
-    /// Memory that they are expected to need at most, bytes.
-    pub(crate) memory: u64,
-}
-
 /// Says how far a run is. Shared by all threads.
 #[derive(Debug)]
-pub(crate) struct Progress {
+pub(crate) struct Progress<'a> {
     style: Style,
-    start: Start,
+    dir: &'a Path,
     bar: ProgressBar,
 }
 
-impl Progress {
-    /// Announces a run.
-    pub(crate) fn start(args: &Generate, start: Start) -> Result<Self, Failure> {
+impl<'a> Progress<'a> {
+    /// Announces a run that makes so many frames on so many threads, with so many bytes of memory at most.
+    pub(crate) fn start(args: &'a Generate, frames: u64, threads: usize, memory: u64) -> Result<Self, Failure> {
         let style = Style::of(args.quiet, args.json);
-        let bar = style.bar(start.frames);
+        let (dir, bar) = (args.out.as_path(), style.bar(frames));
         bar.set_style(look("{msg}", "frames, {elapsed} gone"));
-        bar.set_message(start.dir.display().to_string());
+        bar.set_message(dir.display().to_string());
         if style == Style::Json {
-            let Start { dir, seed, frames, threads, memory } = &start;
+            let seed = args.engine.seed;
             event(&json!({
                 "event": "start", "dir": dir, "seed": seed, "frames": frames, "threads": threads, "memory_bytes": memory,
             }))?;
@@ -83,7 +67,7 @@ impl Progress {
             // Frames may take a while: the clock runs on between them.
             bar.enable_steady_tick(Duration::from_secs(1));
         }
-        Ok(Self { style, start, bar })
+        Ok(Self { style, dir, bar })
     }
 
     /// A frame is done, or was there. Whoever closed the stream that this is told on no longer wants to know.
@@ -112,14 +96,13 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
     }
 
     /// Everything is done.
     pub(crate) fn done(&self, outcome: &Outcome, share: Share) -> Result<(), Failure> {
-        let (dir, Outcome { made, kept, .. }) = (&self.start.dir, outcome);
+        let (dir, Outcome { made, kept, .. }) = (self.dir, outcome);
         match self.style {
             Style::Json => event(&json!({
                 "event": "done", "dir": dir, "made": made, "kept": kept, "peak_memory_bytes": memory::peak(),
@@ -167,7 +150,6 @@ impl Bar {
         }
     }
 
-    /// Takes the bar away.
     pub(crate) fn clear(&self) {
         self.bar.finish_and_clear();
     }

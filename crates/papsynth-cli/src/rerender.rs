@@ -1,18 +1,16 @@
-//! `papsynth rerender`: the same scenes under another microscope.
+//! `papsynth rerender` and `papsynth convert`: a data set of another, under another microscope or in other formats.
 
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
-use papsynth::Threads;
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share, frames_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, Progress, frames_of, truth_differs};
 use toml::Table;
 
-use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
+use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
 use crate::exit::{self, Failure};
-use crate::interrupt::Interrupt;
-use crate::setup::Setup;
-use crate::words::runs;
+use crate::setup::{Setup, run_of};
+use crate::words::{counted, runs};
 
 /// The sections of a recipe that say how a scene is imaged, not what lies in it.
 const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", "stain"];
@@ -22,7 +20,9 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let frames = frames_of(&source)?;
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
-    if before.recipe.recipe.to_toml() != source_recipe(&source)? {
+    let path = source.path().join("recipe.toml");
+    let recipe = std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))?;
+    if before.recipe.recipe.to_toml() != recipe {
         return Err(Failure::wrong(
             format!("{}: this program reads its recipe otherwise", args.dir.display()),
             "a data set is rendered again by the release that made it",
@@ -37,8 +37,8 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
         ));
     }
     let (layout, _) = args.layout.layout(0);
-    let interrupt = Interrupt::watch()?;
-    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, interrupt.flag())?;
+    let stop = exit::watch()?;
+    let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, stop)?;
     if let Some(difference) = truth_differs(&args.dir, &args.out)? {
         return Err(Failure::wrong(
             format!("the truth is another: {difference}"),
@@ -48,13 +48,26 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     if args.quiet {
         return Ok(());
     }
+    let (out, dir, Outcome { made, kept, .. }) = (args.out.display(), args.dir.display(), outcome);
+    exit::print(&format!("{out}: {made} frames made, {kept} were there; the truth is that of {dir}\n"))
+}
+
+/// `papsynth convert`: a data set in other formats.
+pub(crate) fn convert(args: &Convert) -> Result<(), Failure> {
+    let layout = args.files.layout(args.format.clone());
+    let stop = exit::watch()?;
+    let report = |_: Progress| ();
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &report)?;
     let out = args.out.display();
-    exit::print(&format!(
-        "{out}: {} frames made, {} were there; the truth is that of {}\n",
-        outcome.made,
-        outcome.kept,
-        args.dir.display()
-    ))
+    if outcome.stopped {
+        let message = format!("stopped; every file in {out} is whole");
+        return Err(Failure::stopped(message, "write"));
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
+    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.made, "frame", "frames")))
 }
 
 /// The engine of the data set's recipe, with what is set over it or without.
@@ -69,17 +82,11 @@ fn load(args: &Rerender, seed: u64, changed: bool) -> Result<Setup, Failure> {
         },
         model: Some(args.dir.join("model.json")),
         seed,
-        threads: Some(u16::try_from(args::threads(args.threads)).unwrap_or(u16::MAX)),
+        threads: args.threads,
     };
     Setup::load(&engine, None)
 }
 
-fn source_recipe(source: &Dataset) -> Result<String, Failure> {
-    let path = source.path().join("recipe.toml");
-    std::fs::read_to_string(&path).map_err(|error| Failure::file("read", &path, &error))
-}
-
-/// Names of the sections in which two recipes differ.
 fn changed_sections(before: &Recipe, after: &Recipe) -> Vec<String> {
     let table = |recipe: &Recipe| -> Table { toml::from_str(&recipe.to_toml()).unwrap_or_default() };
     let (before, after) = (table(before), table(after));
@@ -96,20 +103,10 @@ pub(crate) fn render(
     out: &std::path::Path,
     stop: &AtomicBool,
 ) -> Result<Outcome, Failure> {
-    let map = setup.map.as_ref();
-    let info = DatasetInfo { recipe: &setup.recipe.recipe, model: &setup.model, seed, map, layout };
-    let dataset = Dataset::create_or_resume(out, &info)?;
+    let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
     let mut sum = Outcome { kept: 0, made: 0, stopped: false };
     for frames in frames {
-        let run = Run {
-            frames: frames.clone(),
-            share: Share::ALL,
-            at_once: setup.threads,
-            threads: Threads::One,
-            check: Check::Sizes,
-            stop,
-            profile: None,
-        };
+        let run = run_of(frames.clone(), setup.threads, stop);
         let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
         sum.kept += outcome.kept;
         sum.made += outcome.made;

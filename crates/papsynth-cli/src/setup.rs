@@ -1,33 +1,31 @@
 //! From the command line to an engine.
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use papsynth::model::Model;
 use papsynth::profile::Profile;
 use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
+use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Share};
 
-use crate::args::EngineArgs;
-use crate::exit::{self, Complaint, Failure};
+use crate::args::{EngineArgs, threads};
+use crate::exit::{self, Failure};
 use crate::recipe_file::RecipeFile;
 use crate::text_file;
 
 /// Largest model that is read: it may hold the textures of thousands of nuclei.
 const LARGEST_MODEL: u64 = 1 << 28;
 
-/// All that frames are made from.
 #[derive(Debug)]
 pub(crate) struct Setup {
-    /// The recipe, and where it was written.
     pub(crate) recipe: RecipeFile,
-    /// What cells are like.
     pub(crate) model: Model,
     /// The map that the recipe names.
     pub(crate) map: Option<InputFile>,
-    /// Makes the frames.
     pub(crate) engine: Engine,
-    /// Threads to work with.
     pub(crate) threads: usize,
 }
 
@@ -39,16 +37,19 @@ impl Setup {
         recipe.check_classes(&model)?;
         let folder = recipe.folder.clone();
         let (mut inputs, map) = read_inputs(&mut recipe.recipe, &folder, &Limits::default())
-            .map_err(|error| Failure::dataset(&error, recipe.complaint("layout.path", error.to_string())))?;
+            .map_err(|error| Failure::new(error.is_io(), recipe.complaint("layout.path", error.to_string())))?;
         inputs.profile = profile;
         let engine = Engine::new(&recipe.recipe, &model, &inputs).map_err(|error| recipe.refuse(&error))?;
-        for note in recipe.recipe.notes() {
-            exit::note(&note.to_string());
-        }
-        Ok(Self { recipe, model, map, engine, threads: args.threads() })
+        recipe.recipe.notes().iter().for_each(exit::note);
+        Ok(Self { recipe, model, map, engine, threads: threads(args.threads) })
     }
 
-    /// A slide of a seed.
+    /// What a data set of a seed is made of.
+    pub(crate) fn info<'a>(&'a self, seed: u64, layout: &'a Layout) -> DatasetInfo<'a> {
+        let (recipe, map) = (&self.recipe.recipe, self.map.as_ref());
+        DatasetInfo { recipe, model: &self.model, seed, map, layout }
+    }
+
     pub(crate) fn slide(&self, seed: u64, number: u64) -> Result<papsynth::Slide<'_>, Failure> {
         self.engine.slide(seed, number).map_err(|error| self.recipe.refuse(&error))
     }
@@ -72,16 +73,22 @@ impl Setup {
     }
 }
 
+/// All of some frames, each made on a thread of its own.
+pub(crate) fn run_of(frames: Range<u64>, at_once: usize, stop: &AtomicBool) -> Run<'_> {
+    let (share, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
+    Run { frames, share, at_once, threads, check, stop, profile: None }
+}
+
 /// Threads of their own, as many as asked for, or one a core.
 #[cfg(feature = "judge")]
 pub(crate) fn pool(asked: Option<u16>) -> Result<rayon::ThreadPool, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(crate::args::threads(asked)).build();
-    pool.map_err(|error| Failure::input(Complaint::new(format!("cannot start threads: {error}"))))
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(asked)).build();
+    pool.map_err(|error| Failure::input(format!("cannot start threads: {error}")))
 }
 
 /// The model that ships, with the classes of a file.
 pub(crate) fn read_model(path: Option<&Path>) -> Result<Model, Failure> {
     let Some(path) = path else { return Ok(Model::builtin()) };
     let (name, text) = text_file::read(path, LARGEST_MODEL, "a model or a class file")?;
-    Model::builtin().with(&text).map_err(|error| Failure::input(Complaint::new(format!("{name}: {error}"))))
+    Model::builtin().with(&text).map_err(|error| Failure::input(format!("{name}: {error}")))
 }

@@ -1,15 +1,53 @@
 //! Which share of the work is this process's: as given, or as a scheduler says in its environment.
 
+use clap::Args;
 use papsynth_dataset::Share;
 
-use crate::args::Shards;
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
-/// The share that is asked for.
-pub(crate) fn of(shards: Shards) -> Result<Share, Failure> {
-    match shards {
-        Shards::Given(share) => Ok(share),
-        Shards::Environment(of) => from_environment(of, |name| std::env::var(name).ok()),
+/// Which shards to make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shards {
+    Given(Share),
+    /// Those that the environment of a Slurm array or of a Kubernetes job says; of how many, where it does not say.
+    Environment(Option<u64>),
+}
+
+/// Which share to make.
+#[derive(Debug, Args)]
+pub(crate) struct ShareArgs {
+    /// Make every N-th shard from the I-th on (0/4 to 3/4 make all); `auto` asks the environment of a Slurm array, `auto/N`
+    /// that of a Kubernetes job of N completions. Close the data set with `papsynth merge`, a slide with
+    /// `papsynth slide finalize` afterwards
+    #[arg(long, value_name = "I/N", value_parser = parse_share)]
+    pub(crate) shard: Option<Shards>,
+}
+
+impl ShareArgs {
+    /// The share that is asked for: all where none is.
+    pub(crate) fn share(&self) -> Result<Share, Failure> {
+        match self.shard {
+            None => Ok(Share::ALL),
+            Some(Shards::Given(share)) => Ok(share),
+            Some(Shards::Environment(of)) => from_environment(of, |name| std::env::var(name).ok()),
+        }
+    }
+}
+
+fn parse_share(text: &str) -> Result<Shards, String> {
+    let expected = "expected I/N with 0 ≤ I < N, such as 0/4, or `auto`, or `auto/N`";
+    let number = |part: &str| part.trim().parse::<u64>().map_err(|e| format!("{part:?}: {e}; {expected}"));
+    match text.split_once('/') {
+        None if text == "auto" => Ok(Shards::Environment(None)),
+        Some(("auto", of)) => match number(of)? {
+            0 => Err(expected.to_owned()),
+            of => Ok(Shards::Environment(Some(of))),
+        },
+        Some((index, of)) => {
+            let share = Share { index: number(index)?, of: number(of)? };
+            if share.index < share.of { Ok(Shards::Given(share)) } else { Err(expected.to_owned()) }
+        }
+        None => Err(expected.to_owned()),
     }
 }
 
@@ -17,45 +55,32 @@ pub(crate) fn of(shards: Shards) -> Result<Share, Failure> {
 fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) -> Result<Share, Failure> {
     let number = |name: &str| -> Result<Option<u64>, Failure> {
         let Some(text) = variable(name) else { return Ok(None) };
-        let wrong = |_| Failure::input(Complaint::new(format!("{name} is {text:?}; a whole number is expected")));
+        let wrong = |_| Failure::input(format!("{name} is {text:?}; a whole number is expected"));
         text.trim().parse().map(Some).map_err(wrong)
     };
-    let share = if let Some(task) = number("SLURM_ARRAY_TASK_ID")? {
+    let ask = |message: &str| Err(Failure::wrong(message, "say it: --shard auto/N"));
+    let (index, of) = if let Some(task) = number("SLURM_ARRAY_TASK_ID")? {
         // Of a repaired array (`--array=3,17`) only its own numbers say how many tasks there once were.
         let (count, first) = (number("SLURM_ARRAY_TASK_COUNT")?, number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0));
-        match of {
-            Some(of) => Share { index: task, of },
-            None => {
-                let last = number("SLURM_ARRAY_TASK_MAX")?;
-                let whole = last.is_none_or(|last| count == Some(last.saturating_sub(first) + 1));
-                match count {
-                    Some(of) if whole && first == 0 => Share { index: task, of },
-                    _ => {
-                        return Err(ask(
-                            "the Slurm array has not the tasks 0 to N − 1, so that it does not say how many shares there are",
-                        ));
-                    }
-                }
-            }
-        }
+        let last = if of.is_none() { number("SLURM_ARRAY_TASK_MAX")? } else { None };
+        let is_whole = first == 0 && last.is_none_or(|last| count == Some(last.saturating_add(1)));
+        let Some(of) = of.or(count.filter(|_| is_whole)) else {
+            return ask(
+                "the Slurm array has not the tasks 0 to N − 1, so that it does not say how many shares there are",
+            );
+        };
+        (task, of)
     } else if let Some(index) = number("JOB_COMPLETION_INDEX")? {
-        match of {
-            Some(of) => Share { index, of },
-            None => return Err(ask("Kubernetes does not say how many completions there are")),
-        }
+        let Some(of) = of else { return ask("Kubernetes does not say how many completions there are") };
+        (index, of)
     } else {
         let message = "neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set, which `--shard auto` reads";
         return Err(Failure::wrong(message, "give the share itself: --shard 0/4"));
     };
-    if share.index < share.of {
-        return Ok(share);
+    match index < of {
+        true => Ok(Share { index, of }),
+        false => Err(Failure::input(format!("task {index} is none of {of}, which are counted from 0"))),
     }
-    let Share { index, of } = share;
-    Err(Failure::input(Complaint::new(format!("task {index} is none of {of}, which are counted from 0"))))
-}
-
-fn ask(message: &str) -> Failure {
-    Failure::wrong(message, "say it: --shard auto/N")
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ fn tile(args: &SlideTile) -> Result<(), Failure> {
     let middle = part.planes.len() / 2;
     if part.planes.len() > 1 {
         let (planes, um) = (part.planes.len(), part.planes[middle].stage_um);
-        exit::note(&format!(
+        exit::note(format!(
             "of {planes} planes the middle one, at {um} µm, is written; `papsynth slide make` writes all"
         ));
     }

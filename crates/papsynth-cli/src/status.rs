@@ -1,23 +1,24 @@
-//! `papsynth status` and `papsynth merge`: how much is there, and the end of the work of several.
+//! `papsynth status`, `merge`, `verify` and `clean`: how much is there, the end of the work of several, whether a data set is
+//! whole, and what does not belong there.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::path::Path;
 
-use papsynth_dataset::{Check, Dataset, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Finding, Home, Mend, shards_to_make};
 
-use crate::args::{Merge, Status, check_of};
+use crate::args::{Clean, Merge, Status, Verify, check_of};
 use crate::exit::{self, Failure};
-use crate::place;
 use crate::words::{counted, runs};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
     #[cfg(feature = "zarr")]
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
-        let there = crate::slide::there(&args.dir)?;
-        let close = (!there.is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
-        return tell(args, &runs(&there.missing), there.shards, close.as_deref());
+        let (missing, shards, is_closed) = crate::slide::there(&args.dir)?;
+        let close = (!is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
+        return tell(args, &runs(&missing), shards, close.as_deref());
     }
-    let dataset = Dataset::open(&place::home(&args.dir)?)?;
+    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
         return Err(Failure::wrong(
@@ -51,7 +52,7 @@ fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) ->
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
-    let dataset = Dataset::open(&place::home(&args.dir)?)?;
+    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
     let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {
@@ -87,6 +88,70 @@ fn listed(ranges: &[Range<u64>]) -> String {
         .iter()
         .map(|r| if r.end - r.start == 1 { r.start.to_string() } else { format!("{}-{}", r.start, r.end - 1) });
     text.collect::<Vec<_>>().join(",")
+}
+
+pub(crate) fn verify(args: &Verify) -> Result<(), Failure> {
+    #[cfg(feature = "zarr")]
+    if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
+        return crate::slide::verify(&args.dir, args.json);
+    }
+    let verdict = papsynth_dataset::verify(&Home::at(&args.dir)?, args.frames.map(|frames| 0..frames))?;
+    let dir = args.dir.display();
+    if args.json {
+        let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
+        exit::print(&format!("{text}\n"))?;
+    } else if let Some(root) = &verdict.root {
+        let (frames, files) = (counted(verdict.frames, "frame", "frames"), counted(verdict.files, "file", "files"));
+        exit::print(&format!("{dir}: whole, {frames} in {files}\nroot {root}\n"))?;
+    } else {
+        print_findings(&verdict.findings)?;
+    }
+    judge(&args.dir, &verdict.findings)
+}
+
+pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
+    let cleaned = papsynth_dataset::clean(&Home::at(&args.dir)?, args.strays)?;
+    let (dir, strays) = (args.dir.display(), counted(cleaned.strays, "other", "others"));
+    let left = counted(cleaned.temporary, "file", "files");
+    exit::print(&format!("{dir}: {left} of killed runs and {strays} removed\n"))?;
+    if cleaned.stayed > 0 {
+        let stay = counted(cleaned.stayed, "file stays", "files stay");
+        exit::note(format!("{stay}: at work, another user's, or of a name that is no UTF-8"));
+    }
+    Ok(())
+}
+
+/// Findings that are printed in full; the rest is counted.
+const MOST_FINDINGS: usize = 50;
+
+pub(crate) fn print_findings(findings: &[Finding]) -> Result<(), Failure> {
+    let mut text = String::new();
+    for finding in findings.iter().take(MOST_FINDINGS) {
+        text.push_str(&format!("{}: {}\n", finding.path, finding.message));
+    }
+    if findings.len() > MOST_FINDINGS {
+        text.push_str(&format!("and {} more\n", findings.len() - MOST_FINDINGS));
+    }
+    exit::print(&text)
+}
+
+/// Nothing found is good; else there is something to do.
+pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
+    if findings.is_empty() {
+        return Ok(());
+    }
+    let things = counted(findings.len() as u64, "thing is", "things are");
+    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
+    let mends: Vec<&str> = [
+        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
+        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
+        (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
+    ]
+    .into_iter()
+    .filter(|(mend, _)| wants(*mend))
+    .map(|(_, words)| words)
+    .collect();
+    Err(Failure::wrong(format!("{}: {things} wrong", dir.display()), mends.join("; ")))
 }
 
 #[cfg(test)]

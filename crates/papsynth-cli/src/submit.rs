@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Parser;
 
 use crate::args::{Cli, Generate, Submit, Verb};
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::setup::Setup;
 
 pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
@@ -13,8 +13,8 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
     let words = ["papsynth", "generate"].into_iter().chain(args.arguments.iter().map(String::as_str));
     let generate = match Cli::try_parse_from(words) {
         Ok(Cli { verb: Verb::Generate(generate) }) => generate,
-        Ok(_) => return Err(Failure::input(Complaint::new("what follows `--` is not for `papsynth generate`"))),
-        Err(error) => return Err(Failure::input(Complaint::new(error.to_string()))),
+        Ok(_) => return Err(Failure::input("what follows `--` is not for `papsynth generate`")),
+        Err(error) => return Err(Failure::input(error)),
     };
     if generate.share.shard.is_some() || generate.engine.threads.is_some() {
         return Err(Failure::wrong(
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
         _ => {
             let out = &generate.out;
             if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
-                exit::note(&format!(
+                exit::note(format!(
                     "{} lies in the pod and is lost with it; the volume is mounted at /data, and addresses of object stores need none",
                     out.display()
                 ));
@@ -58,7 +58,7 @@ fn check_here(generate: &Generate) -> Result<(), Failure> {
                     "leave it out; what follows it is meant",
                 ));
             }
-            exit::note(&format!("{} is not on this machine; the tasks must find it", path.display()));
+            exit::note(format!("{} is not on this machine; the tasks must find it", path.display()));
             Ok(())
         }
         _ => Setup::load(&generate.engine, None).map(drop),

@@ -7,22 +7,17 @@ use std::path::Path;
 use papsynth_dataset::{Dataset, images_of, write_file};
 
 use crate::args::Sweep;
-use crate::exit::{self, Complaint, Failure};
-use crate::interrupt::Interrupt;
+use crate::exit::{self, Failure};
 use crate::rerender::render;
 use crate::setup::Setup;
 use crate::text_file;
 
-/// Most combinations of a sweep.
 const MOST: usize = 10_000;
 
-/// The name of the table.
 const TABLE: &str = "sweep.csv";
 
-/// Its first columns.
 const COLUMNS: [&str; 4] = ["set", "image", "slide", "file"];
 
-/// A field and the values that it takes.
 struct Axis {
     field: String,
     values: Vec<String>,
@@ -40,23 +35,25 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
     }
     let count = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.values.len()));
     let Some(count) = count.filter(|count| *count <= MOST) else {
-        return Err(Failure::input(Complaint::new(format!("more than {MOST} combinations; vary fewer at once"))));
+        return Err(Failure::input(format!("more than {MOST} combinations; vary fewer at once")));
     };
     let (layout, _) = args.layout.layout(args.frames);
     // What one combination cannot be made of is told before any is made.
-    let combinations: Vec<Vec<&str>> = (0..count).map(|number| combination(&axes, number)).collect();
+    let combinations = combinations(&axes);
     let setups = combinations.iter().map(|values| setup(args, &axes, values)).collect::<Result<Vec<_>, _>>()?;
     is_own(&args.out, count)?;
     let frames = 0..args.frames;
-    let interrupt = Interrupt::watch()?;
-    let mut table = csv_line(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
+    let stop = exit::watch()?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    // Writing to memory cannot fail, and all lines are of one length.
+    let _ = table.write_record(COLUMNS.into_iter().chain(axes.iter().map(|axis| axis.field.as_str())));
     for (number, (setup, values)) in setups.iter().zip(&combinations).enumerate() {
         let name = set_name(number);
         let out = args.out.join(&name);
-        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, interrupt.flag())?;
+        render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, stop)?;
         for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
             let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
-            table.push_str(&csv_line(fixed.into_iter().chain(values.iter().copied())));
+            let _ = table.write_record(fixed.into_iter().chain(values.iter().copied()));
         }
         if !args.quiet {
             let set: Vec<String> =
@@ -65,7 +62,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), Failure> {
         }
     }
     let path = args.out.join(TABLE);
-    write_file(&path, table.as_bytes())?;
+    write_file(&path, &table.into_inner().unwrap_or_default())?;
     if args.quiet { Ok(()) } else { exit::print(&format!("Look at: {}\n", path.display())) }
 }
 
@@ -79,7 +76,7 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Err(error) if error.kind() == ErrorKind::NotADirectory => {
-            return Err(Failure::input(Complaint::new(format!("{}: is a file; a folder is wanted", out.display()))));
+            return Err(Failure::input(format!("{}: is a file; a folder is wanted", out.display())));
         }
         Err(error) => return Err(Failure::file("read", out, &error)),
     };
@@ -99,20 +96,19 @@ fn is_own(out: &Path, count: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The name of a data set of a sweep.
 fn set_name(number: usize) -> String {
     format!("{number:04}")
 }
 
 fn axis(text: &str) -> Result<Axis, Failure> {
-    let wrong = || Failure::input(Complaint::new(format!("--vary {text}: expected FIELD=A,B,…")));
+    let wrong = || Failure::input(format!("--vary {text}: expected FIELD=A,B,…"));
     let (field, values) = text.split_once('=').ok_or_else(wrong)?;
     let values = parts(values);
     if field.trim().is_empty() || values.iter().any(String::is_empty) {
         return Err(wrong());
     }
     if let Some(twice) = values.iter().enumerate().find(|(number, value)| values[..*number].contains(value)) {
-        return Err(Failure::input(Complaint::new(format!("--vary {text}: {} stands there twice", twice.1))));
+        return Err(Failure::input(format!("--vary {text}: {} stands there twice", twice.1)));
     }
     Ok(Axis { field: field.trim().to_owned(), values })
 }
@@ -139,34 +135,21 @@ fn parts(text: &str) -> Vec<String> {
     parts.iter().map(|part| part.trim().to_owned()).collect()
 }
 
-/// The values of a combination: the last axis changes first.
-fn combination(axes: &[Axis], mut number: usize) -> Vec<&str> {
-    let mut values: Vec<&str> = axes
-        .iter()
-        .rev()
-        .map(|axis| {
-            let value = &axis.values[number % axis.values.len()];
-            number /= axis.values.len();
-            value.as_str()
-        })
-        .collect();
-    values.reverse();
-    values
+/// The values of every combination: the last axis changes first.
+fn combinations(axes: &[Axis]) -> Vec<Vec<&str>> {
+    let mut all = vec![Vec::new()];
+    for axis in axes {
+        let each =
+            |before: &Vec<_>| axis.values.iter().map(|value| [&before[..], &[value.as_str()]].concat()).collect();
+        all = all.iter().flat_map(|before| -> Vec<_> { each(before) }).collect();
+    }
+    all
 }
 
 fn setup(args: &Sweep, axes: &[Axis], values: &[&str]) -> Result<Setup, Failure> {
     let mut engine = args.engine.clone();
     engine.recipe.set.extend(axes.iter().zip(values).map(|(axis, value)| format!("{}={value}", axis.field)));
     Setup::load(&engine, None)
-}
-
-/// A line of a table; a value with a comma or a quote is quoted.
-fn csv_line<'a>(values: impl Iterator<Item = &'a str>) -> String {
-    let cell = |value: &str| match value.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", value.replace('"', "\"\"")),
-        false => value.to_owned(),
-    };
-    format!("{}\n", values.map(cell).collect::<Vec<_>>().join(","))
 }
 
 #[cfg(test)]
@@ -176,12 +159,9 @@ mod tests {
     #[test]
     fn every_combination_comes_once() {
         let axes = [axis("a.b=1,2").unwrap(), axis("c = x, y ,z").unwrap()];
-        let all: Vec<Vec<&str>> = (0..6).map(|number| combination(&axes, number)).collect();
-        assert_eq!(all[0], ["1", "x"]);
-        assert_eq!(all[1], ["1", "y"]);
-        assert_eq!(all[5], ["2", "z"]);
+        let expected = [["1", "x"], ["1", "y"], ["1", "z"], ["2", "x"], ["2", "y"], ["2", "z"]];
+        assert_eq!(combinations(&axes), expected);
         assert!(axis("a").is_err() && axis("a=").is_err() && axis("=1").is_err());
-        assert_eq!(csv_line(["a", "b,c", "d\"e"].into_iter()), "a,\"b,c\",\"d\"\"e\"\n");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, stdin};
 use std::path::Path;
 
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
 /// Makes sure that writing to `out` costs the user nothing but an older output of the same kind: a file that is there must
 /// begin as one does.
@@ -26,7 +26,7 @@ pub(crate) fn may_replace_in(out: &Path, files: &[(&str, &[u8], &str)]) -> Resul
     files.iter().try_for_each(|(name, begins, what)| may_replace(&out.join(name), begins, what))?;
     if out.exists() && !out.is_dir() {
         let message = format!("--out {}: there is a file of this name; expected a folder", out.display());
-        return Err(Failure::input(Complaint::new(message)));
+        return Err(Failure::input(message));
     }
     Ok(())
 }
@@ -37,7 +37,7 @@ pub(crate) fn is_png(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     if OTHERS.contains(&ending.as_str()) {
         let message = format!("--out {}: the picture is a PNG; expected a name that ends in .png", out.display());
-        return Err(Failure::input(Complaint::new(message)));
+        return Err(Failure::input(message));
     }
     may_replace(out, b"\x89PNG", "an older picture")
 }
@@ -47,7 +47,7 @@ pub(crate) fn is_png(out: &Path) -> Result<(), Failure> {
 pub(crate) fn can_write(out: &Path) -> Result<(), Failure> {
     if out.is_dir() {
         let message = format!("{}: this is a folder; expected the name of a file", out.display());
-        return Err(Failure::input(Complaint::new(message)));
+        return Err(Failure::input(message));
     }
     // Folders that are not there yet are made when it is written.
     let named = out.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty());
@@ -69,7 +69,7 @@ pub(crate) fn read(path: &Path, largest: u64, what: &str) -> Result<(String, Str
         File::open(path).and_then(|file| file.take(largest + 1).read_to_end(&mut bytes))
     };
     read.map_err(|error| Failure::file("read", path, &error))?;
-    let refuse = |message: String| Failure::input(Complaint::new(message));
+    let refuse = |message: String| Failure::input(message);
     if bytes.len() as u64 > largest {
         return Err(refuse(format!("{name}: it is larger than {largest} bytes; expected {what}")));
     }

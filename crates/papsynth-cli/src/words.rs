@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-/// A number and what is counted.
 pub(crate) fn counted(count: u64, one: &str, many: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { many })
 }

@@ -1,8 +1,10 @@
 //! Arrays that Python hands over: of numbers, of the right shape, and finite.
 
 use numpy::{Element, PyArray2, PyArrayMethods, dtype};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+
+use crate::error::wrong;
 
 /// Anything that NumPy may make an array of.
 pub(crate) type Given<'py> = Bound<'py, PyAny>;
@@ -22,7 +24,7 @@ fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyRe
         return Ok((Vec::new(), [0, shape.get(1).copied().unwrap_or(0)]));
     }
     let &[rows, columns] = shape.as_slice() else {
-        return Err(PyValueError::new_err(format!("{name}: has the shape {shape:?}; expected two dimensions")));
+        return Err(wrong(format!("{name}: has the shape {shape:?}; expected two dimensions")));
     };
     let array = array.call_method1("astype", (dtype::<T>(py),))?;
     let array = array.cast::<PyArray2<T>>()?;
@@ -30,7 +32,7 @@ fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyRe
     match values.iter().position(|&value| !value.into().is_finite()) {
         Some(place) => {
             let (row, column, value) = (place / columns, place % columns, values[place].into());
-            Err(PyValueError::new_err(format!("{name}[{row}, {column}]: {value}; expected finite numbers")))
+            Err(wrong(format!("{name}[{row}, {column}]: {value}; expected finite numbers")))
         }
         None => Ok((values, [rows, columns])),
     }
@@ -40,7 +42,7 @@ fn numbers<T: Element + Copy + Into<f64>>(name: &str, given: &Given<'_>) -> PyRe
 pub(crate) fn pixels(name: &str, image: &Given<'_>) -> PyResult<(Vec<f32>, usize)> {
     let (values, [_, width]) = numbers(name, image)?;
     if values.is_empty() {
-        return Err(PyValueError::new_err(format!("{name}: has no pixel; expected (height, width)")));
+        return Err(wrong(format!("{name}: has no pixel; expected (height, width)")));
     }
     Ok((values, width))
 }
@@ -52,7 +54,7 @@ pub(crate) fn pixels_within(name: &str, image: &Given<'_>, [low, high]: [f32; 2]
         Some(place) => {
             let (row, column, value) = (place / width, place % width, values[place]);
             let range = if high < f32::MAX { format!("{low} to {high}") } else { format!("at least {low}") };
-            Err(PyValueError::new_err(format!("{name}[{row}, {column}]: {value}; expected {range}")))
+            Err(wrong(format!("{name}[{row}, {column}]: {value}; expected {range}")))
         }
         None => Ok((values, width)),
     }
@@ -63,12 +65,11 @@ pub(crate) fn points(name: &str, points: &Given<'_>) -> PyResult<Vec<[f64; 2]>> 
     let (values, [rows, columns]) = numbers::<f64>(name, points)?;
     if !values.is_empty() && columns != 2 {
         let message = format!("{name}: has the shape [{rows}, {columns}]; expected rows of x and y, (n, 2)");
-        return Err(PyValueError::new_err(message));
+        return Err(wrong(message));
     }
     Ok(values.as_chunks::<2>().0.to_vec())
 }
 
-/// One of a list.
 pub(crate) fn nth(name: &str, number: usize) -> String {
     format!("{name}[{number}]")
 }

@@ -3,32 +3,14 @@
 use papsynth_calibrate::{
     Calibration, Edge, EdgeAt, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt, Window,
 };
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde_json::Value;
 
 use crate::array::{Given, nth, pixels, pixels_within};
+use crate::error::wrong;
 use crate::pool;
 
-fn wrong(error: impl std::fmt::Display) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
-
-/// What `papsynth.calibrate_microscope` gives, as JSON.
-///
-/// Parameters
-/// ----------
-/// stack : list of array_like, optional
-///     Planes, each (height, width).
-/// edge : array_like, optional
-///     (height, width).
-/// step_um : float, optional
-/// windows : list of (int, int, int, int), optional
-///     Left, top, width and height.
-/// line : (float, float, float, float), optional
-///     Two points.
-/// pixel_um, na, wavelength_um, mount_index, immersion_index : float, optional
-/// threads : int
+/// What `papsynth.calibrate_microscope` gives, where what is given is described, as JSON.
 #[pyfunction]
 #[pyo3(signature = (stack=None, edge=None, *, step_um=None, windows=None, line=None, pixel_um=None, na=None, wavelength_um=None, mount_index=None, immersion_index=None, threads=0))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -91,14 +73,7 @@ pub(crate) fn calibrate_microscope(
     told(&found, [("recipe", recipe), ("recipe_gaussian", gaussian)])
 }
 
-/// What `papsynth.calibrate_camera` gives, as JSON.
-///
-/// Parameters
-/// ----------
-/// flats : list of list of array_like
-///     Frames of each level of light, each (height, width).
-/// darks : list of array_like
-/// bits : int
+/// What `papsynth.calibrate_camera` gives, where what is given is described, as JSON.
 #[pyfunction]
 pub(crate) fn calibrate_camera(
     py: Python<'_>,

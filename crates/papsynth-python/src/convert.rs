@@ -1,26 +1,22 @@
 //! Dictionaries of Python as the text of a recipe.
 
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use toml::{Table, Value};
 
+use crate::error::wrong;
+
 /// No recipe is nested as deep; a list that holds itself is.
 const DEEPEST: usize = 16;
 
-/// A dictionary as TOML.
-pub(crate) fn table(dict: &Bound<'_, PyDict>) -> PyResult<Table> {
-    nested(dict, "", 0)
-}
-
-fn nested(dict: &Bound<'_, PyDict>, path: &str, depth: usize) -> PyResult<Table> {
-    if depth > DEEPEST {
-        return Err(PyValueError::new_err(format!("{path}: nested deeper than any recipe")));
-    }
+/// A dictionary as TOML; it lies at a path, so deep. That of a recipe lies at `""`, 0.
+pub(crate) fn table(dict: &Bound<'_, PyDict>, path: &str, depth: usize) -> PyResult<Table> {
     let mut table = Table::new();
     for (key, value) in dict {
         let Ok(key) = key.cast::<PyString>() else {
-            return Err(PyTypeError::new_err(format!("{}: {} is no name of a field", shown(path), key.repr()?)));
+            let path = if path.is_empty() { "recipe" } else { path };
+            return Err(PyTypeError::new_err(format!("{path}: {} is no name of a field", key.repr()?)));
         };
         let key = key.to_str()?.to_owned();
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
@@ -29,13 +25,9 @@ fn nested(dict: &Bound<'_, PyDict>, path: &str, depth: usize) -> PyResult<Table>
     Ok(table)
 }
 
-fn shown(path: &str) -> &str {
-    if path.is_empty() { "recipe" } else { path }
-}
-
 fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> {
     if depth > DEEPEST {
-        return Err(PyValueError::new_err(format!("{path}: nested deeper than any recipe")));
+        return Err(wrong(format!("{path}: nested deeper than any recipe")));
     }
     if let Ok(truth) = value.cast::<PyBool>() {
         return Ok(Value::Boolean(truth.is_true()));
@@ -44,7 +36,7 @@ fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> 
         return Ok(Value::String(text.to_str()?.to_owned()));
     }
     if let Ok(dict) = value.cast::<PyDict>() {
-        return Ok(Value::Table(nested(dict, path, depth)?));
+        return Ok(Value::Table(table(dict, path, depth)?));
     }
     if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
         let items = value.try_iter()?.map(|item| self::value(&item?, path, depth + 1));
@@ -52,9 +44,7 @@ fn value(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> PyResult<Value> 
     }
     if value.is_instance_of::<PyInt>() {
         let whole = value.extract::<i64>();
-        return whole
-            .map(Value::Integer)
-            .map_err(|_| PyValueError::new_err(format!("{path}: {} is too large", repr(value))));
+        return whole.map(Value::Integer).map_err(|_| wrong(format!("{path}: {} is too large", repr(value))));
     }
     if value.is_instance_of::<PyFloat>() {
         return Ok(Value::Float(value.extract()?));

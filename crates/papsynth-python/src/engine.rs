@@ -13,20 +13,18 @@ use papsynth::{Plane, Threads};
 use papsynth_dataset::Layout;
 use papsynth_dataset::memory::{Need, available};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
-use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 
+use crate::error::wrong;
 use crate::frame::Frame;
 use crate::{convert, error, pool};
 
-/// Largest recipe that is read.
 const LARGEST_RECIPE: u64 = 1 << 20;
 
-/// Largest model that is read.
 const LARGEST_MODEL: u64 = 1 << 28;
 
-/// Largest scene that is read.
 const LARGEST_SCENE: u64 = 1 << 30;
 
 /// Makes the images of one recipe.
@@ -52,12 +50,10 @@ const LARGEST_SCENE: u64 = 1 << 30;
 pub(crate) struct Engine {
     pub(crate) engine: Arc<papsynth::Engine>,
     pub(crate) model: Model,
-    /// The map that the recipe names.
     pub(crate) map: Option<InputFile>,
     pub(crate) source: String,
 }
 
-/// What stops a rendering.
 enum Stop {
     Engine(papsynth::Error),
     Python(PyErr),
@@ -204,7 +200,6 @@ fn render(engine: &papsynth::Engine, scene: Scene, threads: Threads) -> Result<p
     Ok(papsynth::Frame { planes, finished })
 }
 
-/// A recipe, and where it comes from.
 pub(crate) struct Source {
     pub(crate) recipe: Recipe,
     /// Files that it names are relative to this.
@@ -227,35 +222,28 @@ impl Source {
         {
             return Ok(of_preset(preset));
         }
-        let dict = match recipe.hasattr("to_dict")? {
-            true => Some(recipe.call_method0("to_dict")?),
-            false => None,
-        };
+        let dict = recipe.hasattr("to_dict")?.then(|| recipe.call_method0("to_dict")).transpose()?;
         if let Ok(dict) = dict.as_ref().unwrap_or(recipe).cast::<PyDict>() {
             let name = "the recipe".to_owned();
-            let table = convert::table(dict)?;
+            let table = convert::table(dict, "", 0)?;
             if table.is_empty() {
                 return Ok(Self { name, ..of_preset(Preset::Lbc) });
             }
-            let text = toml::to_string(&table).map_err(|error| PyValueError::new_err(error.to_string()))?;
+            let text = toml::to_string(&table).map_err(wrong)?;
             let recipe = diagnose::read(&text).map_err(|faults| error::recipe(py, &name, &faults))?;
             return Ok(Self { recipe, folder: PathBuf::new(), name });
         }
+        let presets = || Preset::ALL.map(Preset::name).join(", ");
         let path: PathBuf = recipe.extract().map_err(|_| {
-            let presets: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
             PyTypeError::new_err(format!(
                 "recipe: {} is none; expected None, a dictionary, the path of a TOML file or one of {}",
                 recipe.get_type(),
-                presets.join(", ")
+                presets()
             ))
         })?;
         if !path.exists() {
-            let presets: Vec<&str> = Preset::ALL.iter().map(|preset| preset.name()).collect();
-            let message = format!(
-                "recipe: there is no file {}, nor a preset of that name: {}",
-                path.display(),
-                presets.join(", ")
-            );
+            let (path, presets) = (path.display(), presets());
+            let message = format!("recipe: there is no file {path}, nor a preset of that name: {presets}");
             return Err(PyFileNotFoundError::new_err(message));
         }
         let text = read(&path, LARGEST_RECIPE)?;
@@ -270,12 +258,12 @@ impl Source {
 pub(crate) fn read_model(py: Python<'_>, model: Option<&Bound<'_, PyAny>>) -> PyResult<Model> {
     let Some(model) = model.filter(|model| !model.is_none()) else { return Ok(Model::builtin()) };
     let (name, text) = json(py, model, "the model", LARGEST_MODEL)?;
-    Model::builtin().with(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+    Model::builtin().with(&text).map_err(|error| wrong(format!("{name}: {error}")))
 }
 
 fn read_scene(py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Scene> {
     let (name, text) = json(py, scene, "the scene", LARGEST_SCENE)?;
-    Scene::from_json(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+    Scene::from_json(&text).map_err(|error| wrong(format!("{name}: {error}")))
 }
 
 /// The name and the text of a file, or of a dictionary as JSON.
@@ -306,12 +294,7 @@ pub(crate) fn recipe_schema() -> String {
     Recipe::schema().to_string()
 }
 
-/// A recipe with everything that was left out, as TOML.
-///
-/// Parameters
-/// ----------
-/// recipe : None, str, os.PathLike or dict
-///     As of `Engine`.
+/// A recipe, as of `Engine`, with everything that was left out, as TOML.
 #[pyfunction]
 #[pyo3(signature = (recipe=None))]
 pub(crate) fn resolve(py: Python<'_>, recipe: Option<&Bound<'_, PyAny>>) -> PyResult<String> {

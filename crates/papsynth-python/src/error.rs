@@ -5,6 +5,11 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
+/// What a value or a library has against what was asked for.
+pub(crate) fn wrong(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
 /// A `papsynth.RecipeError` of these faults, each as its field, what is wrong with it and what would help.
 pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[Fault]) -> PyErr {
     let told: Vec<(String, String, Option<String>)> =
@@ -18,26 +23,22 @@ pub(crate) fn recipe(py: Python<'_>, source: &str, faults: &[Fault]) -> PyErr {
 
 /// What the engine says against a recipe or a scene.
 pub(crate) fn engine(py: Python<'_>, source: &str, error: &papsynth::Error) -> PyErr {
+    let fault = |field: &str, message: String| {
+        let path = field.split('.').map(str::to_owned).collect();
+        Fault { path, span: None, message, help: None }
+    };
     match error {
         papsynth::Error::Recipe(problems) => {
-            let fault = |problem: &papsynth::recipe::Problem| Fault {
-                path: problem.field.split('.').map(str::to_owned).collect(),
-                span: None,
-                message: problem.to_string(),
-                help: None,
-            };
-            recipe(py, source, &problems.iter().map(fault).collect::<Vec<_>>())
+            let faults: Vec<Fault> = problems.iter().map(|p| fault(&p.field, p.to_string())).collect();
+            recipe(py, source, &faults)
         }
-        papsynth::Error::Layout(_) => {
-            let fault = Fault { path: vec!["layout".to_owned()], span: None, message: error.to_string(), help: None };
-            recipe(py, source, &[fault])
-        }
-        other => PyValueError::new_err(other.to_string()),
+        papsynth::Error::Layout(_) => recipe(py, source, &[fault("layout", error.to_string())]),
+        other => wrong(other),
     }
 }
 
 /// What reading files says.
 pub(crate) fn dataset(error: &papsynth_dataset::Error) -> PyErr {
     let is_of_system = matches!(error, papsynth_dataset::Error::Io { .. });
-    if is_of_system { PyOSError::new_err(error.to_string()) } else { PyValueError::new_err(error.to_string()) }
+    if is_of_system { PyOSError::new_err(error.to_string()) } else { wrong(error) }
 }

@@ -8,7 +8,6 @@ use papsynth::Plane;
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
 use papsynth_dataset::{Column, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
@@ -62,7 +61,6 @@ pub(crate) struct Frame {
     kept: Kept,
 }
 
-/// What was asked for before.
 #[derive(Default)]
 struct Kept {
     labels: OnceLock<Py<PyAny>>,
@@ -269,12 +267,9 @@ impl Frame {
     fn __repr__(&self) -> String {
         let Truth { width, height, objects } = &self.truth;
         let cells = objects.iter().filter(|object| object.part == Part::Cytoplasm).count();
+        let (Self { seed, index, .. }, planes, all) = (self, self.planes_um.len(), objects.len());
         format!(
-            "<papsynth.Frame {} of seed {}: {width} x {height} px, {} planes, {cells} cells, {} objects and parts>",
-            self.index,
-            self.seed,
-            self.planes_um.len(),
-            objects.len()
+            "<papsynth.Frame {index} of seed {seed}: {width} x {height} px, {planes} planes, {cells} cells, {all} objects and parts>"
         )
     }
 }
@@ -294,11 +289,9 @@ pub(crate) fn restored(
     objects: Vec<pickled::Object>,
 ) -> PyResult<Frame> {
     if version != pickled::VERSION {
-        let message = format!(
-            "this frame was pickled in version {version} of its form; this papsynth reads {}",
-            pickled::VERSION
-        );
-        return Err(PyValueError::new_err(message));
+        const KNOWN: u32 = pickled::VERSION;
+        let message = format!("this frame was pickled in version {version} of its form; this papsynth reads {KNOWN}");
+        return Err(error::wrong(message));
     }
     let ((seed, index, slide), (pixel_um, planes_um, bits, [width, height])) = (key, scale);
     let [image, stack, noise_free] = arrays;
@@ -333,7 +326,6 @@ fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: Vec<usize>) -> PyRes
     values.into_pyarray(py).reshape(shape)?.into_py_any(py)
 }
 
-/// An array of texts.
 fn text(py: Python<'_>, values: Vec<String>) -> PyResult<Py<PyAny>> {
     let numpy = py.import("numpy")?;
     numpy.call_method1("array", (values, "U"))?.into_py_any(py)

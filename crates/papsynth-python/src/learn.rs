@@ -1,31 +1,16 @@
-//! Classes of cells, learned from images and outlines.
+//! Classes of cells, learned from images and outlines, and how much synthetic fields are like real ones.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use pyo3::exceptions::PyValueError;
+use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use crate::array::{Given, nth, pixels, pixels_within, points};
 use crate::engine::read_model;
+use crate::error::wrong;
+use crate::pool;
 
-/// A model with a class that is learned, as JSON.
-///
-/// Parameters
-/// ----------
-/// name : str
-///     Of the class.
-/// pixel_um : float
-///     Of all the material.
-/// nuclei : list of (array_like, array_like), optional
-///     Images with their masks, each (height, width).
-/// nucleus_outlines, cytoplasm_outlines : list of array_like, optional
-///     Each (points, 2), pixels.
-/// like : str, optional
-///     Class that it takes after in everything the material does not show; by default that of its name.
-/// bethesda, source : str
-/// numbers_only : bool
-///     Whether the model holds no textures.
-/// model : None, dict, str or os.PathLike
-///     What the class is added to.
+/// What `papsynth.learn` gives, where what is given is described, as JSON.
 #[pyfunction]
 #[pyo3(signature = (name, pixel_um, *, nuclei=None, nucleus_outlines=None, cytoplasm_outlines=None, like=None, bethesda="", source="", numbers_only=false, model=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -53,7 +38,7 @@ pub(crate) fn learn(
     let cytoplasm_outlines = outlines("cytoplasm_outlines", cytoplasm_outlines)?;
     if nuclei.is_empty() && nucleus_outlines.is_empty() && cytoplasm_outlines.is_empty() {
         let message = "nuclei, nucleus_outlines, cytoplasm_outlines: none is given; expected some material";
-        return Err(PyValueError::new_err(message));
+        return Err(wrong(message));
     }
     let material =
         Material { nuclei: &nuclei, nucleus_outlines: &nucleus_outlines, cytoplasm_outlines: &cytoplasm_outlines };
@@ -66,7 +51,7 @@ pub(crate) fn learn(
         donors: if numbers_only { Donors::NumbersOnly } else { Donors::Keep },
     };
     let learned = py.detach(|| papsynth::learn::learn(&base, &material, &params));
-    Ok(learned.map_err(|error| PyValueError::new_err(error.to_string()))?.to_json())
+    Ok(learned.map_err(wrong)?.to_json())
 }
 
 fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<NucleusImage> {
@@ -75,7 +60,7 @@ fn nucleus(number: usize, image: &Given<'_>, mask: &Given<'_>) -> PyResult<Nucle
     let (mask, mask_width) = pixels_within(&format!("{name}[1]"), mask, [0.0, 1.0])?;
     if (light.len(), width) != (mask.len(), mask_width) {
         let [image, mask] = [(&light, width), (&mask, mask_width)].map(|(values, width)| (values.len() / width, width));
-        return Err(PyValueError::new_err(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
+        return Err(wrong(format!("{name}: image of {image:?}, mask of {mask:?}; expected one shape")));
     }
     let mask = mask.into_iter().map(|inside| if inside > 0.5 { 1.0 } else { 0.0 }).collect();
     Ok(NucleusImage { name, light, mask, width })
@@ -87,9 +72,72 @@ fn outlines(name: &str, outlines: Option<Vec<Given<'_>>>) -> PyResult<Vec<Vec<[f
         let name = nth(name, number);
         let outline = points(&name, outline)?;
         match outline.len() {
-            0..3 => Err(PyValueError::new_err(format!("{name}: {} points; expected 3 or more", outline.len()))),
+            0..3 => Err(wrong(format!("{name}: {} points; expected 3 or more", outline.len()))),
             _ => Ok(outline),
         }
     };
     outlines.iter().enumerate().map(one).collect()
+}
+
+/// The report of `papsynth.judge`, where what is given is described, as JSON.
+#[pyfunction]
+#[pyo3(signature = (real, synthetic, pixel_um, full_scale, *, real_nuclei=None, synthetic_nuclei=None, seed=0, quick=false, threads=0))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn judge(
+    py: Python<'_>,
+    real: Vec<Given<'_>>,
+    synthetic: Vec<Given<'_>>,
+    pixel_um: f64,
+    full_scale: f32,
+    real_nuclei: Option<Vec<Given<'_>>>,
+    synthetic_nuclei: Option<Vec<Given<'_>>>,
+    seed: u64,
+    quick: bool,
+    threads: usize,
+) -> PyResult<String> {
+    let nuclei_from = match (&real_nuclei, &synthetic_nuclei) {
+        (Some(_), Some(_)) => NucleiFrom::Points,
+        (None, None) => NucleiFrom::Search,
+        _ => return Err(wrong("real_nuclei, synthetic_nuclei: both or neither must be given")),
+    };
+    let sides = [
+        pictures("real", &real, real_nuclei.as_deref(), full_scale)?,
+        pictures("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
+    ];
+    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
+    let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
+    let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
+    let pool = pool::of(py, threads)?;
+    let report = py.detach(|| {
+        pool.install(|| {
+            let measured = sides.map(|pictures| {
+                let fields: Vec<Result<Field, String>> = pictures
+                    .par_iter()
+                    .map(|picture| gauge.measure(picture).map_err(|error| format!("{}: {error}", picture.name)))
+                    .collect();
+                fields.into_iter().collect::<Result<Vec<Field>, String>>()
+            });
+            let [real, synthetic] = measured;
+            judge.compare(&real?, &synthetic?).map_err(|error| error.to_string())
+        })
+    });
+    serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
+}
+
+fn pictures(side: &str, images: &[Given<'_>], nuclei: Option<&[Given<'_>]>, full_scale: f32) -> PyResult<Vec<Picture>> {
+    if images.len() < 2 {
+        return Err(wrong(format!("{side}: {} fields; expected 2 or more", images.len())));
+    }
+    if nuclei.is_some_and(|nuclei| nuclei.len() != images.len()) {
+        return Err(wrong(format!("{side}_nuclei: must be as many as {side}, {}", images.len())));
+    }
+    let one = |(number, image): (usize, &Given<'_>)| {
+        let (grey, width) = pixels(&nth(side, number), image)?;
+        let nuclei = match nuclei {
+            None => Known::Nothing,
+            Some(nuclei) => Known::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
+        };
+        Ok(Picture { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
+    };
+    images.iter().enumerate().map(one).collect()
 }

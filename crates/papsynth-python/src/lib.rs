@@ -7,7 +7,6 @@ mod convert;
 mod engine;
 mod error;
 mod frame;
-mod judge;
 mod learn;
 mod pickled;
 mod pool;
@@ -26,37 +25,13 @@ mod _native {
     }
 
     #[pymodule_export]
-    use crate::calibrate::calibrate_camera;
-    #[pymodule_export]
-    use crate::calibrate::calibrate_microscope;
-    #[pymodule_export]
-    use crate::engine::Engine;
-    #[pymodule_export]
-    use crate::engine::identity;
-    #[pymodule_export]
-    use crate::engine::recipe_schema;
-    #[pymodule_export]
-    use crate::engine::resolve;
-    #[pymodule_export]
-    use crate::frame::Frame;
-    #[pymodule_export]
-    use crate::frame::restored;
-    #[pymodule_export]
-    use crate::judge::judge;
-    #[pymodule_export]
-    use crate::learn::learn;
-    #[pymodule_export]
-    use crate::pool::after_fork;
-    #[pymodule_export]
-    use crate::sets::generate;
-    #[pymodule_export]
-    use crate::sets::merge;
-    #[pymodule_export]
-    use crate::sets::missing;
-    #[pymodule_export]
-    use crate::sets::shards;
-    #[pymodule_export]
-    use crate::sets::verify;
-    #[pymodule_export]
-    use crate::techniques::{cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture};
+    use crate::{
+        calibrate::{calibrate_camera, calibrate_microscope},
+        engine::{Engine, identity, recipe_schema, resolve},
+        frame::{Frame, restored},
+        learn::{judge, learn},
+        pool::after_fork,
+        sets::{generate, merge, missing, shards, verify},
+        techniques::{cloth, cytoskeleton, dyes, fields, fsd, noise, optics, texture},
+    };
 }

@@ -3,8 +3,9 @@
 use papsynth::scene::{Kind, Tint};
 use papsynth::truth::{Group, ObjectTruth, Part, Truth, UnknownTrait};
 use papsynth_dataset::{Problem, rle};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::error::wrong;
 
 /// Changes with everything below.
 pub(crate) const VERSION: u32 = 1;
@@ -91,5 +92,5 @@ fn restored(object: Object, [width, height]: [usize; 2], planes: usize) -> PyRes
 }
 
 pub(crate) fn damaged(what: &str) -> PyErr {
-    PyValueError::new_err(format!("this is no frame that was pickled: {what}"))
+    wrong(format!("this is no frame that was pickled: {what}"))
 }

@@ -3,11 +3,11 @@
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Most threads of a pool.
+use crate::error::wrong;
+
 const MOST: usize = 1024;
 
 /// The pool of the process of that number, with so many threads.
@@ -23,7 +23,7 @@ static POOL: Mutex<Option<Own>> = Mutex::new(None);
 /// The pool of this process with as many threads as are asked for, 0 for as many as there are processors.
 pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     if threads > MOST {
-        return Err(PyValueError::new_err(format!("threads: {threads}; expected 0 to {MOST}")));
+        return Err(wrong(format!("threads: {threads}; expected 0 to {MOST}")));
     }
     if let Some(Own { process, threads: found, pool }) = POOL.lock().unwrap_or_else(PoisonError::into_inner).as_ref()
         && *process == process::id()
@@ -32,7 +32,7 @@ pub(crate) fn of(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
         return Ok(Arc::clone(pool));
     }
     let built = py.detach(|| ThreadPoolBuilder::new().num_threads(threads).build());
-    let pool = Arc::new(built.map_err(|error| PyValueError::new_err(format!("threads: {threads}: {error}")))?);
+    let pool = Arc::new(built.map_err(|error| wrong(format!("threads: {threads}: {error}")))?);
     let own = Own { process: process::id(), threads, pool: Arc::clone(&pool) };
     let before = POOL.lock().unwrap_or_else(PoisonError::into_inner).replace(own);
     // What a parent has left is not dropped: its threads are not there to be waited for.

@@ -1,18 +1,17 @@
 //! Data sets on the disk.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Home, Layout, Progress, Run, Share, shards_to_make};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{IntoPyDict, PyDict, PyList};
 
 use crate::engine::Engine;
-use crate::error;
+use crate::error::{self, wrong};
 
 /// How often it is looked whether Python wants to stop.
 const LOOK: Duration = Duration::from_millis(50);
@@ -20,40 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Most frames whose shards are listed.
 const MOST_FRAMES: u64 = 1_000_000_000;
 
-/// Makes the frames of a data set that are not whole there, or a part of them.
-///
-/// Parameters
-/// ----------
-/// engine : Engine
-/// out : str or os.PathLike
-///     New, empty, or a data set of the same recipe, seed and formats.
-/// frames : int
-///     Frames that there will be in all, by all parts.
-/// seed : int
-/// shard : tuple of int
-///     (i, n): every n-th shard from the i-th on; n processes with i from 0 to n - 1 make all.
-/// formats : list of str
-///     Such as "folder" or "webdataset", as of the command line.
-/// frames_per_shard : int, optional
-///     Frames that are written and made again together; by default as of the command line.
-/// threads : int
-///     Frames that are made side by side.
-/// verify : bool
-///     Whether files that are there are read, rather than their sizes compared.
-/// progress : callable, optional
-///     Called with the index of each frame that is done.
-///
-/// Returns
-/// -------
-/// dict
-///     Numbers of frames that were "kept" and "made".
-///
-/// Raises
-/// ------
-/// OSError
-///     If the system refuses to write; what is written is whole, and the same call goes on.
-/// ValueError
-///     If the folder holds something else.
+/// What `papsynth.generate` does, where what is given is described: numbers of frames that were "kept" and "made".
 #[pyfunction]
 #[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -73,11 +39,11 @@ pub(crate) fn generate<'py>(
     let made_by = engine.get();
     let (index, of) = shard;
     if of == 0 || index >= of {
-        return Err(PyValueError::new_err(format!("shard: ({index}, {of}) is none; expected (i, n) with i below n")));
+        return Err(wrong(format!("shard: ({index}, {of}) is none; expected (i, n) with i below n")));
     }
     for (name, number) in [("frames", frames), ("threads", threads as u64)] {
         if number == 0 {
-            return Err(PyValueError::new_err(format!("{name}: 0; expected 1 or more")));
+            return Err(wrong(format!("{name}: 0; expected 1 or more")));
         }
     }
     let layout = layout(formats, frames_per_shard)?;
@@ -88,7 +54,7 @@ pub(crate) fn generate<'py>(
         map: made_by.map.as_ref(),
         layout: &layout,
     };
-    let dataset = py.detach(|| home(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
+    let dataset = py.detach(|| Home::at(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
     let dataset = dataset.map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
@@ -135,15 +101,11 @@ pub(crate) fn generate<'py>(
     if let Some(error) = interrupted {
         return Err(error);
     }
-    let outcome =
-        outcome.map_err(|_| PyValueError::new_err("the engine has failed"))?.map_err(|error| match error {
-            papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
-            other => error::dataset(&other),
-        })?;
-    let told = PyDict::new(py);
-    told.set_item("kept", outcome.kept)?;
-    told.set_item("made", outcome.made)?;
-    Ok(told)
+    let outcome = outcome.map_err(|_| wrong("the engine has failed"))?.map_err(|error| match error {
+        papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
+        other => error::dataset(&other),
+    })?;
+    [("kept", outcome.kept), ("made", outcome.made)].into_py_dict(py)
 }
 
 fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
@@ -154,7 +116,7 @@ fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResu
     let mut layout = Layout::new(formats);
     if let Some(frames) = frames_per_shard {
         if !(1..=1_000_000).contains(&frames) {
-            return Err(PyValueError::new_err(format!("frames_per_shard: {frames}; expected 1 to 1000000")));
+            return Err(wrong(format!("frames_per_shard: {frames}; expected 1 to 1000000")));
         }
         layout.frames_per_shard = frames;
     }
@@ -164,7 +126,7 @@ fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResu
 fn format(name: &str) -> PyResult<Format> {
     Format::built().find(|format| format.name() == name).ok_or_else(|| {
         let known: Vec<&str> = Format::built().map(Format::name).collect();
-        PyValueError::new_err(format!("formats: `{name}` is not known; expected some of {}", known.join(", ")))
+        wrong(format!("formats: `{name}` is not known; expected some of {}", known.join(", ")))
     })
 }
 
@@ -175,60 +137,39 @@ pub(crate) fn shards(frames: u64, formats: Option<Vec<String>>, frames_per_shard
     Ok(frames.div_ceil(layout(formats, frames_per_shard)?.frames_per_shard))
 }
 
-/// Closes a data set: fails on any gap, writes the files about all frames.
-///
-/// Parameters
-/// ----------
-/// out : str or os.PathLike
-/// frames : int
-///     Frames that must be there.
-///
-/// Returns
-/// -------
-/// str
-///     The root hash: two data sets of one root hash are the same.
+/// What `papsynth.merge` does: the root hash.
 #[pyfunction]
 pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<String> {
     let gaps = missing(py, out.clone(), frames)?;
     if !gaps.is_empty() {
         let some: Vec<String> = gaps.iter().take(20).map(u64::to_string).collect();
         let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
-        return Err(PyValueError::new_err(message));
+        return Err(wrong(message));
     }
-    let summary = py.detach(|| Dataset::open(&home(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
+    let summary = py.detach(|| Dataset::open(&Home::at(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
     if summary.frames != frames {
         let message = format!("frames: {frames}; expected {}, which are there", summary.frames);
-        return Err(PyValueError::new_err(message));
+        return Err(wrong(message));
     }
     Ok(summary.root)
-}
-
-/// The data set at a path or an address.
-fn home(path: &Path) -> Result<Home, papsynth_dataset::Error> {
-    Home::at(path)
 }
 
 /// Numbers of the shards that are not whole, from commit records: also while others work.
 #[pyfunction]
 pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec<u64>> {
     if frames == 0 || frames > MOST_FRAMES {
-        return Err(PyValueError::new_err(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
+        return Err(wrong(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
     }
-    let found = py.detach(|| shards_to_make(&Dataset::open(&home(&out)?)?, 0..frames, Check::Sizes));
+    let found = py.detach(|| shards_to_make(&Dataset::open(&Home::at(&out)?)?, 0..frames, Check::Sizes));
     Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 
-/// Reads every file of a data set.
-///
-/// Returns
-/// -------
-/// dict
-///     "root", the root hash or None; numbers of "frames" and "files"; "findings", a list of (path, what is wrong).
+/// What `papsynth.verify` gives, where it is described.
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
     let verdict =
-        py.detach(|| home(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
+        py.detach(|| Home::at(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
     let verdict = verdict.map_err(|error| error::dataset(&error))?;
     let told = PyDict::new(py);
     told.set_item("root", verdict.root)?;

@@ -3,17 +3,16 @@
 use std::fmt::Display;
 
 use numpy::{IntoPyArray, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
 use crate::array::{Given, nth, pixels, pixels_within, points};
+use crate::error::wrong;
 
 /// Most pixels of an image that is made here.
 const MOST_PIXELS: usize = 1 << 30;
 
-/// Most points of an outline.
 const MOST_POINTS: usize = 1 << 20;
 
 /// Most points of an outline that a cell is made of.
@@ -22,20 +21,22 @@ const MOST_OUTLINE: usize = 1 << 16;
 /// Absorbance and light have no other end.
 const NOT_NEGATIVE: [f32; 2] = [0.0, f32::MAX];
 
-fn wrong(error: impl Display) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
-
 fn random(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// Zeros of a shape, as rows and columns.
-fn blank((rows, columns): (usize, usize)) -> PyResult<Vec<f32>> {
-    match rows.checked_mul(columns) {
-        Some(pixels @ 1..=MOST_PIXELS) => Ok(vec![0.0; pixels]),
-        _ => Err(PyValueError::new_err(format!("shape: ({rows}, {columns}); expected 1 to {MOST_PIXELS} pixels"))),
-    }
+/// An image of so many rows and columns, which is drawn on zeros.
+fn drawn<'py, E: Display + Send>(
+    py: Python<'py>,
+    (rows, columns): (usize, usize),
+    draw: impl FnOnce(&mut [f32]) -> Result<(), E> + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut out = match rows.checked_mul(columns) {
+        Some(pixels @ 1..=MOST_PIXELS) => vec![0.0; pixels],
+        _ => return Err(wrong(format!("shape: ({rows}, {columns}); expected 1 to {MOST_PIXELS} pixels"))),
+    };
+    py.detach(|| draw(&mut out)).map_err(wrong)?;
+    image(py, out, columns)
 }
 
 /// An outline of as many points as can be worked with.
@@ -43,7 +44,7 @@ fn outline_of(given: &Given<'_>) -> PyResult<Vec<[f64; 2]>> {
     let outline = points("outline", given)?;
     match outline.len() {
         3..=MOST_OUTLINE => Ok(outline),
-        found => Err(PyValueError::new_err(format!("outline: {found} points; expected 3 to {MOST_OUTLINE}"))),
+        found => Err(wrong(format!("outline: {found} points; expected 3 to {MOST_OUTLINE}"))),
     }
 }
 
@@ -57,11 +58,35 @@ fn outline<'py>(py: Python<'py>, points: Vec<[f64; 2]>) -> PyResult<Bound<'py, P
     Ok(points.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([rows, 2])?.into_any())
 }
 
-/// Outlines as Fourier shape descriptors.
-#[pymodule]
-pub(crate) mod fsd {
-    #[pymodule_export]
-    use super::{ShapeModel, trace};
+/// The modules of Python, and what each holds.
+macro_rules! modules {
+    ($($(#[$($about:tt)*])* $module:ident { $($item:ident),* })*) => {$(
+        $(#[$($about)*])*
+        #[pymodule]
+        pub(crate) mod $module {
+            #[pymodule_export]
+            use super::{$($item),*};
+        }
+    )*};
+}
+
+modules! {
+    /// Outlines as Fourier shape descriptors.
+    fsd { ShapeModel, trace }
+    /// Cells as cloth that is pressed into their outline.
+    cloth { crumple }
+    /// Cytoskeletons.
+    cytoskeleton { grow }
+    /// Random fields and noise of backgrounds.
+    fields { matern, perlin }
+    /// Textures from pieces of others.
+    texture { quilt }
+    /// How a microscope spreads light.
+    optics { bright_field, gaussian, gibson_lanni }
+    /// Noise of a camera: what it makes of light.
+    noise { expose }
+    /// The colours of dyes.
+    dyes { transmittance }
 }
 
 /// The outline of the one object of a mask, through the places where it has a level.
@@ -132,19 +157,12 @@ impl ShapeModel {
         points: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         if !(3..=MOST_POINTS).contains(&points) {
-            return Err(PyValueError::new_err(format!("points: {points}; expected 3 to {MOST_POINTS}")));
+            return Err(wrong(format!("points: {points}; expected 3 to {MOST_POINTS}")));
         }
         let mut random = random(seed);
         let radius_px = radius_px.unwrap_or_else(|| self.0.draw_radius(&mut random));
         outline(py, self.0.draw(radius_px, &mut random).map_err(wrong)?.descriptors.outline(points))
     }
-}
-
-/// Cells as cloth that is pressed into their outline.
-#[pymodule]
-pub(crate) mod cloth {
-    #[pymodule_export]
-    use super::crumple;
 }
 
 /// The thickness of a sheet that is pressed into an outline.
@@ -176,23 +194,13 @@ fn crumple<'py>(
     excess: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let outline = outline_of(&outline)?;
-    let mut out = blank(shape)?;
     let params = cloth_verlet::ClothParams { vertices, excess, ..Default::default() };
-    py.detach(|| {
+    drawn(py, shape, |out| -> Result<(), cloth_verlet::Error> {
         let sheet = cloth_verlet::Cloth::new(&params)?.crumple(&outline, &mut random(seed))?;
         let view = cloth_verlet::View { origin: [0.0, 0.0], pixel: 1.0 };
-        sheet.thickness_into(&mut out, shape.1, &view, |_| 1.0);
+        sheet.thickness_into(out, shape.1, &view, |_| 1.0);
         Ok(())
     })
-    .map_err(|error: cloth_verlet::Error| wrong(error))?;
-    image(py, out, shape.1)
-}
-
-/// Cytoskeletons.
-#[pymodule]
-pub(crate) mod cytoskeleton {
-    #[pymodule_export]
-    use super::grow;
 }
 
 /// A cytoskeleton within an outline, drawn.
@@ -224,22 +232,12 @@ fn grow<'py>(
     width_px: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let outline = outline_of(&outline)?;
-    let mut out = blank(shape)?;
-    py.detach(|| {
+    drawn(py, shape, |out| -> Result<(), voronoi_cytoskeleton::Error> {
         let params = voronoi_cytoskeleton::SkeletonParams { rivers, ..Default::default() };
         let rivers = voronoi_cytoskeleton::Skeleton::new(&params)?.grow(&outline, &mut random(seed))?;
         let lines = voronoi_cytoskeleton::LineParams { width_px, ..Default::default() };
-        voronoi_cytoskeleton::draw_into(&mut out, shape.1, &rivers, &lines)
+        voronoi_cytoskeleton::draw_into(out, shape.1, &rivers, &lines)
     })
-    .map_err(|error: voronoi_cytoskeleton::Error| wrong(error))?;
-    image(py, out, shape.1)
-}
-
-/// Random fields and noise of backgrounds.
-#[pymodule]
-pub(crate) mod fields {
-    #[pymodule_export]
-    use super::{matern, perlin};
 }
 
 /// Perlin's noise, in several octaves.
@@ -270,17 +268,14 @@ fn perlin(
     persistence: f64,
 ) -> PyResult<Bound<'_, PyAny>> {
     if !(cell_px.is_finite() && cell_px > 0.0) {
-        return Err(PyValueError::new_err(format!("cell_px: {cell_px}; expected a number above 0")));
+        return Err(wrong(format!("cell_px: {cell_px}; expected a number above 0")));
     }
-    let mut out = blank(shape)?;
-    py.detach(|| {
+    drawn(py, shape, |out| -> Result<(), perlin_bg::Error> {
         let params = perlin_bg::FractalParams { octaves, persistence, ..Default::default() };
         let window = perlin_bg::Window::with_cell_px(cell_px);
-        perlin_bg::Fractal::new(&params, seed)?.add_into(&mut out, shape.1, &window, 1.0);
+        perlin_bg::Fractal::new(&params, seed)?.add_into(out, shape.1, &window, 1.0);
         Ok(())
     })
-    .map_err(|error: perlin_bg::Error| wrong(error))?;
-    image(py, out, shape.1)
 }
 
 /// A Gaussian random field of Matern's covariance.
@@ -301,26 +296,16 @@ fn perlin(
 #[pyfunction]
 #[pyo3(signature = (shape, length_px=4.0, nu=1.0, seed=0))]
 fn matern(py: Python<'_>, shape: (usize, usize), length_px: f64, nu: f64, seed: u64) -> PyResult<Bound<'_, PyAny>> {
-    let mut out = blank(shape)?;
-    py.detach(|| {
+    drawn(py, shape, |out| -> Result<(), spectral_field::Error> {
         let params = spectral_field::FieldParams {
             width: shape.1,
             height: shape.0,
             spectrum: spectral_field::Spectrum::Matern { nu, length_px },
             ..Default::default()
         };
-        spectral_field::SpectralField::new(&params)?.draw_into(&mut out, &mut random(seed));
+        spectral_field::SpectralField::new(&params)?.draw_into(out, &mut random(seed));
         Ok(())
     })
-    .map_err(|error: spectral_field::Error| wrong(error))?;
-    image(py, out, shape.1)
-}
-
-/// Textures from pieces of others.
-#[pymodule]
-pub(crate) mod texture {
-    #[pymodule_export]
-    use super::quilt;
 }
 
 /// Covers a target with pieces of a texture.
@@ -357,9 +342,7 @@ fn quilt<'py>(
     let (target, target_width) = pixels_within("target", &target, [0.0, 1.0])?;
     if (mask.len(), mask_width) != (texture.len(), width) {
         let [found, wanted] = [(&mask, mask_width), (&texture, width)].map(|(v, w)| (v.len() / w, w));
-        return Err(PyValueError::new_err(format!(
-            "mask: has the shape {found:?}; expected that of source, {wanted:?}"
-        )));
+        return Err(wrong(format!("mask: has the shape {found:?}; expected that of source, {wanted:?}")));
     }
     let made = py.detach(|| {
         let source = quilt_texture::Source::new(&texture, &mask, width)?;
@@ -369,13 +352,6 @@ fn quilt<'py>(
             .pixels)
     });
     image(py, made.map_err(|error: quilt_texture::Error| wrong(error))?, target_width)
-}
-
-/// How a microscope spreads light.
-#[pymodule]
-pub(crate) mod optics {
-    #[pymodule_export]
-    use super::{bright_field, gaussian, gibson_lanni};
 }
 
 /// A Gaussian blur, mirrored at the border.
@@ -425,7 +401,7 @@ fn bright_field<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (values, width) = pixels_within("absorbance", &absorbance, NOT_NEGATIVE)?;
     if !defocus_um.is_finite() {
-        return Err(PyValueError::new_err(format!("defocus_um: {defocus_um}; expected a finite number")));
+        return Err(wrong(format!("defocus_um: {defocus_um}; expected a finite number")));
     }
     let height = values.len() / width;
     let made = py.detach(|| {
@@ -475,13 +451,6 @@ fn gibson_lanni(
     image(py, made.map_err(wrong)?, r_um.len())
 }
 
-/// Noise of a camera: what it makes of light.
-#[pymodule]
-pub(crate) mod noise {
-    #[pymodule_export]
-    use super::expose;
-}
-
 /// A frame of a camera, with shot noise, read noise and everything else of it.
 ///
 /// Parameters
@@ -506,20 +475,13 @@ fn expose<'py>(py: Python<'py>, electrons: Given<'py>, seed: u64, camera: &str) 
         "scmos" => ccd_noise::CameraParams::scmos(),
         other => {
             let message = format!("camera: `{other}` is not known; expected paper, orca-05g or scmos");
-            return Err(PyValueError::new_err(message));
+            return Err(wrong(message));
         }
     };
     let camera = ccd_noise::Camera::new(&params).map_err(wrong)?;
     let mut frame = vec![0_u16; electrons.len()];
     py.detach(|| camera.expose_window(&electrons, width, [0, 0], seed, &mut frame));
     image(py, frame, width)
-}
-
-/// The colours of dyes.
-#[pymodule]
-pub(crate) mod dyes {
-    #[pymodule_export]
-    use super::transmittance;
 }
 
 /// The light that a mixture of dyes lets through, in the channels of a colour camera.
@@ -542,29 +504,23 @@ fn transmittance<'py>(
     light_green: Option<Given<'py>>,
     orange_g: Option<Given<'py>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    use dye_spectra::{Colour, ColourParams, DYES, Dye};
-    let given = [
-        (Dye::Haematein, "haematein", haematein),
-        (Dye::EosinY, "eosin_y", eosin_y),
-        (Dye::LightGreen, "light_green", light_green),
-        (Dye::OrangeG, "orange_g", orange_g),
-    ];
+    use dye_spectra::{Colour, ColourParams, DYES};
+    // In the order of `Dye::ALL`, without the last of them, which is neutral.
+    let given = [("haematein", haematein), ("eosin_y", eosin_y), ("light_green", light_green), ("orange_g", orange_g)];
     let mut planes: [Vec<f32>; DYES] = Default::default();
     let mut shape: Option<[usize; 2]> = None;
-    for (dye, name, plane) in given {
+    for ((name, plane), place) in given.into_iter().zip(&mut planes) {
         let Some(plane) = plane else { continue };
         let (values, width) = pixels_within(name, &plane, NOT_NEGATIVE)?;
         let own = [values.len() / width, width];
         if shape.is_some_and(|shape| shape != own) {
-            return Err(PyValueError::new_err(format!("{name}: {own:?} is another shape than that of the others")));
+            return Err(wrong(format!("{name}: {own:?} is another shape than that of the others")));
         }
         shape = Some(own);
-        if let Some(place) = Dye::ALL.iter().position(|known| *known == dye) {
-            planes[place] = values;
-        }
+        *place = values;
     }
     let Some([rows, width]) = shape else {
-        return Err(PyValueError::new_err("at least one dye is needed"));
+        return Err(wrong("at least one dye is needed"));
     };
     let colour = Colour::new(&ColourParams::default()).map_err(wrong)?;
     let light = py.detach(|| {

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::design::Side;
-use crate::judged::Judged;
 use crate::parameters::Value;
+use crate::saved::Judged;
 use crate::score::Proportion;
 
 /// So many different values are a group each; more numbers are sorted into thirds.
@@ -15,7 +15,6 @@ const FEW_VALUES: usize = 3;
 /// Texts of more kinds than this are not broken down by: what is left in each group says nothing.
 const MOST_TEXTS: usize = 12;
 
-/// What the breakdown by field is called.
 pub(crate) const FIELD: &str = "field";
 
 /// Right answers where a parameter had one value, or lay between two.
@@ -41,16 +40,15 @@ pub(crate) fn breakdown(judged: &[Judged]) -> Vec<Group> {
         }
     }
     let mut groups: Vec<Group> = by_name.iter().flat_map(|(name, values)| by_value(name, values)).collect();
-    let mut by_field: BTreeMap<(bool, &str), Proportion> = BTreeMap::new();
+    let mut by_field: BTreeMap<(Side, &str), Proportion> = BTreeMap::new();
     for (one, patch) in patches() {
-        let name = one.plan.fields.get(patch.field).map_or("", |field| &field.name);
-        let proportion = by_field.entry((patch.side == Side::Synthetic, name)).or_default();
-        proportion.hits += u64::from(one.is_correct());
-        proportion.of += 1;
+        by_field.entry((patch.side, &one.plan.fields[patch.field].name)).or_default().count(one.is_correct());
     }
-    groups.extend(by_field.into_iter().map(|((is_synthetic, name), correct)| {
-        let side = if is_synthetic { Side::Synthetic } else { Side::Real };
-        Group { side, parameter: FIELD.to_owned(), value: name.to_owned(), correct }
+    groups.extend(by_field.into_iter().map(|((side, name), correct)| Group {
+        side,
+        parameter: FIELD.to_owned(),
+        value: name.to_owned(),
+        correct,
     }));
     groups
 }
@@ -62,7 +60,7 @@ fn by_value(name: &str, values: &[(&Value, bool)]) -> Vec<Group> {
     for (value, is_correct) in values {
         match value {
             Value::Number(number) => numbers.push((*number, *is_correct)),
-            Value::Text(text) => add(texts.entry(text).or_default(), *is_correct),
+            Value::Text(text) => texts.entry(text).or_default().count(*is_correct),
         }
     }
     let group = |value: String, correct: Proportion| Group {
@@ -77,7 +75,7 @@ fn by_value(name: &str, values: &[(&Value, bool)]) -> Vec<Group> {
         let (Some((low, _)), Some((high, _))) = (part.first(), part.last()) else { continue };
         let value = if low == high { short(*low) } else { format!("{} to {}", short(*low), short(*high)) };
         let mut correct = Proportion::default();
-        part.iter().for_each(|(_, is_correct)| add(&mut correct, *is_correct));
+        part.iter().for_each(|(_, is_correct)| correct.count(*is_correct));
         groups.push(group(value, correct));
     }
     if texts.len() <= MOST_TEXTS {
@@ -87,33 +85,22 @@ fn by_value(name: &str, values: &[(&Value, bool)]) -> Vec<Group> {
     if groups.len() > 1 { groups } else { Vec::new() }
 }
 
-fn add(proportion: &mut Proportion, is_hit: bool) {
-    proportion.hits += u64::from(is_hit);
-    proportion.of += 1;
-}
-
 /// Sorted values, each by itself if there are few, else in three parts of about the same length; equal values stay together.
 fn thirds(sorted: &[(f64, bool)]) -> Vec<&[(f64, bool)]> {
-    let mut runs: Vec<&[(f64, bool)]> = sorted.chunk_by(|(a, _), (b, _)| a == b).collect();
-    if runs.len() > FEW_VALUES {
-        let mut cuts = Vec::new();
-        let mut seen = 0;
-        for run in &runs {
-            seen += run.len();
-            // The run that reaches a third of all ends it.
-            if seen * 3 >= sorted.len() * (cuts.len() + 1) {
-                cuts.push(seen);
-            }
-        }
-        cuts.dedup();
-        let mut from = 0;
-        runs = Vec::new();
-        for to in cuts {
-            runs.push(&sorted[from..to]);
+    let runs: Vec<&[(f64, bool)]> = sorted.chunk_by(|(a, _), (b, _)| a == b).collect();
+    if runs.len() <= FEW_VALUES {
+        return runs;
+    }
+    let (mut parts, mut from, mut to) = (Vec::new(), 0, 0);
+    for run in runs {
+        to += run.len();
+        // The run that reaches a third of all ends it.
+        if to * 3 >= sorted.len() * (parts.len() + 1) {
+            parts.push(&sorted[from..to]);
             from = to;
         }
     }
-    runs
+    parts
 }
 
 /// A number in three figures.

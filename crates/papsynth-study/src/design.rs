@@ -12,76 +12,81 @@ const LONGEST_NAME: usize = 64;
 /// The name of the row of random answers; no subject may have it.
 pub const RANDOM: &str = "x";
 
-/// What is asked of each trial.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Task {
-    /// One patch: real or synthetic? The paper's.
-    #[serde(rename = "yes-no")]
-    YesNo,
-    /// Two patches, one of each side: which is real, left or right?
-    #[serde(rename = "2afc")]
-    TwoAlternatives,
+/// An enum whose values have names: those of files, options and messages.
+macro_rules! named {
+    ($($(#[$about:meta])* $Kind:ident { $($(#[$of:meta])* $Value:ident = $name:literal,)* })*) => {$(
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum $Kind {
+            $($(#[$of])* #[serde(rename = $name)] $Value,)*
+        }
+
+        impl $Kind {
+            /// All of them.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$Value),*];
+
+            /// The name it goes by.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Value => $name,)*
+                }
+            }
+        }
+    )*};
 }
 
-impl Task {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::YesNo, Self::TwoAlternatives];
-
-    /// The name it goes by.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::YesNo => "yes-no",
-            Self::TwoAlternatives => "2afc",
-        }
+named! {
+    /// What is asked of each trial.
+    Task {
+        /// One patch: real or synthetic? The paper's.
+        YesNo = "yes-no",
+        /// Two patches, one of each side: which is real, left or right?
+        TwoAlternatives = "2afc",
+    }
+    /// How grey levels are brought to 8 bits, on both sides alike.
+    Grey {
+        /// As they are; of deeper images, the full scale of the side's camera becomes 255.
+        AsIs = "as-is",
+        /// Each field so that its bright glass becomes one level: how it was exposed tells nothing.
+        Glass = "glass",
+    }
+    /// Where an image comes from.
+    Side {
+        /// A microscope: the positives.
+        Real = "real",
+        /// A simulation: the negatives.
+        Synthetic = "synthetic",
+    }
+    /// What of a study counts.
+    Stage {
+        /// For practice; not counted.
+        Training = "training",
+        /// Counted.
+        Counted = "counted",
+    }
+    /// What a subject says.
+    Answer {
+        /// The patch is real.
+        Real = "real",
+        /// The patch is synthetic.
+        Synthetic = "synthetic",
+        /// Of two patches, the left one is real.
+        Left = "left",
+        /// Of two patches, the right one is real.
+        Right = "right",
     }
 }
 
-/// How grey levels are brought to 8 bits, on both sides alike.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Grey {
-    /// As they are; of deeper images, the full scale of the side's camera becomes 255.
-    AsIs,
-    /// Each field so that its bright glass becomes one level: how it was exposed tells nothing.
-    Glass,
-}
-
-impl Grey {
-    /// All of them.
-    pub const ALL: [Self; 2] = [Self::AsIs, Self::Glass];
-
-    /// The name it goes by.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AsIs => "as-is",
-            Self::Glass => "glass",
-        }
+impl Answer {
+    /// Whether it is one that the task knows.
+    pub(crate) fn fits(self, task: Task) -> bool {
+        (task == Task::YesNo) == matches!(self, Self::Real | Self::Synthetic)
     }
-}
 
-/// Where an image comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Side {
-    /// A microscope: the positives.
-    Real,
-    /// A simulation: the negatives.
-    Synthetic,
-}
-
-impl Side {
-    /// Both, the real one first.
-    pub const BOTH: [Self; 2] = [Self::Real, Self::Synthetic];
-
-    /// "real" or "synthetic".
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Real => "real",
-            Self::Synthetic => "synthetic",
-        }
+    /// Whether a positive was claimed: "real", or "left".
+    pub(crate) fn is_positive(self) -> bool {
+        matches!(self, Self::Real | Self::Left)
     }
 }
 
@@ -99,8 +104,7 @@ pub struct StudyParams {
     pub training: usize,
     /// How long a patch is shown, ms, 50 to 60000. Default 2000 (the paper's).
     pub exposure_ms: u32,
-    /// Standard deviation of the Gaussian noise that is added to every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (the
-    /// paper's).
+    /// Standard deviation of the Gaussian noise on every pixel, grey levels of 8 bits, 0 to 50. Default 0.7 (the paper's).
     pub noise_dn: f64,
     /// Side of a patch, pixels, 32 to 1024. Default 200 (the paper's).
     pub patch_px: usize,
@@ -112,8 +116,7 @@ pub struct StudyParams {
     pub grey: Grey,
     /// Size of a real pixel, µm, 0.01 to 100; nothing if it is not known. Default nothing (ours).
     pub real_pixel_um: Option<f64>,
-    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if it is not known, or a papsynth data set knows it. Default nothing
-    /// (ours).
+    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if nobody or the data set knows it. Default nothing (ours).
     pub synthetic_pixel_um: Option<f64>,
 }
 
@@ -137,21 +140,15 @@ impl Default for StudyParams {
 }
 
 impl StudyParams {
-    /// Refuses what no study can have.
-    ///
-    /// # Errors
-    /// If a parameter is out of its range; the error names it.
-    pub fn check(&self) -> Result<(), Error> {
-        fn within<T: PartialOrd + ToString>(
-            field: &'static str,
+    /// Refuses what no study can have; the error names the parameter.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        fn within<T: PartialOrd + std::fmt::Display>(
+            field: &str,
             value: T,
             range: std::ops::RangeInclusive<T>,
-            expected: &'static str,
+            expected: &str,
         ) -> Result<(), Error> {
-            match range.contains(&value) {
-                true => Ok(()),
-                false => Err(Error::Parameter { field, value: value.to_string(), expected }),
-            }
+            if range.contains(&value) { Ok(()) } else { Err(Error::parameter(field, value, expected)) }
         }
         check_name(&self.subject)?;
         within("trials", self.trials, 1..=10_000, "1 to 10000")?;
@@ -160,19 +157,9 @@ impl StudyParams {
         within("noise_dn", self.noise_dn, 0.0..=50.0, "0 to 50 grey levels")?;
         within("patch_px", self.patch_px, 32..=1024, "32 to 1024 pixels")?;
         within("fields", self.fields, 1..=10_000, "1 to 10000")?;
-        let sizes = [("real_pixel_um", self.real_pixel_um), ("synthetic_pixel_um", self.synthetic_pixel_um)];
-        for (field, size) in sizes.into_iter().filter_map(|(field, size)| Some((field, size?))) {
-            within(field, size, 0.01..=100.0, "0.01 to 100 µm")?;
-        }
-        Ok(())
-    }
-
-    /// The size of a pixel that was stated for one side.
-    pub(crate) fn pixel_um(&self, side: Side) -> Option<f64> {
-        match side {
-            Side::Real => self.real_pixel_um,
-            Side::Synthetic => self.synthetic_pixel_um,
-        }
+        // Sizes that are not known are fine.
+        within("real_pixel_um", self.real_pixel_um.unwrap_or(1.0), 0.01..=100.0, "0.01 to 100 µm")?;
+        within("synthetic_pixel_um", self.synthetic_pixel_um.unwrap_or(1.0), 0.01..=100.0, "0.01 to 100 µm")
     }
 }
 
@@ -184,43 +171,21 @@ pub(crate) fn check_name(subject: &str) -> Result<(), Error> {
         && subject.chars().all(plain)
         && !subject.starts_with('.')
         && subject != RANDOM;
-    match fine {
-        true => Ok(()),
-        false => Err(Error::Parameter {
-            field: "subject",
-            value: format!("`{}`", subject.escape_debug()),
-            expected: "1 to 64 letters, digits, `-`, `_` and `.`, not beginning with a dot; `x` is the random row",
-        }),
+    if fine {
+        return Ok(());
     }
+    let expected = "1 to 64 letters, digits, `-`, `_` and `.`, not beginning with a dot; `x` is the random row";
+    Err(Error::parameter("subject", format!("`{}`", subject.escape_debug()), expected))
 }
 
-/// What of a study counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stage {
-    /// For practice; not counted.
-    Training,
-    /// Counted.
-    Counted,
-}
-
-/// Which sides a trial shows: one, or two from left to right.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Order {
-    /// Whether it counts.
-    pub stage: Stage,
-    /// What it shows.
-    pub sides: Vec<Side>,
-}
-
-/// The order of the trials: the training ones first; within each stage both sides (or both places of the real one) equally
-/// often, which of an odd number has one more being random, in a random order.
-#[must_use]
-pub fn order<R: Rng + ?Sized>(params: &StudyParams, rng: &mut R) -> Vec<Order> {
+/// Which sides each trial shows, one or two from left to right, and whether it counts: the training ones first; within each
+/// stage both sides (or both places of the real one) equally often, which of an odd number has one more being random, in a
+/// random order.
+pub(crate) fn order(params: &StudyParams, rng: &mut impl Rng) -> Vec<(Stage, Vec<Side>)> {
     let mut orders = Vec::with_capacity(params.training + params.trials);
     for (stage, count) in [(Stage::Training, params.training), (Stage::Counted, params.trials)] {
         let first = below(2, rng);
-        let mut sides: Vec<Side> = (0..count).map(|k| Side::BOTH[(k + first) % 2]).collect();
+        let mut sides: Vec<Side> = (0..count).map(|k| Side::ALL[(k + first) % 2]).collect();
         shuffle(&mut sides, rng);
         orders.extend(sides.into_iter().map(|side| {
             let sides = match (params.task, side) {
@@ -228,7 +193,7 @@ pub fn order<R: Rng + ?Sized>(params: &StudyParams, rng: &mut R) -> Vec<Order> {
                 (Task::TwoAlternatives, Side::Real) => vec![Side::Real, Side::Synthetic],
                 (Task::TwoAlternatives, Side::Synthetic) => vec![Side::Synthetic, Side::Real],
             };
-            Order { stage, sides }
+            (stage, sides)
         }));
     }
     orders
@@ -260,20 +225,16 @@ mod tests {
                 let params = StudyParams { task, trials, ..StudyParams::default() };
                 let orders = order(&params, &mut rng(seed));
                 assert_eq!(orders.len(), trials + 2);
-                assert!(orders.iter().take(2).all(|o| o.stage == Stage::Training));
-                for stage in [Stage::Training, Stage::Counted] {
-                    let of_stage: Vec<_> = orders.iter().filter(|o| o.stage == stage).collect();
-                    let real_first = of_stage.iter().filter(|o| o.sides[0] == Side::Real).count();
+                assert!(orders.iter().take(2).all(|o| o.0 == Stage::Training));
+                for stage in Stage::ALL {
+                    let of_stage: Vec<_> = orders.iter().filter(|o| o.0 == stage).collect();
+                    let real_first = of_stage.iter().filter(|o| o.1[0] == Side::Real).count();
                     assert!(real_first.abs_diff(of_stage.len() - real_first) <= 1, "{task:?} {trials}");
                 }
-                for order in &orders {
-                    match task {
-                        Task::YesNo => assert_eq!(order.sides.len(), 1),
-                        Task::TwoAlternatives => {
-                            assert!(order.sides.len() == 2 && order.sides[0] != order.sides[1]);
-                        }
-                    }
-                }
+                assert!(orders.iter().all(|(_, sides)| match task {
+                    Task::YesNo => sides.len() == 1,
+                    Task::TwoAlternatives => sides.len() == 2 && sides[0] != sides[1],
+                }));
             }
         }
     }
@@ -285,7 +246,7 @@ mod tests {
         let runs = 2000;
         let params = StudyParams { training: 0, ..StudyParams::default() };
         let all: Vec<Vec<bool>> = (0..runs)
-            .map(|seed| order(&params, &mut rng(seed)).iter().map(|o| o.sides[0] == Side::Real).collect())
+            .map(|seed| order(&params, &mut rng(seed)).iter().map(|o| o.1[0] == Side::Real).collect())
             .collect();
         let bound = 4.5 * (0.25 / runs as f64).sqrt();
         for place in 0..118 {

@@ -1,66 +1,19 @@
 //! What can go wrong.
 
+use std::fmt::Display;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Why a study cannot begin or go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter is out of its range.
-    #[error("{field}: {value} is not accepted; expected {expected}")]
-    Parameter {
-        /// Its name.
-        field: &'static str,
-        /// What it was.
-        value: String,
-        /// What it could be.
-        expected: &'static str,
-    },
-    /// An image or a data set cannot be read, or a file cannot be written.
+    /// What was asked for cannot be, or what lies there is not what is expected; the message names it.
+    #[error("{0}")]
+    Refused(String),
+    /// An image or a data set cannot be read, or the system refused to read or write.
     #[error(transparent)]
     Dataset(#[from] papsynth_dataset::Error),
-    /// The system refused to read or write.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// What was tried: "read", "write", ….
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A file that was given lies elsewhere than in the folder that was given.
-    #[error("{}: leads out of {}; only files in the folder itself are shown", path.display(), folder.display())]
-    Outside {
-        /// The file.
-        path: PathBuf,
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// A folder or file is not what is expected.
-    #[error("{}: {message}", path.display())]
-    Folder {
-        /// The folder or file.
-        path: PathBuf,
-        /// What is wrong, and what would help.
-        message: String,
-    },
-    /// The fields do not give enough patches.
-    #[error(
-        "{side}: {fields} fields give {found} patches with something on them that do not overlap much, {needed} are needed; \
-         expected more or larger fields, fewer trials or smaller patches"
-    )]
-    TooFew {
-        /// "real" or "synthetic".
-        side: &'static str,
-        /// Number of fields.
-        fields: usize,
-        /// Patches that were found.
-        found: usize,
-        /// Patches that the study shows.
-        needed: usize,
-    },
 }
 
 impl Error {
@@ -68,25 +21,22 @@ impl Error {
     /// asked for.
     #[must_use]
     pub fn is_io(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => !matches!(
-                source.kind(),
-                io::ErrorKind::NotFound
-                    | io::ErrorKind::IsADirectory
-                    | io::ErrorKind::NotADirectory
-                    | io::ErrorKind::AlreadyExists
-                    | io::ErrorKind::InvalidInput
-            ),
-            Self::Dataset(error) => error.is_io(),
-            _ => false,
-        }
+        matches!(self, Self::Dataset(error) if error.is_io())
     }
 
     pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Io { action, path: path.to_owned(), source }
+        move |source| match source.kind() {
+            // A name that leads nowhere is what was asked for.
+            io::ErrorKind::NotFound => Self::Refused(format!("cannot {action} {}: {source}", path.display())),
+            _ => papsynth_dataset::Error::Io { action, path: path.to_owned(), source }.into(),
+        }
     }
 
-    pub(crate) fn folder(path: &Path, message: impl Into<String>) -> Self {
-        Self::Folder { path: path.to_owned(), message: message.into() }
+    pub(crate) fn parameter(field: &str, value: impl Display, expected: &str) -> Self {
+        Self::Refused(format!("{field}: {value} is not accepted; expected {expected}"))
+    }
+
+    pub(crate) fn folder(path: &Path, message: impl Display) -> Self {
+        Self::Refused(format!("{}: {message}", path.display()))
     }
 }

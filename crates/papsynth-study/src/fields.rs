@@ -6,18 +6,16 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use papsynth_dataset::read::{Limits, image_files, natural_order};
+use papsynth_dataset::read::{image_files, natural_order};
 use papsynth_dataset::{FrameSummary, Problem, ShardRecord};
 
 use crate::error::Error;
 
-/// What says that a folder is a data set.
 const MANIFEST: &str = "manifest.json";
 
 /// Largest record, recipe or table that is read, bytes.
 const LARGEST_TEXT: u64 = 1 << 26;
 
-/// A field that may be shown.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
     /// Its path below the folder that was given, with `/` between folders.
@@ -28,12 +26,9 @@ pub(crate) struct Field {
     pub(crate) frame: Option<Frame>,
 }
 
-/// A frame of a data set.
 #[derive(Debug, Clone)]
 pub(crate) struct Frame {
-    /// The folder of the data set.
     pub(crate) root: PathBuf,
-    /// The frame in a few numbers.
     pub(crate) summary: FrameSummary,
     /// The recipe of the data set, a line a field.
     pub(crate) recipe: Arc<BTreeMap<String, toml::Value>>,
@@ -42,7 +37,7 @@ pub(crate) struct Frame {
 /// A folder that nothing outside is read through.
 pub(crate) struct Root {
     /// As it was given, for messages.
-    given: PathBuf,
+    pub(crate) given: PathBuf,
     /// Without links.
     real: PathBuf,
 }
@@ -56,18 +51,14 @@ impl Root {
         Ok(Self { given: folder.to_owned(), real })
     }
 
-    /// The folder, as it was given.
-    pub(crate) fn path(&self) -> &Path {
-        &self.given
-    }
-
     /// A path in the folder without links, if it stays there.
     pub(crate) fn inside(&self, path: &Path) -> Result<PathBuf, Error> {
         let real = fs::canonicalize(path).map_err(Error::io("read", path))?;
-        match real.starts_with(&self.real) {
-            true => Ok(real),
-            false => Err(Error::Outside { path: path.to_owned(), folder: self.given.clone() }),
+        if real.starts_with(&self.real) {
+            return Ok(real);
         }
+        let given = self.given.display();
+        Err(Error::folder(path, format!("leads out of {given}; only files in the folder itself are shown")))
     }
 
     /// All fields in the folder, in the natural order of their names.
@@ -76,14 +67,8 @@ impl Root {
         if self.real.join(MANIFEST).exists() {
             self.add_frames(&self.real, "", &mut fields)?;
         } else {
-            let mut sets = Vec::new();
-            for entry in fs::read_dir(&self.real).map_err(Error::io("read", &self.given))? {
-                let path = entry.map_err(Error::io("read", &self.given))?.path();
-                if path.join(MANIFEST).exists() {
-                    sets.push((path.file_name().unwrap_or_default().to_string_lossy().into_owned(), path));
-                }
-            }
-            sets.sort_by(|(a, _), (b, _)| natural_order(a, b));
+            let mut sets = entries(&self.given)?;
+            sets.retain(|(_, path)| path.join(MANIFEST).exists());
             for (name, path) in &sets {
                 self.add_frames(&self.inside(path)?, &format!("{name}/"), &mut fields)?;
             }
@@ -108,25 +93,15 @@ impl Root {
         let mut names: Vec<_> = files.into_iter().collect();
         names.sort_by(|(a, _), (b, _)| natural_order(a, b));
         for (_, path) in names {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            fields.push(Field { name: format!("{prefix}{name}"), path: self.inside(&path)?, frame: None });
+            fields.push(Field { name: format!("{prefix}{}", name(&path)), path: self.inside(&path)?, frame: None });
         }
         Ok(())
     }
 
     /// The whole frames of one data set.
     fn add_frames(&self, root: &Path, prefix: &str, fields: &mut Vec<Field>) -> Result<(), Error> {
-        let folder = root.join("shards");
-        let mut records = Vec::new();
-        for entry in fs::read_dir(&folder).map_err(Error::io("read", &folder))? {
-            let path = entry.map_err(Error::io("read", &folder))?.path();
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let index = name.strip_suffix(".json").filter(|stem| stem.bytes().all(|b| b.is_ascii_digit()));
-            if index.is_some() {
-                records.push((name, path));
-            }
-        }
-        records.sort_by(|(a, _), (b, _)| natural_order(a, b));
+        let mut records = entries(&root.join("shards"))?;
+        records.retain(|(name, _)| name.strip_suffix(".json").is_some_and(|s| s.bytes().all(|b| b.is_ascii_digit())));
         let recipe = Arc::new(recipe(&self.text(&root.join("recipe.toml"))?));
         for (_, path) in records {
             let record = ShardRecord::from_json(self.text(&path)?.as_bytes())
@@ -147,11 +122,25 @@ impl Root {
         Ok(())
     }
 
-    /// A text in the folder.
     pub(crate) fn text(&self, path: &Path) -> Result<String, Error> {
         let bytes = bytes(&self.inside(path)?, LARGEST_TEXT)?;
         String::from_utf8(bytes).map_err(|_| Error::folder(path, "is no text; UTF-8 is expected"))
     }
+}
+
+/// What lies in a folder, in the natural order of its names.
+pub(crate) fn entries(folder: &Path) -> Result<Vec<(String, PathBuf)>, Error> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io("read", folder))? {
+        let path = entry.map_err(Error::io("read", folder))?.path();
+        found.push((name(&path), path));
+    }
+    found.sort_by(|(a, _), (b, _)| natural_order(a, b));
+    Ok(found)
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// The bytes of a file of at most `limit` bytes.
@@ -171,31 +160,19 @@ pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     Ok(bytes)
 }
 
-/// What is accepted as an image.
-pub(crate) fn limits() -> Limits {
-    Limits::default()
-}
-
 /// A recipe as one value a line, such as `layout.count.uniform = [5.0, 11.0]`. One that cannot be read has none: it is only
 /// looked at to sort answers by.
 fn recipe(text: &str) -> BTreeMap<String, toml::Value> {
-    fn add(prefix: &str, value: toml::Value, lines: &mut BTreeMap<String, toml::Value>) {
-        match value {
-            toml::Value::Table(table) => {
-                for (key, value) in table {
-                    let name = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
-                    add(&name, value, lines);
-                }
-            }
-            value => {
-                lines.insert(prefix.to_owned(), value);
+    fn add(prefix: &str, table: toml::Table, lines: &mut BTreeMap<String, toml::Value>) {
+        for (key, value) in table {
+            match value {
+                toml::Value::Table(table) => add(&format!("{prefix}{key}."), table, lines),
+                value => _ = lines.insert(format!("{prefix}{key}"), value),
             }
         }
     }
     let mut lines = BTreeMap::new();
-    if let Ok(table) = toml::from_str::<toml::Table>(text) {
-        add("", toml::Value::Table(table), &mut lines);
-    }
+    add("", toml::from_str(text).unwrap_or_default(), &mut lines);
     lines
 }
 
@@ -208,7 +185,7 @@ mod tests {
     fn pictures_are_listed_in_their_natural_order() {
         let scratch = Scratch::new("fields");
         for name in ["f10.png", "f9.png", "f1.png", ".hidden.png"] {
-            fs::write(scratch.join(name), picture(1, 64, 64)).unwrap();
+            picture(&scratch.join(name), 1, [64, 64]);
         }
         fs::write(scratch.join("notes.txt"), "no picture").unwrap();
         let fields = Root::new(scratch.path()).unwrap().fields().unwrap();
@@ -216,8 +193,7 @@ mod tests {
         assert!(fields.iter().all(|f| f.frame.is_none()));
         // Pictures may lie in a folder of that name.
         let below = Scratch::new("fields-images");
-        fs::create_dir_all(below.join("images")).unwrap();
-        fs::write(below.join("images/a.png"), picture(1, 64, 64)).unwrap();
+        picture(&below.join("images/a.png"), 1, [64, 64]);
         assert_eq!(Root::new(below.path()).unwrap().fields().unwrap()[0].name, "images/a.png");
     }
 
@@ -246,20 +222,20 @@ mod tests {
         let (folder, elsewhere) = (scratch.join("folder"), scratch.join("folder-elsewhere"));
         fs::create_dir_all(&folder).unwrap();
         fs::create_dir_all(&elsewhere).unwrap();
-        fs::write(folder.join("a.png"), picture(1, 64, 64)).unwrap();
-        fs::write(elsewhere.join("secret.png"), picture(2, 64, 64)).unwrap();
+        picture(&folder.join("a.png"), 1, [64, 64]);
+        picture(&elsewhere.join("secret.png"), 2, [64, 64]);
         symlink(folder.join("a.png"), folder.join("b.png")).unwrap();
         // The folder itself may be a link.
         symlink(&folder, scratch.join("link")).unwrap();
         assert_eq!(Root::new(&scratch.join("link")).unwrap().fields().unwrap().len(), 2);
         symlink(elsewhere.join("secret.png"), folder.join("c.png")).unwrap();
         let error = Root::new(&folder).unwrap().fields().unwrap_err();
-        assert!(matches!(&error, Error::Outside { path, .. } if path.ends_with("c.png")), "{error}");
+        assert!(error.to_string().contains("c.png: leads out of"), "{error}");
         fs::remove_file(folder.join("c.png")).unwrap();
         // A whole data set elsewhere.
         fs::write(elsewhere.join(MANIFEST), "{}").unwrap();
         symlink(&elsewhere, folder.join("set")).unwrap();
-        assert!(matches!(Root::new(&folder).unwrap().fields().unwrap_err(), Error::Outside { .. }));
+        assert!(Root::new(&folder).unwrap().fields().unwrap_err().to_string().contains("leads out of"));
     }
 
     #[test]

@@ -12,9 +12,7 @@ use crate::fields::{Field, Frame, Root};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub(crate) enum Value {
-    /// A number.
     Number(f64),
-    /// A text.
     Text(String),
 }
 
@@ -35,11 +33,8 @@ struct Row {
     defocus_um: String,
 }
 
-/// The objects of one field.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Objects {
-    rows: Vec<Row>,
-}
+#[derive(Debug)]
+pub(crate) struct Objects(Vec<Row>);
 
 impl Objects {
     /// Reads the table of a frame.
@@ -51,7 +46,7 @@ impl Objects {
     fn parse(text: &str, path: &Path) -> Result<Self, Error> {
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows = reader.deserialize().collect::<Result<_, _>>();
-        Ok(Self { rows: rows.map_err(|error| Error::folder(path, format!("is no table of objects: {error}")))? })
+        rows.map(Self).map_err(|error| Error::folder(path, format!("is no table of objects: {error}")))
     }
 
     /// What is known of a patch, a square given in pixels of the field's own file.
@@ -62,7 +57,7 @@ impl Objects {
                 && row.bbox_y_px < place[1] + side
                 && place[1] < row.bbox_y_px + row.bbox_height_px
         };
-        let shown: Vec<&Row> = self.rows.iter().filter(touches).collect();
+        let shown: Vec<&Row> = self.0.iter().filter(touches).collect();
         let plane = frame.summary.planes_um.len() / 2;
         let part = |part: &'static str| shown.iter().filter(move |row| row.kind == "cell" && row.part == part);
         let cells = |rows: &[Row]| rows.iter().filter(|row| row.part == "cytoplasm").count() as f64;
@@ -72,7 +67,7 @@ impl Objects {
             frame.summary.width as f64 * frame.summary.height as f64 * um * um
         };
         let numbers = [
-            ("field_cells_per_mm2", Some(cells(&self.rows) / area_mm2)),
+            ("field_cells_per_mm2", Some(cells(&self.0) / area_mm2)),
             ("field_most_layers", Some(f64::from(frame.summary.most_layers))),
             ("patch_cells", Some(part("cytoplasm").count() as f64)),
             ("patch_nuclei", Some(part("nucleus").count() as f64)),
@@ -93,26 +88,21 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The lines of their recipes in which fields differ, for each field: what was varied between data sets.
 pub(crate) fn varied(fields: &[&Field]) -> Vec<Parameters> {
-    let recipes: Vec<_> = fields.iter().map(|field| field.frame.as_ref().map(|frame| &frame.recipe)).collect();
-    let names: BTreeSet<&String> = recipes.iter().flatten().flat_map(|recipe| recipe.keys()).collect();
-    let differing: Vec<&String> = names
-        .into_iter()
-        .filter(|name| {
-            let mut values = recipes.iter().map(|recipe| recipe.and_then(|recipe| recipe.get(*name)));
-            let first = values.next().flatten();
-            values.any(|value| value != first)
-        })
-        .collect();
+    let none = BTreeMap::new();
+    let recipes: Vec<&BTreeMap<String, toml::Value>> =
+        fields.iter().map(|field| field.frame.as_ref().map_or(&none, |frame| &*frame.recipe)).collect();
+    let mut names: BTreeSet<&String> = recipes.iter().flat_map(|recipe| recipe.keys()).collect();
+    names.retain(|name| recipes.windows(2).any(|pair| pair[0].get(*name) != pair[1].get(*name)));
     let value = |value: &toml::Value| match value {
         toml::Value::Integer(number) => Value::Number(*number as f64),
         toml::Value::Float(number) if number.is_finite() => Value::Number(*number),
         toml::Value::String(text) => Value::Text(text.clone()),
         other => Value::Text(other.to_string()),
     };
-    let of = |recipe: &BTreeMap<String, toml::Value>| {
-        differing.iter().filter_map(|name| Some(((*name).clone(), value(recipe.get(*name)?)))).collect()
+    let of = |recipe: &&BTreeMap<String, toml::Value>| {
+        names.iter().filter_map(|name| Some(((*name).clone(), value(recipe.get(*name)?)))).collect()
     };
-    recipes.iter().map(|recipe| recipe.map(|recipe| of(recipe)).unwrap_or_default()).collect()
+    recipes.iter().map(of).collect()
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
-//! A field as grey levels, and where in it a patch may be taken.
+//! A field as grey levels, where in it a patch may be taken, and a patch as it is sent: with noise, as a PNG of which nothing
+//! but the pixels differs between patches.
 
-use papsynth_dataset::read::{LevelImage, Stack};
-use portable_numerics::random::below;
+use papsynth_dataset::read::{LevelImage, Limits, Stack};
+use png::{BitDepth, ColorType, Compression, Encoder, Filter};
+use portable_numerics::random::{Normals, below};
 use rand_core::Rng;
 
 use crate::error::Error;
-use crate::fields::{Field, bytes, limits};
+use crate::fields::{Field, bytes};
 
 /// Rows and columns at the border of a field that no patch holds, on either side: where planes were combined, or an image
 /// was put straight, they may be black.
@@ -33,14 +35,11 @@ const MOST_OVERLAP: f64 = 0.25;
 /// Places that are tried in a field for each patch that is looked for.
 const TRIES: usize = 60;
 
-/// Left and top of patches.
 pub(crate) type Places = Vec<[usize; 2]>;
 
-/// A field in grey levels.
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     pub(crate) width: usize,
-    /// Row by row.
     pub(crate) levels: Vec<f32>,
 }
 
@@ -48,7 +47,6 @@ pub(crate) struct Picture {
 #[derive(Debug)]
 pub(crate) struct Raw {
     pub(crate) picture: Picture,
-    /// The bytes it was read from.
     pub(crate) bytes: Vec<u8>,
     /// Whether the file holds more than 8 bits.
     pub(crate) is_deep: bool,
@@ -58,7 +56,7 @@ impl Raw {
     /// Reads a field. Of an image in colour, green: the channel that sees most of the stain, and the nearest to the 570 nm of the
     /// paper. Of a stack, the plane in the middle.
     pub(crate) fn read(field: &Field) -> Result<Self, Error> {
-        let limits = limits();
+        let limits = Limits::default();
         let bytes = bytes(&field.path, limits.max_file_bytes)?;
         let refuse = |problem| papsynth_dataset::Error::Input { path: field.path.clone(), problem };
         let is_stack = field.frame.as_ref().is_some_and(|frame| frame.summary.planes_um.len() > 1);
@@ -80,14 +78,12 @@ impl Picture {
         self.levels.len() / self.width.max(1)
     }
 
-    /// The largest level.
     pub(crate) fn most(&self) -> f32 {
         self.levels.iter().copied().fold(0.0, f32::max)
     }
 
-    /// The level of the glass.
     pub(crate) fn glass(&self) -> f32 {
-        glass(&mut self.sample([0, 0], [self.width, self.height()]))
+        glass(&mut self.sample([0, 0], [self.width, self.height()], STRIDE_PX))
     }
 
     /// The picture with pixels `factor` times as large, at least 1: each holds the mean of what lay on it, as a camera of
@@ -117,19 +113,16 @@ impl Picture {
         Self { width, levels }
     }
 
-    /// Levels of a rectangle, every [`STRIDE_PX`]-th of either way.
-    fn sample(&self, [x, y]: [usize; 2], [width, height]: [usize; 2]) -> Vec<f32> {
-        let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(height).step_by(STRIDE_PX);
-        rows.flat_map(|row| row[x..x + width].iter().copied().step_by(STRIDE_PX)).collect()
+    /// Levels of a rectangle, every so many-th of either way.
+    fn sample(&self, [x, y]: [usize; 2], [width, height]: [usize; 2], stride: usize) -> Vec<f32> {
+        let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(height).step_by(stride);
+        rows.flat_map(|row| row[x..x + width].iter().copied().step_by(stride)).collect()
     }
 
     /// The levels of a square, if it lies in the picture.
     pub(crate) fn square(&self, [x, y]: [usize; 2], side: usize) -> Option<Vec<f32>> {
-        if x.checked_add(side)? > self.width || y.checked_add(side)? > self.height() {
-            return None;
-        }
-        let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(side);
-        Some(rows.flat_map(|row| row[x..x + side].iter().copied()).collect())
+        let is_inside = x.checked_add(side)? <= self.width && y.checked_add(side)? <= self.height();
+        is_inside.then(|| self.sample([x, y], [side, side], 1))
     }
 
     /// Up to `wanted` places of patches, left and top, in the order in which they were found: anywhere at random where
@@ -156,7 +149,7 @@ impl Picture {
 
     /// On how much of a patch something lies.
     fn cover(&self, place: [usize; 2], side: usize, field_glass: f32) -> f64 {
-        let mut sample = self.sample(place, [side, side]);
+        let mut sample = self.sample(place, [side, side], STRIDE_PX);
         let glass = glass(&mut sample).max(LEAST_GLASS * field_glass);
         sample.iter().filter(|&&level| level < SOMETHING * glass).count() as f64 / sample.len().max(1) as f64
     }
@@ -194,6 +187,37 @@ fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
             (first, (first..last).map(part).collect())
         })
         .collect()
+}
+
+/// Adds Gaussian noise of `sigma` grey levels and rounds to 8 bits. Each pixel takes the same random numbers whatever its level.
+pub(crate) fn noisy<R: Rng + ?Sized>(levels: &[f32], sigma: f64, rng: &mut R) -> Vec<u8> {
+    let mut normals = Normals::new(rng);
+    levels
+        .iter()
+        .map(|&level| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates: black and white")]
+            let grey = (f64::from(level) + sigma * normals.draw() + 0.5) as u8;
+            grey
+        })
+        .collect()
+}
+
+/// A square in 8-bit grey. It is not compressed, so that the size of the file is the same for all: what packs well and what
+/// does not would tell real from synthetic. It holds no chunk but those that every PNG has.
+pub(crate) fn png(grey: &[u8], side: usize) -> Vec<u8> {
+    let mut out = Vec::with_capacity(grey.len() + grey.len() / 64);
+    let length = u32::try_from(side).unwrap_or_default();
+    let mut encoder = Encoder::new(&mut out, length, length);
+    encoder.set_color(ColorType::Grayscale);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::NoCompression);
+    encoder.set_filter(Filter::NoFilter);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(grey)?;
+        writer.finish()
+    });
+    debug_assert!(written.is_ok(), "memory takes every byte, and the size is right: {written:?}");
+    out
 }
 
 #[cfg(test)]
@@ -270,5 +294,49 @@ mod tests {
             assert!(field(width, height, |_, _| 1.0).places(200, 2, &mut rng()).is_empty());
         }
         assert_eq!(field(216, 216, |x, _| if x < 100 { 1.0 } else { 2.0 }).places(200, 2, &mut rng()), [[8, 8]]);
+    }
+
+    #[test]
+    fn noise_has_the_deviation_that_is_asked_for() {
+        let mut rng = rng();
+        let n = 200_000;
+        for sigma in [0.7, 5.0] {
+            let noisy = noisy(&vec![100.25; n], sigma, &mut rng);
+            let mean = noisy.iter().map(|&g| f64::from(g)).sum::<f64>() / n as f64;
+            let variance = noisy.iter().map(|&g| (f64::from(g) - mean) * (f64::from(g) - mean)).sum::<f64>() / n as f64;
+            // Rounding adds 1/12. Within 5 standard errors.
+            let wanted = sigma * sigma + 1.0 / 12.0;
+            assert!((mean - 100.25).abs() < 5.0 * (wanted / n as f64).sqrt(), "{mean}");
+            assert!((variance - wanted).abs() < 5.0 * wanted * (2.0 / n as f64).sqrt(), "{variance} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn without_noise_levels_are_rounded_and_bounded() {
+        let mut rng = rng();
+        assert_eq!(noisy(&[0.0, 0.49, 0.5, 254.6, 300.0, -3.0], 0.0, &mut rng), [0, 0, 1, 255, 255, 0]);
+    }
+
+    #[test]
+    fn files_differ_in_their_pixels_alone() {
+        let flat = png(&vec![128; 200 * 200], 200);
+        let mut rng = rng();
+        let rough = png(&noisy(&vec![128.0; 200 * 200], 20.0, &mut rng), 200);
+        assert_eq!(flat.len(), rough.len());
+        let chunks = |file: &[u8]| {
+            let (mut at, mut chunks) = (8, Vec::new());
+            while at < file.len() {
+                let length = usize::try_from(u32::from_be_bytes(file[at..at + 4].try_into().unwrap())).unwrap();
+                chunks.push((String::from_utf8(file[at + 4..at + 8].to_vec()).unwrap(), length));
+                at += 12 + length;
+            }
+            chunks
+        };
+        assert_eq!(chunks(&flat), chunks(&rough));
+        assert!(chunks(&flat).iter().all(|(kind, _)| ["IHDR", "IDAT", "IEND"].contains(&kind.as_str())));
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&rough)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        assert_eq!((info.width, info.height, info.color_type), (200, 200, ColorType::Grayscale));
     }
 }

@@ -8,8 +8,7 @@ use serde::Serialize;
 use crate::breakdown::{Group, breakdown};
 use crate::design::{RANDOM, StudyParams, Task};
 use crate::error::Error;
-use crate::judged::{Judged, counted};
-use crate::saved::{Answered, Saved, read_all};
+use crate::saved::{Judged, Saved, read_all};
 use crate::score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, mean_over_subjects, trials_for};
 
 /// A row of Table 1.
@@ -30,9 +29,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of these counts.
-    #[must_use]
-    pub fn new(subject: &str, counts: Counts, task: Task) -> Self {
+    pub(crate) fn new(subject: &str, counts: Counts, task: Task) -> Self {
         Self {
             subject: subject.to_owned(),
             counts,
@@ -41,6 +38,12 @@ impl Row {
             accuracy: counts.accuracy(),
             detection: counts.detection(task),
         }
+    }
+
+    fn of(subject: &str, judged: &[Judged], task: Task) -> Self {
+        let mut counts = Counts::default();
+        judged.iter().for_each(|one| counts.count(one.is_positive(), one.answered.answer.is_positive()));
+        Self::new(subject, counts, task)
     }
 }
 
@@ -97,17 +100,17 @@ pub struct Summary {
 
 impl Summary {
     pub(crate) fn of(saved: &Saved) -> Self {
-        let Saved { params, plan, answers, .. } = saved;
-        let counted: Vec<Judged> = counted(saved).collect();
+        let params = &saved.params;
+        let counted: Vec<Judged> = saved.counted().collect();
         Self {
             study: params.clone(),
             finished: saved.is_finished(),
-            row: Row::new(&params.subject, counts(&counted), params.task),
+            row: Row::of(&params.subject, &counted, params.task),
             random: random(saved),
-            exposure: exposures(params, answers),
+            exposure: exposures(saved),
             claim: Claim::five_points(),
             breakdown: breakdown(&counted),
-            notes: plan.notes.clone(),
+            notes: saved.plan.notes.clone(),
         }
     }
 }
@@ -175,15 +178,15 @@ impl Pool {
         }
         let subjects: Vec<Row> = finished
             .iter()
-            .map(|saved| Row::new(&saved.params.subject, counts(&counted(saved).collect::<Vec<_>>()), task))
+            .map(|saved| Row::of(&saved.params.subject, &saved.counted().collect::<Vec<_>>(), task))
             .collect();
-        let all: Vec<Judged> = finished.iter().flat_map(counted).collect();
+        let all: Vec<Judged> = finished.iter().flat_map(Saved::counted).collect();
         let mean = |part: fn(&Row) -> Proportion| {
             mean_over_subjects(&subjects.iter().filter_map(|row| part(row).value()).collect::<Vec<_>>())
         };
         Ok(Self {
             task,
-            pooled: Row::new("pooled", counts(&all), task),
+            pooled: Row::of("pooled", &all, task),
             random: random(first),
             mean_sensitivity: mean(|row| row.sensitivity),
             mean_specificity: mean(|row| row.specificity),
@@ -196,38 +199,32 @@ impl Pool {
     }
 }
 
-fn counts(judged: &[Judged]) -> Counts {
-    let mut counts = Counts::default();
-    judged.iter().for_each(|one| counts.count(one.is_positive(), one.answered.answer.is_positive()));
-    counts
-}
-
 /// The random row: a coin for each trial that was answered.
 fn random(saved: &Saved) -> Row {
     use rand_core::Rng;
     let mut coin = saved.plan.key(&saved.params).stream("random row", 0);
     let mut counts = Counts::default();
-    counted(saved).for_each(|one| counts.count(one.is_positive(), coin.next_u64() >> 63 == 1));
+    saved.counted().for_each(|one| counts.count(one.is_positive(), coin.next_u64() >> 63 == 1));
     Row::new(RANDOM, counts, saved.params.task)
 }
 
-fn exposures(params: &StudyParams, answers: &[Answered]) -> Option<Exposures> {
-    let mut given: Vec<f64> = answers.iter().map(|answered| answered.exposure.exposure_ms).collect();
+fn exposures(saved: &Saved) -> Option<Exposures> {
+    let mut given: Vec<f64> = saved.answers.iter().map(|answered| answered.exposure.exposure_ms).collect();
     given.sort_by(f64::total_cmp);
     Some(Exposures {
-        asked_ms: params.exposure_ms,
+        asked_ms: saved.params.exposure_ms,
         shortest_ms: *given.first()?,
         median_ms: *given.get(given.len() / 2)?,
         longest_ms: *given.last()?,
-        shown_again: answers.iter().filter(|answered| answered.showings > 1).count(),
+        shown_again: saved.answers.iter().filter(|answered| answered.showings > 1).count(),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::Side;
-    use crate::saved::{Answer, Exposure};
+    use crate::design::{Answer, Side};
+    use crate::saved::Exposure;
     use crate::session::Session;
     use crate::support::{Scratch, study_folders};
 

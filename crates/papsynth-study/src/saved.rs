@@ -1,22 +1,19 @@
 //! What is kept of a subject: who is shown what, and what was answered.
 
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::design::{StudyParams, Task, check_name};
+use crate::design::{Answer, Side, Stage, StudyParams, Task, check_name};
 use crate::error::Error;
-use crate::fields::{Root, bytes};
-use crate::plan::{Plan, Trial};
+use crate::fields::{Root, bytes, entries};
+use crate::plan::{Patch, Plan, Trial};
 
 /// What says that a file is the state of a study.
 const FORMAT: &str = "papsynth-study";
 
-/// Version of the layout of that file.
 const VERSION: u32 = 1;
 
-/// The program that wrote it.
 const WRITER: &str = concat!("papsynth-study ", env!("CARGO_PKG_VERSION"));
 
 /// Largest state that is read, bytes.
@@ -25,47 +22,7 @@ const LARGEST_STATE: u64 = 1 << 28;
 /// Longest time that is believed, ms: eleven days.
 const LONGEST_MS: f64 = 1e9;
 
-/// The file that it is kept in.
 pub(crate) const STATE: &str = "session.json";
-
-/// What a subject says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Answer {
-    /// The patch is real.
-    Real,
-    /// The patch is synthetic.
-    Synthetic,
-    /// Of two patches, the left one is real.
-    Left,
-    /// Of two patches, the right one is real.
-    Right,
-}
-
-impl Answer {
-    /// Whether it is one that the task knows.
-    #[must_use]
-    pub fn fits(self, task: Task) -> bool {
-        (task == Task::YesNo) == matches!(self, Self::Real | Self::Synthetic)
-    }
-
-    /// Whether a positive was claimed: "real", or "left".
-    #[must_use]
-    pub fn is_positive(self) -> bool {
-        matches!(self, Self::Real | Self::Left)
-    }
-
-    /// The name it goes by.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Real => "real",
-            Self::Synthetic => "synthetic",
-            Self::Left => "left",
-            Self::Right => "right",
-        }
-    }
-}
 
 /// How a patch was shown, as the page measured it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -91,7 +48,6 @@ pub(crate) fn is_time(ms: f64) -> bool {
     (0.0..=LONGEST_MS).contains(&ms)
 }
 
-/// A trial that was answered.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Answered {
@@ -103,7 +59,6 @@ pub(crate) struct Answered {
     pub(crate) showings: u32,
 }
 
-/// What is known of the trial under way.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct UnderWay {
@@ -159,16 +114,10 @@ impl Saved {
         if let Err(error) = params.check() {
             return Some(error.to_string());
         }
-        let slots = match params.task {
-            Task::YesNo => 1,
-            Task::TwoAlternatives => 2,
-        };
+        let slots = if params.task == Task::YesNo { 1 } else { 2 };
         let fits = |trial: &Trial| {
-            trial.patches.len() == slots
-                && trial
-                    .patches
-                    .iter()
-                    .all(|patch| plan.fields.get(patch.field).is_some_and(|field| field.side == patch.side))
+            let is_of_its_side = |patch: &Patch| plan.fields.get(patch.field).is_some_and(|f| f.side == patch.side);
+            trial.patches.len() == slots && trial.patches.iter().all(is_of_its_side)
         };
         let times = |answered: &Answered| {
             answered.exposure.is_sound() && is_time(answered.response_ms) && answered.answer.fits(params.task)
@@ -185,19 +134,42 @@ impl Saved {
     pub(crate) fn is_finished(&self) -> bool {
         self.answers.len() == self.plan.trials.len()
     }
+
+    pub(crate) fn answered(&self) -> impl Iterator<Item = Judged<'_>> {
+        let pairs = self.plan.trials.iter().zip(&self.answers);
+        pairs.map(|(trial, answered)| Judged { plan: &self.plan, trial, answered })
+    }
+
+    /// Those of them that count.
+    pub(crate) fn counted(&self) -> impl Iterator<Item = Judged<'_>> {
+        self.answered().filter(|judged| judged.trial.stage == Stage::Counted)
+    }
+}
+
+/// A trial and what was said to it.
+#[derive(Clone, Copy)]
+pub(crate) struct Judged<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) trial: &'a Trial,
+    pub(crate) answered: &'a Answered,
+}
+
+impl Judged<'_> {
+    /// Whether the first patch is real.
+    pub(crate) fn is_positive(&self) -> bool {
+        self.trial.patches.first().is_some_and(|patch| patch.side == Side::Real)
+    }
+
+    pub(crate) fn is_correct(&self) -> bool {
+        self.is_positive() == self.answered.answer.is_positive()
+    }
 }
 
 /// The studies of all subjects in a folder, in the natural order of their names.
 pub(crate) fn read_all(out: &Path) -> Result<Vec<Saved>, Error> {
     let root = Root::new(out)?;
-    let mut found = Vec::new();
-    for entry in fs::read_dir(out).map_err(Error::io("read", out))? {
-        let path = entry.map_err(Error::io("read", out))?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if check_name(&name).is_ok() && path.join(STATE).exists() {
-            found.push((name, root.inside(&path.join(STATE))?));
-        }
-    }
-    found.sort_by(|(a, _), (b, _)| papsynth_dataset::read::natural_order(a, b));
-    found.iter().map(|(_, path)| Saved::read(path)).collect()
+    let mut found = entries(out)?;
+    found.retain(|(name, path)| check_name(name).is_ok() && path.join(STATE).exists());
+    let files: Vec<_> = found.iter().map(|(_, path)| root.inside(&path.join(STATE))).collect::<Result<_, _>>()?;
+    files.iter().map(|path| Saved::read(path)).collect()
 }

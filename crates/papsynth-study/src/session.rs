@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use papsynth_dataset::write_file;
 use serde::Serialize;
 
-use crate::design::{Side, Stage, StudyParams, Task};
+use crate::design::{Answer, Side, Stage, StudyParams, Task};
 use crate::error::Error;
 use crate::fields::Root;
 use crate::key::Key;
 use crate::plan::{Folders, Plan};
 use crate::results::Summary;
-use crate::saved::{Answer, Answered, Exposure, STATE, Saved, UnderWay, is_time};
+use crate::saved::{Answered, Exposure, STATE, Saved, UnderWay, is_time};
 use crate::table::trials_csv;
 
 const TRIALS: &str = "trials.csv";
@@ -28,6 +28,12 @@ pub enum Refusal {
     Nonsense,
     /// It could not be written down, so it does not count.
     NotWritten(Error),
+}
+
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::NotWritten(error)
+    }
 }
 
 /// What a page has to know to go on; nothing in it depends on what is real.
@@ -186,8 +192,7 @@ impl Session {
         let slot = (0..slots).find(|&slot| self.saved.plan.patch_name(&self.key, trial, slot) == name);
         let slot = slot.filter(|_| self.saved.under_way.exposure.is_none()).ok_or(Refusal::Stale)?;
         if slot == 0 {
-            self.change(|saved| saved.under_way.showings = saved.under_way.showings.saturating_add(1))
-                .map_err(Refusal::NotWritten)?;
+            self.change(|saved| saved.under_way.showings = saved.under_way.showings.saturating_add(1))?;
         }
         Ok(&self.patches[trial][slot])
     }
@@ -202,7 +207,7 @@ impl Session {
         }
         self.expect(name)?;
         if self.saved.under_way.exposure.is_none() {
-            self.change(|saved| saved.under_way.exposure = Some(exposure)).map_err(Refusal::NotWritten)?;
+            self.change(|saved| saved.under_way.exposure = Some(exposure))?;
         }
         Ok(())
     }
@@ -221,11 +226,10 @@ impl Session {
         self.change(|saved| {
             saved.answers.push(Answered { answer, response_ms, exposure, showings });
             saved.under_way = UnderWay::default();
-        })
-        .map_err(Refusal::NotWritten)?;
+        })?;
         if self.is_finished() {
             // The answers are safe; results that cannot be written now are written when the study is opened again.
-            self.write_results().map_err(Refusal::NotWritten)?;
+            self.write_results()?;
         }
         Ok(())
     }
@@ -265,16 +269,12 @@ fn same(asked: &StudyParams, begun: &StudyParams, path: &Path) -> Result<(), Err
         return Ok(());
     }
     let (asked, begun) = (serde_json::json!(asked), serde_json::json!(begun));
-    let differing: Vec<String> = asked
-        .as_object()
-        .into_iter()
-        .flatten()
-        .filter(|(name, value)| begun[name.as_str()] != **value)
-        .map(|(name, value)| format!("{name} was {} and is {value} now", begun[name.as_str()]))
-        .collect();
+    let asked = asked.as_object().into_iter().flatten();
+    let differing = asked.filter(|(name, value)| begun[name.as_str()] != **value);
+    let differing = differing.map(|(name, value)| format!("{name} was {} and is {value} now", begun[name.as_str()]));
     let message = format!(
         "this study was begun otherwise: {}; the same options go on with it, another subject or folder begins a new one",
-        differing.join(", ")
+        differing.collect::<Vec<_>>().join(", ")
     );
     Err(Error::folder(path, message))
 }
@@ -464,7 +464,7 @@ mod tests {
         fs::create_dir_all(scratch.join("elsewhere")).unwrap();
         fs::create_dir_all(scratch.join("out")).unwrap();
         std::os::unix::fs::symlink(scratch.join("elsewhere"), scratch.join("out/1")).unwrap();
-        assert!(matches!(open(&scratch, &params()).unwrap_err(), Error::Outside { .. }));
+        assert!(open(&scratch, &params()).unwrap_err().to_string().contains("leads out of"));
         assert_eq!(fs::read_dir(scratch.join("elsewhere")).unwrap().count(), 0);
     }
 }

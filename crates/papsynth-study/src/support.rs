@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use papsynth_dataset::write_png;
+
 use crate::plan::Folders;
 
 /// A folder of this test alone, removed at its end.
@@ -31,51 +33,29 @@ impl Drop for Scratch {
     }
 }
 
+/// A PNG of 8 bits, in a folder that is made.
+pub(crate) fn picture(path: &Path, number: u32, side: [u32; 2]) {
+    exposed(path, number, side, 230, 8);
+}
+
 /// Glass of one level with dark discs on it, at places that depend on the number.
-fn levels(number: u32, width: u32, height: u32, glass: u32) -> Vec<u32> {
+pub(crate) fn exposed(path: &Path, number: u32, [width, height]: [u32; 2], glass: u32, bits: u32) {
     let disc = |x: u32, y: u32| {
         let (dx, dy) = ((x + 17 * number) % 60, (y + 29 * number) % 60);
         dx.abs_diff(30).pow(2) + dy.abs_diff(30).pow(2) < 400
     };
+    let level = |x, y| if disc(x, y) { glass / 2 + number % 7 } else { glass - (x + y) % 3 };
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    pixels.map(|(x, y)| if disc(x, y) { glass / 2 + number % 7 } else { glass - (x + y) % 3 }).collect()
-}
-
-fn encode(bytes: &[u8], depth: png::BitDepth, width: u32, height: u32) -> Vec<u8> {
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, width, height);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(depth);
-    let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(bytes).unwrap();
-    writer.finish().unwrap();
-    out
-}
-
-/// A PNG of 8 bits.
-pub(crate) fn picture(number: u32, width: u32, height: u32) -> Vec<u8> {
-    exposed(number, width, height, 230)
-}
-
-fn exposed(number: u32, width: u32, height: u32, glass: u32) -> Vec<u8> {
-    let bytes: Vec<u8> = levels(number, width, height, glass).into_iter().map(|l| u8::try_from(l).unwrap()).collect();
-    encode(&bytes, png::BitDepth::Eight, width, height)
-}
-
-/// A PNG of 16 bits in a folder that is made.
-pub(crate) fn write_deep(path: &Path, width: u32, height: u32, glass: u32) {
-    let levels = levels(1, width, height, glass);
-    let bytes: Vec<u8> = levels.into_iter().flat_map(|l| u16::try_from(l).unwrap().to_be_bytes()).collect();
+    let levels: Vec<u16> = pixels.map(|(x, y)| level(x, y).try_into().unwrap()).collect();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    fs::write(path, encode(&bytes, png::BitDepth::Sixteen, width, height)).unwrap();
+    write_png(path, &levels, width as usize, 1, bits, 0.25).unwrap();
 }
 
 /// Folders `real`, whose fields are exposed darker, and `synthetic`.
 pub(crate) fn study_folders(scratch: &Scratch, real: u32, synthetic: u32) -> Folders {
     for (side, count, glass, first) in [("real", real, 200, 0), ("synthetic", synthetic, 230, 100)] {
-        fs::create_dir_all(scratch.join(side)).unwrap();
         for k in 0..count {
-            fs::write(scratch.join(&format!("{side}/f{k}.png")), exposed(first + k, 300, 240, glass)).unwrap();
+            exposed(&scratch.join(&format!("{side}/f{k}.png")), first + k, [300, 240], glass, 8);
         }
     }
     Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap()

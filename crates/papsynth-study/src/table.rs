@@ -4,88 +4,60 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::breakdown::{FIELD, Group};
-use crate::design::{Side, Stage, Task};
-use crate::judged::answered;
+use crate::design::{Side, Task};
 use crate::parameters::Value;
-use crate::plan::Patch;
 use crate::results::Row;
 use crate::saved::{Answered, Saved};
-use crate::score::{Interval, Proportion};
+use crate::score::{Counts, Interval, Proportion};
 
-/// Every trial that was answered, as a table.
+/// Every trial that was answered, as a table; nothing if none was.
 pub(crate) fn trials_csv(saved: &Saved) -> Vec<u8> {
     let names: BTreeSet<&String> =
         saved.plan.trials.iter().flat_map(|trial| &trial.patches).flat_map(|patch| patch.parameters.keys()).collect();
-    let mut lines = Vec::with_capacity(saved.answers.len() + 1);
-    let fixed = [
-        "subject",
-        "trial",
-        "stage",
-        "design",
-        "truth",
-        "answer",
-        "correct",
-        "exposure_ms",
-        "frames",
-        "longest_frame_ms",
-        "pixel_ratio",
-        "showings",
-        "response_ms",
-        "real_field",
-        "real_x_px",
-        "real_y_px",
-        "synthetic_field",
-        "synthetic_x_px",
-        "synthetic_y_px",
-    ];
-    lines.push(fixed.iter().map(|name| (*name).to_owned()).chain(names.iter().map(|name| (*name).clone())).collect());
     let params = &saved.params;
-    for (number, one) in answered(saved).enumerate() {
-        let of = |side: Side| one.trial.patches.iter().find(|patch| patch.side == side);
-        let field = |patch: Option<&Patch>| {
-            let name = patch.and_then(|patch| saved.plan.fields.get(patch.field)).map(|field| field.name.clone());
-            [name, patch.map(|patch| patch.x_px.to_string()), patch.map(|patch| patch.y_px.to_string())]
-                .map(Option::unwrap_or_default)
-        };
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for (number, one) in saved.answered().enumerate() {
         let truth = match (params.task, one.is_positive()) {
             (Task::YesNo, true) => "real",
             (Task::YesNo, false) => "synthetic",
             (Task::TwoAlternatives, true) => "left",
             (Task::TwoAlternatives, false) => "right",
         };
-        let stage = match one.trial.stage {
-            Stage::Training => "training",
-            Stage::Counted => "counted",
-        };
         let Answered { answer, response_ms, exposure, showings } = one.answered;
-        let mut line: Vec<String> = vec![
-            params.subject.clone(),
-            (number + 1).to_string(),
-            stage.to_owned(),
-            params.task.name().to_owned(),
-            truth.to_owned(),
-            answer.name().to_owned(),
-            u8::from(one.is_correct()).to_string(),
-            exposure.exposure_ms.to_string(),
-            exposure.frames.to_string(),
-            exposure.longest_frame_ms.to_string(),
-            exposure.pixel_ratio.to_string(),
-            showings.to_string(),
-            response_ms.to_string(),
+        let mut line: Vec<(&str, String)> = vec![
+            ("subject", params.subject.clone()),
+            ("trial", (number + 1).to_string()),
+            ("stage", one.trial.stage.name().to_owned()),
+            ("design", params.task.name().to_owned()),
+            ("truth", truth.to_owned()),
+            ("answer", answer.name().to_owned()),
+            ("correct", u8::from(one.is_correct()).to_string()),
+            ("exposure_ms", exposure.exposure_ms.to_string()),
+            ("frames", exposure.frames.to_string()),
+            ("longest_frame_ms", exposure.longest_frame_ms.to_string()),
+            ("pixel_ratio", exposure.pixel_ratio.to_string()),
+            ("showings", showings.to_string()),
+            ("response_ms", response_ms.to_string()),
         ];
-        line.extend(field(of(Side::Real)));
-        line.extend(field(of(Side::Synthetic)));
+        let of = |side: Side| one.trial.patches.iter().find(|patch| patch.side == side);
+        for (side, columns) in [
+            (Side::Real, ["real_field", "real_x_px", "real_y_px"]),
+            (Side::Synthetic, ["synthetic_field", "synthetic_x_px", "synthetic_y_px"]),
+        ] {
+            let known = of(side).map_or_else(Default::default, |patch| {
+                [one.plan.fields[patch.field].name.clone(), patch.x_px.to_string(), patch.y_px.to_string()]
+            });
+            line.extend(columns.into_iter().zip(known));
+        }
         let known = of(Side::Synthetic).map(|patch| &patch.parameters);
         line.extend(names.iter().map(|name| match known.and_then(|known| known.get(*name)) {
-            Some(Value::Number(number)) => number.to_string(),
-            Some(Value::Text(text)) => text.clone(),
-            None => String::new(),
+            Some(Value::Number(number)) => (name.as_str(), number.to_string()),
+            Some(Value::Text(text)) => (name.as_str(), text.clone()),
+            None => (name.as_str(), String::new()),
         }));
-        lines.push(line);
-    }
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for line in lines {
-        let written: Result<(), csv::Error> = writer.write_record(&line);
+        let (head, line): (Vec<&str>, Vec<String>) = line.into_iter().unzip();
+        let written = if number == 0 { writer.write_record(head) } else { Ok(()) };
+        let written = written.and_then(|()| writer.write_record(line));
         debug_assert!(written.is_ok(), "memory takes every byte, and all lines are of one length: {written:?}");
     }
     writer.into_inner().unwrap_or_default()
@@ -104,19 +76,14 @@ pub fn table<'a>(rows: impl IntoIterator<Item = &'a Row>) -> String {
         "subject", "TP", "FP", "TN", "FN", "sensitivity", "specificity", "accuracy", "d′", "c"
     );
     for row in rows {
-        let Row { subject, counts, detection, .. } = row;
+        let Row { subject, counts: Counts { tp, fp, tn, fn_ }, detection, .. } = row;
+        // No minus before 0.00.
+        let [d_prime, criterion] = [detection.d_prime, detection.criterion].map(|number| number + 0.0);
         let [sensitivity, specificity, accuracy] =
             [row.sensitivity, row.specificity, row.accuracy].map(|proportion| fraction(&proportion));
         let _ = writeln!(
             out,
-            "{subject:<wide$}  {:>4}  {:>4}  {:>4}  {:>4}   {sensitivity:<15}   {specificity:<15}   {accuracy:<15}  {:>5.2}  {:>5.2}",
-            counts.tp,
-            counts.fp,
-            counts.tn,
-            counts.fn_,
-            // No minus before 0.00.
-            detection.d_prime + 0.0,
-            detection.criterion + 0.0,
+            "{subject:<wide$}  {tp:>4}  {fp:>4}  {tn:>4}  {fn_:>4}   {sensitivity:<15}   {specificity:<15}   {accuracy:<15}  {d_prime:>5.2}  {criterion:>5.2}"
         );
     }
     out
@@ -148,15 +115,8 @@ pub fn breakdown_table(groups: &[Group]) -> String {
     for group in shown {
         let parameter = if group.parameter == before { "" } else { &group.parameter };
         before = &group.parameter;
-        let Proportion { hits, of } = group.correct;
-        let _ = writeln!(
-            out,
-            "{parameter:<name$}  {:<value$}  {:>4} of {:<4}  {}",
-            group.value,
-            hits,
-            of,
-            fraction(&group.correct)
-        );
+        let (Proportion { hits, of }, shown) = (group.correct, fraction(&group.correct));
+        let _ = writeln!(out, "{parameter:<name$}  {:<value$}  {hits:>4} of {of:<4}  {shown}", group.value);
     }
     out
 }
@@ -165,7 +125,6 @@ pub fn breakdown_table(groups: &[Group]) -> String {
 mod tests {
     use super::*;
     use crate::breakdown::short;
-    use crate::score::Counts;
 
     #[test]
     fn tables_show_the_numbers_as_papers_do() {

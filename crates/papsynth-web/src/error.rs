@@ -1,7 +1,6 @@
 //! What can go wrong.
 
 use std::io;
-use std::path::{Path, PathBuf};
 
 /// Why a page cannot be served.
 #[derive(Debug, thiserror::Error)]
@@ -15,32 +14,12 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
-    /// A data set or slide cannot be read.
+    /// A data set or slide cannot be read, or a folder holds nothing that is shown.
     #[error(transparent)]
-    Dataset(Box<papsynth_dataset::Error>),
+    Dataset(#[from] papsynth_dataset::Error),
     /// A study cannot be kept on the disk.
     #[error(transparent)]
-    Study(Box<papsynth_study::Error>),
-    /// The folder holds nothing that is shown.
-    #[error("{}: {message}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What is wrong, and what would help.
-        message: String,
-    },
-}
-
-impl From<papsynth_dataset::Error> for Error {
-    fn from(error: papsynth_dataset::Error) -> Self {
-        Self::Dataset(Box::new(error))
-    }
-}
-
-impl From<papsynth_study::Error> for Error {
-    fn from(error: papsynth_study::Error) -> Self {
-        Self::Study(Box::new(error))
-    }
+    Study(#[from] papsynth_study::Error),
 }
 
 impl Error {
@@ -50,11 +29,7 @@ impl Error {
         match self {
             Self::Dataset(error) => error.is_io(),
             Self::Study(error) => error.is_io(),
-            Self::Listen { .. } | Self::Folder { .. } => false,
+            Self::Listen { .. } => false,
         }
-    }
-
-    pub(crate) fn folder(path: &Path, message: impl Into<String>) -> Self {
-        Self::Folder { path: path.to_owned(), message: message.into() }
     }
 }

@@ -9,5 +9,5 @@ mod view;
 
 pub use error::Error;
 pub use server::{JSON, LONGEST_BODY, Reply, Request, Server, Site};
-pub use study::{Study, serve_study};
+pub use study::serve_study;
 pub use view::View;

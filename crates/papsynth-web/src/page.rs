@@ -1,6 +1,6 @@
 //! The files of the pages, which are part of the program.
 
-use crate::server::Reply;
+use crate::server::{Reply, Request};
 
 /// A file of a page: the path that it is asked for by, its type, its text.
 pub(crate) type File = (&'static str, &'static str, &'static str);
@@ -14,7 +14,7 @@ const SHARED: [File; 2] =
     [("/base.css", CSS, include_str!("page/base.css")), ("/base.js", JS, include_str!("page/base.js"))];
 
 /// The file of a page that is asked for, if it is one.
-pub(crate) fn file(own: &[File], path: &str) -> Option<Reply> {
-    let file = own.iter().chain(&SHARED).find(|file| file.0 == path);
-    file.map(|(_, content_type, text)| Reply::page(content_type, text))
+pub(crate) fn file(own: &[File], request: &Request) -> Option<Reply> {
+    let (_, content_type, text) = own.iter().chain(&SHARED).find(|file| file.0 == request.target)?;
+    Some(if request.method == "GET" { Reply::page(content_type, text) } else { Reply::method("GET") })
 }

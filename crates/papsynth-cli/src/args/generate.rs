@@ -5,11 +5,10 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 
-use super::engine::{EngineArgs, RecipeArgs};
-use super::layout::LayoutArgs;
-use super::share::ShareArgs;
+use super::shared::{EngineArgs, LayoutArgs, RecipeArgs};
 use super::values::parse_range;
 use crate::memory::parse_size;
+use crate::share::ShareArgs;
 
 /// Make images and their truth.
 ///

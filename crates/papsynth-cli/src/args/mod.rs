@@ -2,60 +2,49 @@
 
 #[cfg(feature = "calibrate")]
 mod calibrate;
-mod engine;
 mod generate;
 #[cfg(feature = "judge")]
 mod judge;
-mod layout;
 #[cfg(feature = "learn")]
 mod learn;
-#[cfg(not(all(
-    feature = "calibrate",
-    feature = "completions",
-    feature = "judge",
-    feature = "learn",
-    feature = "web"
-)))]
-mod left_out;
 mod sets;
-mod share;
+mod shared;
 mod slide;
 mod values;
 #[cfg(feature = "web")]
 mod web;
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 use papsynth::recipe::Preset;
 
+#[cfg(not(feature = "calibrate"))]
+use LeftOut as Calibrate;
+#[cfg(not(feature = "completions"))]
+use LeftOut as Completions;
+#[cfg(not(feature = "learn"))]
+use LeftOut as Learn;
 #[cfg(feature = "calibrate")]
 pub(crate) use calibrate::Calibrate;
-pub(crate) use engine::{EngineArgs, RecipeArgs, threads};
 pub(crate) use generate::{Generate, Preview, Render};
 #[cfg(feature = "judge")]
 pub(crate) use judge::{Judge, Match};
-pub(crate) use layout::LayoutArgs;
 #[cfg(feature = "learn")]
 pub(crate) use learn::Learn;
-#[cfg(not(feature = "calibrate"))]
-use left_out::LeftOut as Calibrate;
-#[cfg(not(feature = "completions"))]
-use left_out::LeftOut as Completions;
-#[cfg(not(feature = "learn"))]
-use left_out::LeftOut as Learn;
-#[cfg(not(feature = "judge"))]
-use left_out::{LeftOut as Judge, LeftOut as Match};
-#[cfg(not(feature = "web"))]
-use left_out::{LeftOut as Study, LeftOut as View};
 pub(crate) use sets::{Clean, Convert, Inspect, Merge, Plan, Rerender, Status, Submit, Sweep, Verify, check_of};
-pub(crate) use share::Shards;
+pub(crate) use shared::{EngineArgs, LayoutArgs, RecipeArgs, threads};
 pub(crate) use slide::{Slide, SlideTile, SlideVerb};
 #[cfg(feature = "zarr")]
 pub(crate) use slide::{SlideFinalize, SlideMake};
 use values::preset_parser;
 #[cfg(feature = "web")]
 pub(crate) use web::{Study, View};
+#[cfg(not(feature = "judge"))]
+use {LeftOut as Judge, LeftOut as Match};
+#[cfg(not(feature = "web"))]
+use {LeftOut as Study, LeftOut as View};
 
 /// Synthetic bright-field images of cervical smears, with exact truth.
 #[derive(Debug, Parser)]
@@ -142,6 +131,15 @@ pub(crate) struct Completions {
     /// The shell
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// A subcommand that this program was built without.
+#[derive(Debug, Args)]
+#[allow(dead_code, reason = "a program with all features lacks none")]
+pub(crate) struct LeftOut {
+    /// Whatever is typed after it
+    #[arg(hide = true, trailing_var_arg = true, allow_hyphen_values = true)]
+    words: Vec<OsString>,
 }
 
 #[cfg(test)]

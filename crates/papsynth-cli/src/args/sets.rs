@@ -6,8 +6,7 @@ use clap::Args;
 use papsynth::recipe::CameraPreset;
 use papsynth_dataset::{Check, Format};
 
-use super::engine::EngineArgs;
-use super::layout::{FileArgs, LayoutArgs};
+use super::shared::{EngineArgs, FileArgs, LayoutArgs};
 use super::values::{camera_parser, format_parser};
 
 /// How carefully files that are there are looked at, with `--verify` or without.

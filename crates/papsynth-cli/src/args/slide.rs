@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::engine::EngineArgs;
-use super::share::ShareArgs;
+use super::shared::EngineArgs;
 use super::values::parse_pair;
 use crate::memory::parse_size;
+use crate::share::ShareArgs;
 
 /// Whole slides, larger than memory, and any part of one.
 ///

@@ -9,15 +9,13 @@ use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams,
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
-use crate::exit::{Complaint, Failure};
+use crate::exit::Failure;
 
-/// The subfolder of dark frames.
 const DARK: &str = "dark";
 
 /// Frames that make a level.
 const PAIR: usize = 2;
 
-/// `--stack`.
 pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result<Focus, Failure> {
     let stack = Stack::read(&args.stack, &Limits::default())?;
     let planes: Vec<&[f32]> = stack.planes.iter().map(Vec::as_slice).collect();
@@ -39,7 +37,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
             Error::Window { .. } => {
                 "--window X,Y,W,H: left and top from 0, width and height from 8 pixels, inside the image"
             }
-            _ => return Failure::input(Complaint::new(format!("--stack {name}: {error}"))),
+            _ => return Failure::input(format!("--stack {name}: {error}")),
         };
         Failure::wrong(format!("--stack {name}: {error}"), help)
     })
@@ -68,36 +66,29 @@ pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>
     Ok((edge, profile))
 }
 
-/// `--flat`.
 pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure> {
-    let mut flats: Option<(Flats, u32)> = None;
-    for Exposure { name, files, light } in &exposures(folder, args.dark.as_deref())? {
+    let exposures = exposures(folder, args.dark.as_deref())?;
+    let bits = depth(args, &exposures[0].files[0], folder)?;
+    let mut flats = Flats::new(bits).map_err(|error| Failure::wrong(format!("--bits: {error}"), "8 to 16"))?;
+    for Exposure { name, files, light } in &exposures {
         // One level at a time, so that memory never holds them all.
         let images =
             files.iter().map(|file| GreyImage::read(file, &Limits::default())).collect::<Result<Vec<_>, _>>()?;
-        let (flats, bits) = match &mut flats {
-            Some(flats) => flats,
-            none => {
-                let bits = depth(args, images.first().map_or(u16::MAX, |image| image.white), folder)?;
-                let flats = Flats::new(bits).map_err(|error| Failure::wrong(format!("--bits: {error}"), "8 to 16"))?;
-                none.insert((flats, bits))
-            }
-        };
         let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
         let frames: Vec<Frame> = (names.iter().zip(&images))
             .map(|(name, image)| Frame { name, grey: &image.grey, width: image.width })
             .collect();
         flats.add(name, &frames, *light).map_err(|error| match &error {
-            Error::Sizes { .. } => Failure::wrong(error.to_string(), "all flats and darks must be of one size"),
+            Error::Sizes { .. } => Failure::wrong(error, "all flats and darks must be of one size"),
             Error::Bits { .. } => Failure::wrong(
                 format!("--bits is {bits}, but {error}"),
                 "give the bits of the camera's converter, 8 to 16",
             ),
-            Error::Level { .. } => Failure::wrong(error.to_string(), "a level is two frames or more of the same light"),
-            _ => Failure::input(Complaint::new(error.to_string())),
+            Error::Level { .. } => Failure::wrong(error, "a level is two frames or more of the same light"),
+            _ => Failure::input(error),
         })?;
     }
-    flats.map_or(Err(Error::Camera(NoDark)), |(flats, _)| flats.camera()).map_err(|error| {
+    flats.camera().map_err(|error| {
         let help = match error {
             Error::Camera(NoDark) => "give their folder with --dark, or name it `dark` inside that of --flat",
             Error::Camera(Saturated { .. }) => {
@@ -110,14 +101,13 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
     })
 }
 
-/// Files of one level of light.
 struct Exposure {
     name: String,
     files: Vec<PathBuf>,
     light: Light,
 }
 
-/// The folder's levels of light, dark first.
+/// The folder's levels of light, dark first, each of two files or more.
 fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failure> {
     let mut folders = Vec::new();
     for entry in fs::read_dir(folder).map_err(|error| Failure::file("read", folder, &error))? {
@@ -182,13 +172,13 @@ fn name(path: &Path) -> String {
 }
 
 /// Bits of the camera: a file of 16 bits does not tell them.
-fn depth(args: &Calibrate, white: u16, folder: &Path) -> Result<u32, Failure> {
-    match args.bits {
-        Some(bits) => Ok(bits),
-        None if white == u16::from(u8::MAX) => Ok(u8::BITS),
-        None => {
-            let message = format!("--flat {}: files of 16 bits do not tell those of the camera", folder.display());
-            Err(Failure::wrong(message, "give them with --bits, 8 to 16: often 12 or 14"))
-        }
+fn depth(args: &Calibrate, first: &Path, folder: &Path) -> Result<u32, Failure> {
+    if let Some(bits) = args.bits {
+        return Ok(bits);
     }
+    if GreyImage::read(first, &Limits::default())?.white == u16::from(u8::MAX) {
+        return Ok(u8::BITS);
+    }
+    let message = format!("--flat {}: files of 16 bits do not tell those of the camera", folder.display());
+    Err(Failure::wrong(message, "give them with --bits, 8 to 16: often 12 or 14"))
 }

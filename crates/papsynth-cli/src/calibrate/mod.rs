@@ -12,7 +12,7 @@ use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_BEGINS};
 use papsynth_dataset::write_file;
 
 use crate::args::Calibrate;
-use crate::exit::{self, Complaint, Failure};
+use crate::exit::{self, Failure};
 use crate::text_file::may_replace_in;
 
 const RECORD: &str = "calibration.json";
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         found.keep(older);
     }
     let optics = found.bright_field_toml();
-    let optics = optics.map_err(|error| Failure::input(Complaint::new(format!("--edge: {error}"))))?;
+    let optics = optics.map_err(|error| Failure::input(format!("--edge: {error}")))?;
     files.extend(optics.map(|text| ("optics.toml", text)));
     files.extend(found.gaussian_toml().map(|text| ("optics-gaussian.toml", text)));
     files.extend(found.camera_toml().map(|text| ("camera.toml", text)));
@@ -86,9 +86,9 @@ fn instrument(args: &Calibrate) -> Result<Option<Instrument>, Failure> {
         Err(Error::Microscope(optics_psf::Error::OutOfRange { field, value, accepted })) => {
             let accepted = accepted.replace('_', "-");
             let message = format!("--{} is {value}; it must be {accepted}", field.replace('_', "-"));
-            Err(Failure::input(Complaint::new(message)))
+            Err(Failure::input(message))
         }
-        Err(other) => Err(Failure::input(Complaint::new(other.to_string()))),
+        Err(other) => Err(Failure::input(other)),
     }
 }
 

@@ -3,10 +3,8 @@
 use papsynth_calibrate::{Camera, Edge, Focus, Level};
 use papsynth_judge::svg::{COLOURS, Plot};
 
-/// How every drawing begins.
 pub(super) const BEGINS: &[u8] = b"<svg ";
 
-/// Columns and rows of a drawing.
 const SIZE: [f64; 2] = [720.0, 480.0];
 
 /// Colours of what was measured, and of the fit.
@@ -24,12 +22,9 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
         (Some(step), None) => format!("{:.3} px per µm", slope / step),
         (None, _) => format!("{slope:.3} px a plane"),
     };
-    let title = format!(
-        "Blur against focus offset: {} before focus, {} after (nuclei: {})",
-        per(record.before.slope_px),
-        per(record.after.slope_px),
-        record.nuclei.len()
-    );
+    let [before, after] = [&record.before, &record.after].map(|side| per(side.slope_px));
+    let nuclei = record.nuclei.len();
+    let title = format!("Blur against focus offset: {before} before focus, {after} after (nuclei: {nuclei})");
     let x_name = format!("distance from focus, {unit}");
     let mut plot =
         Plot::sized(SIZE, &title, &x_name, "σ, pixels", [-reach * scale, reach * scale], [0.0, 1.1 * largest]);
@@ -73,12 +68,8 @@ pub(super) fn photon_transfer(record: &Camera) -> String {
     let [dark_mean, dark_variance] = dark.map_or([0.0; 2], |level| [level.mean_dn, level.variance_dn2]);
     let above = |level: &Level| [level.mean_dn - dark_mean, level.variance_dn2 - dark_variance];
     let [right, top] = record.levels.iter().map(above).fold([0.0_f64; 2], |[x, y], p| [x.max(p[0]), y.max(p[1])]);
-    let title = format!(
-        "Photon transfer: {:.4} dn per electron, dark noise {:.2} e, PRNU {:.2} %",
-        record.gain_dn_per_e,
-        record.dark_noise_e,
-        100.0 * record.prnu
-    );
+    let (gain, noise, prnu) = (record.gain_dn_per_e, record.dark_noise_e, 100.0 * record.prnu);
+    let title = format!("Photon transfer: {gain:.4} dn per electron, dark noise {noise:.2} e, PRNU {prnu:.2} %");
     let (x_name, y_name) = ("mean above the dark, grey levels", "variance above the dark's, squared grey levels");
     let mut plot = Plot::sized(SIZE, &title, x_name, y_name, [0.0, 1.05 * right], [0.0, 1.1 * top]);
     // As far as the drawing goes.

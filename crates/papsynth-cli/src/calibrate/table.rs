@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 
-use papsynth_calibrate::{Bound, Camera, Condenser, Edge, Focus, Saturation};
+use papsynth_calibrate::{Bound, Camera, Condenser, Edge, Focus, Level, Saturation};
 
-/// Blur against focus offset.
 pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     let mut out = String::new();
     // Writing to a string cannot fail.
@@ -17,30 +16,19 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
         line(format!("  window {x},{y},{w},{h}: in focus in plane {}", nucleus.focused));
     }
     let um = |known: bool, name: &str| if known { format!("{name:>10}") } else { String::new() };
+    let (step, sigma) = (um(record.step_um.is_some(), "um"), um(pixel_um.is_some(), "sigma um"));
     line(format!(
-        "{:>8}{}{:>8}{:>10}{}{:>16}{:>10}",
-        "planes",
-        um(record.step_um.is_some(), "um"),
-        "nuclei",
-        "sigma px",
-        um(pixel_um.is_some(), "sigma um"),
-        "quartiles px",
-        "line px"
+        "{:>8}{step}{:>8}{:>10}{sigma}{:>16}{:>10}",
+        "planes", "nuclei", "sigma px", "quartiles px", "line px"
     ));
     for o in &record.offsets {
         let n = o.planes.abs() as f64;
         let side = if o.planes < 0 { &record.before } else { &record.after };
         let fit = if o.fitted { format!("{:.2}", side.at(n)) } else { "-".to_owned() };
-        line(format!(
-            "{:>+8}{}{:>8}{:>10.2}{}{:>16}{:>10}",
-            o.planes,
-            record.step_um.map_or_else(String::new, |step| format!("{:>+10.2}", o.planes as f64 * step)),
-            o.nuclei,
-            o.sigma_px,
-            pixel_um.map_or_else(String::new, |pixel| format!("{:>10.3}", o.sigma_px * pixel)),
-            format!("{:.2} to {:.2}", o.quartiles_px[0], o.quartiles_px[1]),
-            fit
-        ));
+        let step = record.step_um.map_or_else(String::new, |step| format!("{:>+10.2}", o.planes as f64 * step));
+        let sigma = pixel_um.map_or_else(String::new, |pixel| format!("{:>10.3}", o.sigma_px * pixel));
+        let quartiles = format!("{:.2} to {:.2}", o.quartiles_px[0], o.quartiles_px[1]);
+        line(format!("{:>+8}{step}{:>8}{:>10.2}{sigma}{quartiles:>16}{fit:>10}", o.planes, o.nuclei, o.sigma_px));
     }
     for (name, side) in [("before focus", &record.before), ("after focus", &record.after)] {
         line(format!(
@@ -65,7 +53,6 @@ pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     out
 }
 
-/// Blur in focus.
 pub(super) fn edge(record: &Edge, pixel_um: Option<f64>) -> String {
     let mut out = String::new();
     let [x, y, w, h] = record.window;
@@ -74,11 +61,8 @@ pub(super) fn edge(record: &Edge, pixel_um: Option<f64>) -> String {
     // Writing to a string cannot fail.
     let _ = writeln!(out, "edge");
     let _ = writeln!(out, "  window {x},{y},{w},{h}: lighter towards {turn:.0} degrees (0 right, 90 down)");
-    let _ = writeln!(
-        out,
-        "levels        {:.4} dark, {:.4} light, {:.4} left by the fit",
-        record.dark, record.light, record.difference
-    );
+    let Edge { dark, light, difference, .. } = record;
+    let _ = writeln!(out, "levels        {dark:.4} dark, {light:.4} light, {difference:.4} left by the fit");
     let _ = writeln!(out, "sigma_xy      {sigma:.3} +- {error:.3} px, the pixel's own width included");
     if let Some(pixel) = pixel_um {
         let _ = writeln!(out, "              {:.4} +- {:.4} um", sigma * pixel, error * pixel);
@@ -86,7 +70,6 @@ pub(super) fn edge(record: &Edge, pixel_um: Option<f64>) -> String {
     out
 }
 
-/// Photon transfer.
 pub(super) fn camera(record: &Camera) -> String {
     let mut out = String::from("photon transfer (EMVA 1288)\n");
     // Writing to a string cannot fail.
@@ -95,20 +78,12 @@ pub(super) fn camera(record: &Camera) -> String {
     };
     line(format!("{:>8}{:>12}{:>14}{:>12}  level", "frames", "mean dn", "variance dn2", "at highest"));
     for level in &record.levels {
-        line(format!(
-            "{:>8}{:>12.2}{:>14.3}{:>10.2} %  {}",
-            level.frames,
-            level.mean_dn,
-            level.variance_dn2,
-            100.0 * level.at_highest,
-            level.name
-        ));
+        let Level { frames, mean_dn, variance_dn2, name, .. } = level;
+        let highest = 100.0 * level.at_highest;
+        line(format!("{frames:>8}{mean_dn:>12.2}{variance_dn2:>14.3}{highest:>10.2} %  {name}"));
     }
-    line(format!(
-        "gain          {:.5} dn per electron, {:.2} electrons per dn",
-        record.gain_dn_per_e,
-        1.0 / record.gain_dn_per_e
-    ));
+    let gain = record.gain_dn_per_e;
+    line(format!("gain          {gain:.5} dn per electron, {:.2} electrons per dn", 1.0 / gain));
     line(format!("full scale    {:.0} electrons in {} bits", record.full_scale_e, record.bits));
     let Saturation { reached, dn, e } = &record.saturation;
     let from = if *reached { "" } else { "not reached: above " };

@@ -10,12 +10,10 @@ use papsynth_dataset::{Check, Share};
 
 use crate::args::{SlideFinalize, SlideMake, check_of};
 use crate::exit::{self, Failure};
-use crate::findings;
-use crate::interrupt::Interrupt;
 use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
-use crate::share;
+use crate::status::{judge, print_findings};
 use crate::words::counted;
 
 pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
@@ -29,11 +27,8 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     setup.threads = fitting(&args, &setup, shard_px)?;
     let seed = args.engine.seed;
     let slide = setup.slide(seed, args.slide)?;
-    let share = match args.share.shard {
-        Some(shards) => share::of(shards)?,
-        None => Share::ALL,
-    };
-    let interrupt = Interrupt::watch()?;
+    let share = args.share.share()?;
+    let stop = exit::watch()?;
     #[cfg(feature = "parquet")]
     let objects_parquet = !args.no_parquet;
     #[cfg(not(feature = "parquet"))]
@@ -43,7 +38,7 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
     let check = check_of(args.verify);
-    let run = SlideRun { share, threads, check, stop: interrupt.flag() };
+    let run = SlideRun { share, threads, check, stop };
     let bar = Bar::start(args.quiet);
     let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
         let [done, all] = progress.done;
@@ -66,36 +61,22 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
 fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Failure> {
     let recipe = &setup.recipe.recipe;
     let need = Need::of_slide(recipe, shard_px);
-    let budget = memory::budget(args.max_memory);
-    let Some(fit) = need.fit(setup.threads, false, budget) else {
-        return Err(memory::refuse_slide(&need, recipe, shard_px, budget.unwrap_or_default()));
-    };
-    if fit.at_once < setup.threads {
-        let may = shown(budget.unwrap_or_default() as f64);
-        exit::note(&format!("{} of {} threads make frames, so that they fit into {may}", fit.at_once, setup.threads));
-    }
-    Ok(fit.at_once)
+    let fit = memory::fit(&need, setup.threads, (setup.threads, false), args.max_memory, |budget| {
+        let (frame_px, needed, may) = (recipe.scan.frame_px, shown(need.of_one_frame()), shown(budget as f64));
+        let sides = format!("shards of {shard_px} pixels a side with frames of {frame_px}");
+        let message = format!("{sides} need about {needed}; {may} may be used");
+        let help = "--shard-px 2048 or less, or a smaller scan.frame_px, needs less; --max-memory allows more";
+        Failure::wrong(message, help)
+    });
+    Ok(fit?.at_once)
 }
 
-/// How much of a slide is there.
-pub(crate) struct There {
-    /// Numbers of the shards that are missing, row by row.
-    pub(crate) missing: Vec<u64>,
-    /// How many there are in all.
-    pub(crate) shards: u64,
-    /// Whether it was closed.
-    pub(crate) is_closed: bool,
-}
-
-pub(crate) fn there(dir: &Path) -> Result<There, Failure> {
+/// Numbers of the shards of a slide that are missing, row by row, how many there are in all, and whether it was closed.
+pub(crate) fn there(dir: &Path) -> Result<(Vec<u64>, u64, bool), Failure> {
     let set = SlideSet::open(dir)?;
     let missing: BTreeSet<[u32; 2]> = set.missing(Check::Sizes)?.into_iter().collect();
     let numbers = (0_u64..).zip(set.all()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
-    Ok(There {
-        missing: numbers.collect(),
-        shards: set.all().count() as u64,
-        is_closed: missing.is_empty() && set.is_finished()?,
-    })
+    Ok((numbers.collect(), set.all().count() as u64, missing.is_empty() && set.is_finished()?))
 }
 
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {
@@ -107,18 +88,15 @@ fn close(set: &SlideSet, check: Check, quiet: bool) -> Result<(), Failure> {
     if quiet {
         return Ok(());
     }
-    let megabytes = finished.bytes / 1_000_000;
+    let (shards, objects, megabytes) = (finished.shards, finished.objects, finished.bytes / 1_000_000);
+    let (dir, shards, root) = (set.path().display(), counted(shards, "shard", "shards"), finished.root_sha256);
+    let look = set.path().join("thumbnail.png");
     exit::print(&format!(
-        "{}: {}, {} objects and parts of cells, {megabytes} MB, root {}\nLook at: {}\n",
-        set.path().display(),
-        counted(finished.shards, "shard", "shards"),
-        finished.objects,
-        finished.root_sha256,
-        set.path().join("thumbnail.png").display()
+        "{dir}: {shards}, {objects} objects and parts of cells, {megabytes} MB, root {root}\nLook at: {}\n",
+        look.display()
     ))
 }
 
-/// `papsynth verify` of a slide.
 pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     let findings = SlideSet::open(dir)?.verify()?;
     if json {
@@ -126,7 +104,7 @@ pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), Failure> {
     } else if findings.is_empty() {
         exit::print(&format!("{}: whole\n", dir.display()))?;
     } else {
-        findings::print(&findings)?;
+        print_findings(&findings)?;
     }
-    findings::judge(dir, &findings)
+    judge(dir, &findings)
 }

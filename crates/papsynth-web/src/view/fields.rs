@@ -7,11 +7,10 @@ use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
 use papsynth_dataset::{Dataset, FramePlace, FrameSummary};
 use serde_json::{Value, json};
 
-use super::encode::png;
 use super::grid::Grid;
 use super::labels::{Ids, colour_text};
 use super::levels::Levels;
-use super::source::{At, Picture, Source, check_pixel, check_plane};
+use super::source::{At, Picture, Source, check_pixel, check_plane, png};
 use crate::server::Reply;
 
 /// Side of a tile, px.
@@ -23,7 +22,6 @@ const KEPT: usize = 3;
 /// Bytes of decoded planes that are kept at most, but for one plane, however large it is.
 const MOST_BYTES: usize = 1 << 28;
 
-/// A data set that is shown.
 pub(crate) struct Fields {
     dataset: Dataset,
     places: Vec<FramePlace>,
@@ -104,7 +102,6 @@ impl Fields {
         }
     }
 
-    /// The frame with its truth read.
     fn with_truth(&mut self, picture: usize) -> Result<(&Frame, &[Shown]), Reply> {
         let frame = self.frame(picture)?;
         if frame.objects.is_none() {
@@ -146,10 +143,6 @@ impl Frame {
 }
 
 impl Source for Fields {
-    fn kind(&self) -> &'static str {
-        "data set"
-    }
-
     fn count(&mut self) -> Result<usize, Reply> {
         // It may be growing.
         self.places = self.dataset.places()?;

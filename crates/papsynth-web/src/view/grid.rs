@@ -29,7 +29,6 @@ impl Grid {
         Self { width, height, tile, levels }
     }
 
-    /// Columns and rows of a level.
     pub(crate) fn size(&self, level: usize) -> Result<[usize; 2], Reply> {
         if level >= self.levels {
             return Err(Reply::refusal(

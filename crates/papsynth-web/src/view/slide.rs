@@ -7,17 +7,15 @@ use papsynth_dataset::Error;
 use papsynth_dataset::slide::SlideSet;
 use serde_json::{Value, json};
 
-use super::encode::png;
 use super::grid::{Cut, Grid};
 use super::labels::{Ids, colour_text};
 use super::levels::eight_bits;
-use super::source::{At, Picture, Source, check_pixel, check_plane};
+use super::source::{At, Picture, Source, check_pixel, check_plane, png};
 use crate::server::Reply;
 
 /// Side of a tile, px: that of a chunk, which is decoded whole.
 const TILE: usize = 512;
 
-/// A slide that is shown.
 pub(crate) struct Slide {
     set: SlideSet,
 }
@@ -39,10 +37,6 @@ impl Slide {
 }
 
 impl Source for Slide {
-    fn kind(&self) -> &'static str {
-        "slide"
-    }
-
     fn count(&mut self) -> Result<usize, Reply> {
         Ok(1)
     }

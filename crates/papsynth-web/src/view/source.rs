@@ -1,17 +1,14 @@
 //! What can be shown: a data set or a slide, asked the same things.
 
 use papsynth::truth::Group;
+use png::{BitDepth, ColorType, Compression, Encoder, Filter};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::grid::Grid;
 use crate::server::Reply;
 
-/// A folder that is shown.
 pub(crate) trait Source: Send {
-    /// What it is called: "data set" or "slide".
-    fn kind(&self) -> &'static str;
-
     /// How many pictures there are now.
     fn count(&mut self) -> Result<usize, Reply>;
 
@@ -28,7 +25,6 @@ pub(crate) trait Source: Send {
     fn under(&mut self, picture: usize, x: usize, y: usize) -> Result<Vec<Value>, Reply>;
 }
 
-/// Which tile.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct At {
     pub(crate) level: usize,
@@ -58,7 +54,6 @@ impl Picture {
     }
 }
 
-/// That a plane is there.
 pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
     if plane < planes {
         return Ok(());
@@ -66,10 +61,32 @@ pub(crate) fn check_plane(plane: usize, planes: usize) -> Result<(), Reply> {
     Err(Reply::refusal(404, &format!("there is no plane {plane}; the last is {}", planes.saturating_sub(1))))
 }
 
-/// That a pixel is there.
 pub(crate) fn check_pixel(x: usize, y: usize, width: usize, height: usize) -> Result<(), Reply> {
     if x < width && y < height {
         return Ok(());
     }
     Err(Reply::refusal(404, &format!("there is no pixel {x}, {y} in {width} x {height}")))
+}
+
+/// Bytes of 1, 3 or 4 channels a pixel as a PNG file.
+pub(crate) fn png(bytes: &[u8], width: usize, channels: usize) -> Result<Reply, Reply> {
+    let color = match channels {
+        1 => ColorType::Grayscale,
+        3 => ColorType::Rgb,
+        _ => ColorType::Rgba,
+    };
+    let encode = || {
+        let mut out = Vec::with_capacity(bytes.len() / 2);
+        let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
+        let mut encoder = Encoder::new(&mut out, side(width), side(bytes.len() / (width * channels).max(1)));
+        encoder.set_color(color);
+        encoder.set_depth(BitDepth::Eight);
+        encoder.set_compression(Compression::Fast);
+        encoder.set_filter(Filter::Up);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(bytes)?;
+        writer.finish()?;
+        Ok::<_, png::EncodingError>(out)
+    };
+    encode().map(Reply::png).map_err(|error| Reply::refusal(500, &error.to_string()))
 }

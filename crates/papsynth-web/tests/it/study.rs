@@ -1,26 +1,26 @@
 //! What is answered about a study, and what that tells.
 
 use papsynth_study::{Session, StudyParams, Task};
-use papsynth_web::{JSON, LONGEST_BODY, Reply, Request, Site, Study};
+use papsynth_web::{JSON, LONGEST_BODY, Reply, Request, Site};
 
 use crate::support::Scratch;
 
-fn open(scratch: &Scratch, task: Task) -> Study {
+fn open(scratch: &Scratch, task: Task) -> Session {
     let params = StudyParams { trials: 4, training: 2, patch_px: 48, task, ..StudyParams::default() };
     let [real, synthetic, out] = ["real", "synthetic", "out"].map(|name| scratch.join(name));
-    Study::new(Session::open(&params, &real, &synthetic, &out).unwrap())
+    Session::open(&params, &real, &synthetic, &out).unwrap()
 }
 
-fn get(study: &mut Study, target: &str) -> Reply {
+fn get(study: &mut Session, target: &str) -> Reply {
     study.reply(&Request { method: "GET", target, ..Request::default() })
 }
 
-fn post(study: &mut Study, target: &str, body: &str) -> Reply {
+fn post(study: &mut Session, target: &str, body: &str) -> Reply {
     let content_type = Some(JSON.as_bytes());
     study.reply(&Request { method: "POST", target, content_type, body: body.as_bytes() })
 }
 
-fn state(study: &mut Study) -> serde_json::Value {
+fn state(study: &mut Session) -> serde_json::Value {
     serde_json::from_slice(&get(study, "/state").body).unwrap()
 }
 
@@ -35,7 +35,7 @@ fn said(patch: &str, answer: &str) -> String {
 }
 
 /// Goes through a whole study and keeps every reply.
-fn transcript(study: &mut Study, answer: &str) -> Vec<(String, Reply)> {
+fn transcript(study: &mut Session, answer: &str) -> Vec<(String, Reply)> {
     let mut seen = Vec::new();
     for target in ["/", "/base.css", "/base.js", "/study.css", "/study.js"] {
         seen.push((target.to_owned(), get(study, target)));

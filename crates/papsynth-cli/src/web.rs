@@ -1,0 +1,137 @@
+//! Pages on this machine.
+
+use std::process::{Command, Stdio};
+
+use papsynth_study::{Group, Interval, Pool, Row, Session, Side, State, StudyParams, Summary, breakdown_table, table};
+use papsynth_web::{Error, Server, serve_study};
+
+use crate::args::{Study, View};
+use crate::exit::{self, Complaint, Failure};
+
+/// Opens a page with what the system opens pages with; if it cannot, the address stands above.
+fn open(address: &str) {
+    let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
+        "macos" => ("open", &[]),
+        // The empty word is the title of a window.
+        "windows" => ("cmd", &["/C", "start", ""]),
+        _ => ("xdg-open", &[]),
+    };
+    let mut command = Command::new(program);
+    command.args(arguments).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    if let Err(error) = command.spawn() {
+        exit::note(format!("no browser could be opened: {error}"));
+    }
+}
+
+/// `papsynth view`: a data set or a slide in the browser.
+pub(crate) fn view(args: &View) -> Result<(), Failure> {
+    let view = papsynth_web::View::open(&args.dir)?;
+    let server = Server::bind(args.port.unwrap_or(0))?;
+    let stop = exit::watch()?;
+    let address = server.address();
+    exit::print(&format!("{}: a {}\nOpen {address} in a browser. Ctrl-C ends.\n", args.dir.display(), view.kind()))?;
+    if args.open {
+        open(&address);
+    }
+    Ok(server.run(view, stop, |_| ())?)
+}
+
+/// `papsynth study`: can people tell?
+pub(crate) fn study(args: &Study) -> Result<(), Failure> {
+    let (Some(real), Some(synthetic)) = (&args.real, &args.synthetic) else {
+        return args.results.as_deref().map_or(Ok(()), |folder| pooled(folder, args.json));
+    };
+    let params = StudyParams {
+        subject: args.subject.clone(),
+        task: args.design,
+        trials: args.trials,
+        training: args.training,
+        exposure_ms: args.exposure_ms,
+        noise_dn: args.noise,
+        patch_px: args.patch_px,
+        fields: args.fields,
+        seed: args.seed,
+        grey: args.grey,
+        real_pixel_um: args.pixel_um,
+        synthetic_pixel_um: args.synthetic_pixel_um,
+    };
+    let session = Session::open(&params, real, synthetic, &args.out).map_err(Error::from)?;
+    let server = match args.port {
+        Some(port) => Server::bind(port)?,
+        None => Server::bind_near(session.port())?,
+    };
+    let stop = exit::watch()?;
+    let folder = session.folder().display().to_string();
+    session.notes().iter().for_each(|note| exit::note(note));
+    exit::print(&announcement(&session, &server))?;
+    if args.open {
+        open(&server.address());
+    }
+    let mut all_answered = session.is_finished();
+    serve_study(server, session, stop, |session| {
+        all_answered = true;
+        // Whoever closed the pipe reads the page or the files.
+        let results = results(&session.summary());
+        let _ = exit::print(&format!("\n{results}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n"));
+    })?;
+    if all_answered {
+        return Ok(());
+    }
+    let message = format!("stopped before the last answer; every answer so far is in {folder}");
+    Err(Failure::interrupted(Complaint::new(message).help("run the same command again to go on")))
+}
+
+fn announcement(session: &Session, server: &Server) -> String {
+    let state = session.state();
+    let [real, synthetic] = Side::ALL.map(|side| session.fields(side));
+    let done = match state.answered {
+        0 => String::new(),
+        answered => format!(", {answered} of them answered"),
+    };
+    let (State { training, trials, .. }, address) = (state, server.address());
+    format!(
+        "{training} trials for practice and {trials} that count{done}; {real} real and {synthetic} synthetic fields\n\
+         Open {address} in a browser. Ctrl-C ends; the same command goes on.\n"
+    )
+}
+
+fn results(summary: &Summary) -> String {
+    told([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
+}
+
+fn told<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
+    let breakdown = breakdown_table(breakdown);
+    let by = if breakdown.is_empty() { String::new() } else { format!("\nright answers by parameter\n{breakdown}") };
+    format!(
+        "{}Intervals of 95 % (Wilson); d′ and c with the log-linear correction. A claim of ±5 points takes {trials} trials.\n\
+         {means}{by}",
+        table(rows)
+    )
+}
+
+fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
+    let pool = Pool::read(folder).map_err(Error::from)?;
+    if as_json {
+        return exit::print(&format!("{}\n", serde_json::to_string_pretty(&pool).unwrap_or_default()));
+    }
+    pool.notes.iter().for_each(|note| exit::note(note));
+    let rows = pool.subjects.iter().chain([&pool.random, &pool.pooled]);
+    let means = [
+        ("sensitivity", pool.mean_sensitivity),
+        ("specificity", pool.mean_specificity),
+        ("accuracy", pool.mean_accuracy),
+    ];
+    let means: Vec<String> = means
+        .into_iter()
+        .filter_map(|(name, mean)| {
+            let (mean, Interval { low, high }) = mean?;
+            Some(format!("{name} {mean:.3} ({low:.3} to {high:.3})"))
+        })
+        .collect();
+    // The interval over subjects tells of other subjects, Wilson's of other patches for the same ones.
+    let means = match means.is_empty() {
+        true => String::new(),
+        false => format!("Means over subjects, with intervals of 95 % by Student's t: {}.\n", means.join(", ")),
+    };
+    exit::print(&told(rows, pool.claim.trials, &means, &pool.breakdown))
+}
