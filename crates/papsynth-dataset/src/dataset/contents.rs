@@ -1,4 +1,4 @@
-//! Whether the files of a shard say the same: what no hash tells of a file that was written wrong, or changed by somebody who mended
+//! Whether a shard is whole: its files are as its record says, and they say the same, what no hash tells of a file that was written wrong, or changed by somebody who mended
 //! the hashes.
 //!
 //! Everything follows from the complete masks in the COCO document: which pixels lie in front, boxes and areas, the table, the
@@ -10,38 +10,124 @@ use std::path::Path;
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
+use serde::Serialize;
 
-use super::record::ShardRecord;
+use super::manifest::Manifest;
+use super::record::{ShardRecord, read_record, recorded_shards};
 use super::set::Dataset;
 use crate::error::{Error, Problem};
-use crate::files::Folder;
-use crate::formats::{Field, Format, LIMITS, TarFile, Written, huggingface, names, tar};
+use crate::files::{Check, Folder, is_temporary};
+use crate::formats::{Field, Format, LIMITS, TarFile, Written, names, tar};
 use crate::read;
-use crate::truth::{Document, FrameSummary, Geometry, Image, Info, Split, table};
+use crate::truth::{Document, FrameSummary, Image, Info, Split, table};
 
-/// What is wrong with a file of a shard.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Flaw {
-    pub(crate) path: String,
-    pub(crate) message: String,
+/// One thing that is wrong.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Finding {
+    /// The file, relative to the data set.
+    pub path: String,
+    /// What is wrong with it.
+    pub message: String,
+    /// What mends it.
+    pub mend: Mend,
 }
 
-impl fmt::Display for Flaw {
+impl Finding {
+    /// What making it again mends.
+    pub(crate) fn made_wrong(path: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { path: path.into(), message: message.into(), mend: Mend::Generate }
+    }
+
+    /// A file that a data set or slide (`whole`) does not have.
+    pub(crate) fn stray(path: &str, whole: &str) -> Self {
+        let message = match is_temporary(path.rsplit('/').next().unwrap_or(path)) {
+            true => "was left behind by a run that was killed".to_owned(),
+            false => format!("is no file of the {whole}"),
+        };
+        Self { path: path.to_owned(), message, mend: Mend::Clean }
+    }
+}
+
+impl fmt::Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.path, self.message)
     }
 }
 
+/// What mends a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mend {
+    /// `papsynth generate --verify`, of a slide `papsynth slide make --verify`, with the same recipe makes it again.
+    Generate,
+    /// `papsynth clean` takes it away.
+    Clean,
+    /// `papsynth merge`, when all shards are there.
+    Merge,
+}
+
+impl Dataset {
+    /// The record of a shard if it is whole: its record is there, is of this data set, and all its files are as it says.
+    ///
+    /// # Errors
+    /// If the system refuses to tell.
+    pub fn whole(&self, shard: u64, check: Check) -> Result<Option<ShardRecord>, Error> {
+        let whole = self.whole_or_flaw(shard, check).map_err(|error| self.folder.named(error));
+        Ok(whole?.ok())
+    }
+
+    /// The same, or what the shard lacks.
+    pub(crate) fn whole_or_flaw(&self, shard: u64, check: Check) -> Result<Result<ShardRecord, Finding>, Error> {
+        let lacks = |message: String| Ok(Err(Finding::made_wrong(names::record(shard), message)));
+        let record = match read_record(&self.folder, shard) {
+            Ok(record) => record,
+            Err(Error::Input { problem, .. }) => return lacks(problem.to_string()),
+            Err(failure) => return Err(failure),
+        };
+        if record.identity != self.identity || record.layout != self.layout {
+            return lacks("is of another data set".to_owned());
+        }
+        for file in &record.files {
+            if let Some(message) = self.folder.flaw(file, check)? {
+                return Ok(Err(Finding::made_wrong(&file.path, message)));
+            }
+        }
+        if check == Check::Hashes
+            && let Some(flaw) = flaw(self, &record)?
+        {
+            return Ok(Err(flaw));
+        }
+        Ok(Ok(record))
+    }
+
+    /// Whether [`finish`](Self::finish) has merged all frames that are recorded, and its files are still there.
+    ///
+    /// # Errors
+    /// If the system refuses to tell.
+    pub fn is_finished(&self) -> Result<bool, Error> {
+        let manifest = Manifest::read(&self.folder)?;
+        if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
+            return Ok(false);
+        }
+        for file in &manifest.files {
+            if self.folder.flaw(file, Check::Sizes)?.is_some() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
 /// What does not fit together in a shard whose files are as its record says.
-pub(super) fn flaw(dataset: &Dataset, record: &ShardRecord) -> Result<Option<Flaw>, Error> {
+fn flaw(dataset: &Dataset, record: &ShardRecord) -> Result<Option<Finding>, Error> {
     match compare(dataset, record) {
         Ok(()) => Ok(None),
         Err(Error::Input { path, problem }) => {
             let path = path.strip_prefix(dataset.path()).unwrap_or(&path).display().to_string();
             // Of a file in a tar file, the tar file is at fault.
             Ok(Some(match path.split_once(".tar/") {
-                Some((tar, entry)) => Flaw { path: format!("{tar}.tar"), message: format!("{entry}: {problem}") },
-                None => Flaw { path, message: problem.to_string() },
+                Some((tar, entry)) => Finding::made_wrong(format!("{tar}.tar"), format!("{entry}: {problem}")),
+                None => Finding::made_wrong(path, problem.to_string()),
             }))
         }
         Err(other) => Err(other),
@@ -68,9 +154,8 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
     let (mut rows, mut before) = (Vec::new(), 0);
     for (number, frame) in record.frames.iter().enumerate() {
         let truth = dataset.truth_in(&document, record.shard, frame.index)?;
-        let geometry = Geometry::of_summary(frame, record.identity.seed);
         let own = own_document(coco, &document, frame, &truth, record)?;
-        let field = Field::new(&geometry, frame, &truth, &own, &[]);
+        let field = Field::new(record.identity.seed, frame, &truth, &own, &[]);
         let written = Written::new(folder, layout, &field);
         layout.formats.iter().try_for_each(|format| format.check(&written, tar.as_mut()))?;
         if layout.scenes {
@@ -103,7 +188,7 @@ fn held_by_their_hashes(dataset: &Dataset, record: &ShardRecord) -> Result<(), E
     let mut due: Vec<String> = layout.objects_parquet.then(|| names::objects(record.shard)).into_iter().collect();
     if layout.has(Format::Huggingface) {
         let split = |frame: &FrameSummary| Split::of_slide(record.identity.seed, frame.slide);
-        due.extend(record.frames.iter().map(|frame| huggingface::file(split(frame), record.shard)));
+        due.extend(record.frames.iter().map(|frame| names::huggingface_file(split(frame), record.shard)));
     }
     match due.iter().find(|name| record.files.iter().all(|file| file.path != **name)) {
         Some(name) => Err(Error::input(&dataset.folder.path(name))(Problem::Missing { wanted: "file" })),
@@ -117,7 +202,7 @@ fn scene(folder: &Folder, frame: &FrameSummary, seed: u64) -> Result<(), Error> 
     let broken = |message: String| Error::input(&path)(Problem::Broken { format: "JSON", message });
     let text = String::from_utf8(read::bytes(&path, LIMITS.max_file_bytes)?).map_err(|e| broken(e.to_string()))?;
     let scene = Scene::from_json(&text).map_err(|e| broken(e.to_string()))?;
-    match Geometry::of(&scene) == Geometry::of_summary(frame, seed) {
+    match scene.key.seed == seed && frame.is_of(&scene) {
         true => Ok(()),
         false => differs(&path, format!("it is not the scene of image {}", frame.index)),
     }
@@ -149,8 +234,7 @@ fn own_document(
     if saturated.is_empty() {
         saturated.resize(frame.planes_um.len(), Mask::default());
     }
-    let geometry = Geometry::of_summary(frame, identity.seed);
-    if FrameSummary::of(&geometry, truth, &saturated, frame.floored.clone(), layout.flatten) != *frame {
+    if frame.clone().counted(truth, &saturated, frame.floored.clone(), layout.flatten) != *frame {
         return differs(coco, format!("image {}: the record's summary is of other objects", frame.index));
     }
     let files = layout.images_of(identity.seed, *shard, frame);
@@ -163,5 +247,5 @@ fn own_document(
 }
 
 fn differs<T>(path: &Path, what: String) -> Result<T, Error> {
-    Err(Error::input(path)(Problem::differs(what)))
+    Err(Error::input(path)(Problem::unfit(what)))
 }

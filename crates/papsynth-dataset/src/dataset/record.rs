@@ -9,9 +9,10 @@ use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{self, sha256};
-use crate::error::Problem;
-use crate::files::FileRecord;
-use crate::formats::Layout;
+use crate::error::{Error, Problem};
+use crate::files::{FileRecord, Folder};
+use crate::formats::{Layout, names};
+use crate::read;
 use crate::truth::FrameSummary;
 
 /// Version of the layout of data sets.
@@ -23,6 +24,9 @@ pub(crate) const FORMAT: &str = "papsynth-dataset";
 /// The program that wrote a file: the same recipe gives the same pixels by every release with the same
 /// `stream_version`, but not always the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
+
+/// Largest record of a shard that is read back.
+const RECORD_BYTES: u64 = 1 << 28;
 
 /// Largest side of an image, as wide as a field may be.
 const LARGEST_SIDE_PX: usize = 1 << 15;
@@ -150,6 +154,24 @@ impl ShardRecord {
         let has = |index| self.frames.binary_search_by_key(&index, |frame| frame.index).is_ok();
         frames.clone().all(has)
     }
+}
+
+/// The record of a shard; a missing one is an [`Problem::Missing`].
+pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
+    let path = folder.inside(&names::record(shard))?;
+    let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
+    if record.shard != shard {
+        return Err(Error::input(&path)(json(format!("is the record of shard {}", record.shard))));
+    }
+    Ok(record)
+}
+
+/// Numbers of all shards with a record, in order.
+pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
+    let names = folder.names_in(names::SHARDS)?;
+    let mut found: Vec<u64> = names.iter().filter_map(|name| names::number_of_record(name)).collect();
+    found.sort_unstable();
+    Ok(found)
 }
 
 /// Whether a path is relative and stays below where it starts.

@@ -6,13 +6,13 @@ use papsynth::scene::Scene;
 use papsynth::truth::{Mask, Truth};
 use papsynth::{Finished, Plane, white_level as white};
 
-use super::record::{FORMAT_VERSION, ShardRecord, WRITER};
-use super::set::{Dataset, read_record};
+use super::record::{FORMAT_VERSION, ShardRecord, WRITER, read_record};
+use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{Output, Pending};
 use crate::formats::parquet::Table;
 use crate::formats::{Field, Files, Sink, names};
-use crate::truth::{Document, Form, FrameSummary, Geometry, Image, Info, table, typed_cells, typed_columns};
+use crate::truth::{Document, FrameSummary, Image, Info, Row, table, typed_columns};
 
 impl Dataset {
     /// Writes a shard, whose frames will follow one by one.
@@ -38,7 +38,7 @@ pub struct ShardWriter<'a> {
 
 /// A frame of which planes are still to come.
 struct Begun {
-    geometry: Geometry,
+    frame: FrameSummary,
     /// Masks of the planes' saturated pixels.
     saturated: Vec<Mask>,
     floored: Vec<usize>,
@@ -63,7 +63,7 @@ impl<'a> ShardWriter<'a> {
         folder.inside(names::SHARDS)?;
         folders_are_own(dataset, shard)?;
         folder.remove(&names::record(shard))?;
-        let files = Files::new(folder, &dataset.layout, shard);
+        let files = Files::new(folder, &dataset.layout, dataset.identity.seed, shard);
         let sinks = dataset.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
         let truth = TruthFiles::begin(dataset, shard)?;
         Ok(Self { dataset, shard, files, sinks, truth, frame: None, done: Vec::new() })
@@ -74,16 +74,18 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If the scene is not one of this shard or not the next one, or the system refuses.
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
-        self.begin_with(Geometry::of(scene))
+        let frame = FrameSummary::of_scene(scene);
+        let (there, here) = (scene.key.seed, self.dataset.identity.seed);
+        if there != here {
+            return Err(frame.wrong(format!("the scene is of seed {there}, the data set of {here}")));
+        }
+        self.begin_with(frame)
     }
 
-    pub(crate) fn begin_with(&mut self, geometry: Geometry) -> Result<(), Error> {
-        let index = geometry.key.index;
-        let wrong = |message: String| Err(Error::Frame { index, message });
-        if geometry.key.seed != self.dataset.identity.seed {
-            let (there, here) = (geometry.key.seed, self.dataset.identity.seed);
-            return wrong(format!("the scene is of seed {there}, the data set of {here}"));
-        }
+    /// The same of a frame of the data set's seed, whatever is counted in it.
+    pub(crate) fn begin_with(&mut self, frame: FrameSummary) -> Result<(), Error> {
+        let index = frame.index;
+        let wrong = |message: String| Err(frame.wrong(message));
         let frames = self.dataset.frames_of_shard(self.shard);
         if !frames.contains(&index) || self.done.last().is_some_and(|last| last.index >= index) {
             return wrong(format!(
@@ -93,18 +95,17 @@ impl<'a> ShardWriter<'a> {
                 frames.end - 1
             ));
         }
-        if let Some(frame) = &self.frame {
-            return wrong(format!("frame {} is not finished yet", frame.geometry.key.index));
+        if let Some(begun) = &self.frame {
+            return wrong(format!("frame {} is not finished yet", begun.frame.index));
         }
-        let (pixels, planes) = (geometry.pixels(), geometry.planes_um.len());
+        let (pixels, planes) = (frame.width * frame.height, frame.planes_um.len());
         if pixels == 0 || planes == 0 {
             return wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"));
         }
         for sink in &mut self.sinks {
-            sink.begin(&geometry, &self.files)?;
+            sink.begin(&frame, &self.files)?;
         }
-        let (saturated, floored) = (Vec::with_capacity(planes), Vec::with_capacity(planes));
-        self.frame = Some(Begun { geometry, saturated, floored, picture: Vec::new() });
+        self.frame = Some(Begun { frame, saturated: Vec::new(), floored: Vec::new(), picture: Vec::new() });
         Ok(())
     }
 
@@ -113,16 +114,16 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If it is not the next one or of another size than the scene, or the system refuses.
     pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
-        let frame = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        frame.check_plane(plane)?;
+        let begun = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check_plane(plane)?;
         for sink in &mut self.sinks {
-            sink.plane(plane, &frame.geometry, &self.files)?;
+            sink.plane(plane, &begun.frame, &self.files)?;
         }
-        if Form::of(frame.geometry.planes_um.len()) == Form::Single {
-            frame.picture.clone_from(&plane.grey);
+        if !begun.frame.is_stack() {
+            begun.picture.clone_from(&plane.grey);
         }
-        frame.saturated.push(plane.saturated.clone());
-        frame.floored.push(plane.floored);
+        begun.saturated.push(plane.saturated.clone());
+        begun.floored.push(plane.floored);
         Ok(())
     }
 
@@ -131,41 +132,37 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If planes are missing, something is of another size than the scene, or the system refuses.
     pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
-        let frame = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        if Geometry::of(&finished.scene) != frame.geometry {
-            let other = finished.scene.key.index;
-            return Err(frame
-                .geometry
-                .wrong(format!("the truth handed over is that of another scene, of frame {other}")));
+        let Begun { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        let key = finished.scene.key;
+        if key.seed != self.dataset.identity.seed || !frame.is_of(&finished.scene) {
+            let other = key.index;
+            return Err(frame.wrong(format!("the truth handed over is that of another scene, of frame {other}")));
         }
-        let sharp = match Form::of(frame.geometry.planes_um.len()) {
-            Form::Single => Vec::new(),
-            Form::Stack => finished.sharp(),
-        };
+        let sharp = if frame.is_stack() { finished.sharp() } else { Vec::new() };
         if self.dataset.layout.scenes {
-            let name = names::scene(finished.scene.key.index);
-            self.files.write(&name, finished.scene.to_json().as_bytes())?;
+            self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
         }
         self.end_with(&finished.truth, sharp)
     }
 
     /// The same with the grey levels of the picture of a stack with everything in focus.
     pub(crate) fn end_with(&mut self, truth: &Truth, sharp: Vec<u16>) -> Result<&FrameSummary, Error> {
-        let frame = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        frame.check(truth, &sharp)?;
-        let geometry = &frame.geometry;
-        let picture = if sharp.is_empty() { frame.picture } else { sharp };
-        let summary = FrameSummary::of(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
-        let files = self.dataset.images_of(&summary, self.shard);
-        let document = Document::of_frame(truth, &summary, &frame.saturated, &self.dataset.categories, files)
-            .map_err(|error| geometry.wrong(format!("the recipe knows no category `{}`", error.name)))?;
-        let field = Field::new(geometry, &summary, truth, &document, &picture);
+        let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check(truth, &sharp)?;
+        let Begun { frame, saturated, floored, picture } = begun;
+        let picture = if sharp.is_empty() { picture } else { sharp };
+        let Dataset { identity, layout, categories, .. } = self.dataset;
+        let frame = frame.counted(truth, &saturated, floored, layout.flatten);
+        let files = self.dataset.images_of(&frame, self.shard);
+        let document = Document::of_frame(truth, &frame, &saturated, categories, files)
+            .map_err(|error| frame.wrong(format!("the recipe knows no category `{}`", error.name)))?;
+        let field = Field::new(identity.seed, &frame, truth, &document, &picture);
         for sink in &mut self.sinks {
             sink.field(&field, &mut self.files)?;
         }
-        let rows = table(truth, geometry.key.index, self.done.is_empty());
-        self.truth.add(document, &rows, truth, geometry.key.index)?;
-        self.done.push(summary);
+        let rows = table(truth, frame.index, self.done.is_empty());
+        self.truth.add(document, &rows, truth, frame.index)?;
+        self.done.push(frame);
         Ok(&self.done[self.done.len() - 1])
     }
 
@@ -174,8 +171,8 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If a frame was begun and not ended, or the system refuses.
     pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
-        if let Some(frame) = &self.frame {
-            return Err(frame.geometry.wrong("is not finished".to_owned()));
+        if let Some(begun) = &self.frame {
+            return Err(begun.frame.wrong("is not finished"));
         }
         let mut files = self.files;
         for sink in self.sinks {
@@ -249,7 +246,7 @@ impl TruthFiles {
         }
         self.images.extend(frame.images);
         if let Some((_, table)) = &mut self.objects {
-            truth.objects.iter().try_for_each(|object| table.row(typed_cells(truth, object, index)))?;
+            Row::all(truth, index).try_for_each(|row| table.row(&row))?;
         }
         self.table.bytes(rows)
     }
@@ -269,17 +266,17 @@ impl TruthFiles {
 
 impl Begun {
     fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
-        let (values, bits) = (self.geometry.values(), self.geometry.bits);
-        let (next, planes) = (self.saturated.len(), self.geometry.planes_um.len());
+        let (values, bits) = (self.frame.values(), self.frame.bits);
+        let (next, planes) = (self.saturated.len(), self.frame.planes_um.len());
         if plane.index != next || next >= planes {
             let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
-            return Err(self.geometry.wrong(message));
+            return Err(self.frame.wrong(message));
         }
         self.check_size("grey levels", plane.grey.len(), values)?;
         self.check_size("noise-free values", plane.noise_free.len(), values)?;
         match plane.grey.iter().copied().max() {
             Some(brightest) if brightest > white(bits) => {
-                Err(self.geometry.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
+                Err(self.frame.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
             }
             _ => Ok(()),
         }
@@ -287,23 +284,24 @@ impl Begun {
 
     /// Everything must fit to the scene before a file is written.
     fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
-        let (view, due) = (&self.geometry.view, self.geometry.planes_um.len());
-        let wrong = |message: String| Err(self.geometry.wrong(message));
+        let FrameSummary { width, height, .. } = self.frame;
+        let due = self.frame.planes_um.len();
+        let wrong = |message: String| Err(self.frame.wrong(message));
         if self.saturated.len() != due {
             return wrong(format!("{} of {due} planes were written", self.saturated.len()));
         }
         if due > 1 {
-            self.check_size("all-in-focus values", sharp.len(), self.geometry.values())?;
+            self.check_size("all-in-focus values", sharp.len(), self.frame.values())?;
         }
-        if [truth.width, truth.height] != [view.width, view.height] {
-            let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
+        let [w, h] = [truth.width, truth.height];
+        if [w, h] != [width, height] {
             return wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}"));
         }
         let outside = truth.objects.iter().find(|object| {
             [&object.amodal, &object.front]
                 .iter()
                 .filter_map(|mask| mask.bounds())
-                .any(|b| (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height)
+                .any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
         });
         outside.map_or(Ok(()), |object| wrong(format!("the mask of object {} leaves the image", object.id)))
     }
@@ -312,9 +310,9 @@ impl Begun {
         if found == values {
             return Ok(());
         }
-        let channels = self.geometry.channels;
+        let channels = self.frame.channels;
         let pixels = values / channels;
         let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
-        Err(self.geometry.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
+        Err(self.frame.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
     }
 }

@@ -7,11 +7,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::fault;
-use super::file_record::{Check, FileRecord};
-use super::pending::{Output, Pending, is_temporary};
+use super::pending::{FileRecord, Output, Pending, is_temporary};
 use super::store::{Home, Remote};
 use crate::bytes::{measure, sha256};
 use crate::error::{Error, Problem};
+
+/// How carefully files are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Check {
+    /// They are there and of the right size.
+    Sizes,
+    /// Their SHA-256 is right, too; all are read.
+    Hashes,
+}
 
 /// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
 ///

@@ -6,13 +6,24 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::fault;
-use super::file_record::FileRecord;
 use super::store::Remote;
 use crate::bytes::{json, measure, sha256};
 use crate::error::Error;
+
+/// A file of a data set.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileRecord {
+    /// Path relative to the data set, with `/` between folders.
+    pub path: String,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+}
 
 const TEMPORARY_ENDING: &str = ".tmp";
 

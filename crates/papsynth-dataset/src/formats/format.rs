@@ -76,32 +76,26 @@ impl Format {
     /// Its name, which is also that of its folder in a data set (but for [`Folder`](Self::Folder), whose folders lie at the top).
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Folder => "folder",
-            Self::Webdataset => "webdataset",
-            Self::OmeTiff => "ome-tiff",
-            Self::Cellpose => "cellpose",
-            Self::Stardist => "stardist",
-            Self::YoloSeg => "yolo-seg",
-            Self::Qupath => "qupath",
-            Self::OmeZarr => "ome-zarr",
-            Self::Huggingface => "huggingface",
-        }
+        self.words().0
     }
 
     /// What it is, in a line.
     #[must_use]
     pub fn about(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
         match self {
-            Self::Folder => "PNG images (stacks: OME-TIFF), noise-free images, label TIFFs in folders",
-            Self::Webdataset => "tar shards for streaming: image and truth of each frame",
-            Self::OmeTiff => "OME-TIFF, pyramidal where large, with label layers that never overlap",
-            Self::Cellpose => "images beside _masks, for cytoplasm and for nuclei",
-            Self::Stardist => "images/ and masks/, for cytoplasm and for nuclei",
-            Self::YoloSeg => "images/ and labels/ by split, with polygons, and data.yaml",
-            Self::Qupath => "GeoJSON with nuclei within cells, beside OME-TIFF images",
-            Self::OmeZarr => "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap",
-            Self::Huggingface => "Parquet shards by split for `datasets`: images, objects with masks",
+            Self::Folder => ("folder", "PNG images (stacks: OME-TIFF), noise-free images, label TIFFs in folders"),
+            Self::Webdataset => ("webdataset", "tar shards for streaming: image and truth of each frame"),
+            Self::OmeTiff => ("ome-tiff", "OME-TIFF, pyramidal where large, with label layers that never overlap"),
+            Self::Cellpose => ("cellpose", "images beside _masks, for cytoplasm and for nuclei"),
+            Self::Stardist => ("stardist", "images/ and masks/, for cytoplasm and for nuclei"),
+            Self::YoloSeg => ("yolo-seg", "images/ and labels/ by split, with polygons, and data.yaml"),
+            Self::Qupath => ("qupath", "GeoJSON with nuclei within cells, beside OME-TIFF images"),
+            Self::OmeZarr => ("ome-zarr", "OME-Zarr 0.5, pyramidal where large, with label layers that never overlap"),
+            Self::Huggingface => ("huggingface", "Parquet shards by split for `datasets`: images, objects with masks"),
         }
     }
 

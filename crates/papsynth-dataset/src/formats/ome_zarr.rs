@@ -19,7 +19,7 @@ use super::written::{LIMITS, Take, Written, differs};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Output};
 use crate::read::{self, LevelImage};
-use crate::truth::{Geometry, category_name, layers};
+use crate::truth::{FrameSummary, category_name, layers};
 use crate::write::{fits_16_bits, is_large};
 use papsynth::white_level as white;
 
@@ -55,8 +55,8 @@ impl Images {
 }
 
 /// The arrays of an image or label image of a frame.
-fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
-    let [width, height] = [geometry.view.width, geometry.view.height];
+fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
+    let [width, height] = [frame.width, frame.height];
     let form = Form {
         kind,
         channels,
@@ -66,14 +66,14 @@ fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 
         tiling: Tiling::whole(CHUNK, planes.unwrap_or(1), width, height),
         levels: if is_large(width, height) { levels_until(CHUNK, width, height) } else { 1 },
     };
-    Pyramid::new(&form).map_err(|error| geometry.wrong(error.to_string()))
+    Pyramid::new(&form).map_err(|error| frame.wrong(error.to_string()))
 }
 
 /// The arrays of the image of a frame.
-fn of_image(geometry: &Geometry) -> Result<Pyramid, Error> {
+fn of_image(frame: &FrameSummary) -> Result<Pyramid, Error> {
     let many = |count: usize| (count > 1).then_some(count);
-    let kind = if geometry.bits <= 8 { Kind::U8 } else { Kind::U16 };
-    pyramid(geometry, kind, [many(geometry.channels), many(geometry.planes_um.len())])
+    let kind = if frame.bits <= 8 { Kind::U8 } else { Kind::U16 };
+    pyramid(frame, kind, [many(frame.channels), many(frame.planes_um.len())])
 }
 
 /// A label image: one layer of a group.
@@ -92,7 +92,7 @@ fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
             let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
             let labels = Labels {
                 name: format!("{}-{number}", group.name()),
-                pyramid: pyramid(field.geometry, kind, [None, None])?,
+                pyramid: pyramid(field.frame, kind, [None, None])?,
                 colors: Vec::new(),
                 properties: properties(field, group, &shown),
             };
@@ -127,35 +127,35 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
 }
 
 /// Every `zarr.json` of a frame.
-fn documents(geometry: &Geometry, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let range = [0.0, f64::from(white(geometry.bits))];
+fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let range = [0.0, f64::from(white(frame.bits))];
     let channel = |(label, color): (&str, [u8; 3])| Channel { label: label.to_owned(), color, range, window: range };
-    let channels = match geometry.channels {
+    let channels = match frame.channels {
         3 => [("red", [255, 0, 0]), ("green", [0, 255, 0]), ("blue", [0, 0, 255])].map(channel).to_vec(),
         _ => vec![channel(("grey", [255; 3]))],
     };
-    let planes = &geometry.planes_um;
+    let planes = &frame.planes_um;
     let step_um = match planes.as_slice() {
         [first, second, ..] if first != second => second - first,
         _ => 1.0,
     };
     let own = json!({
-        "seed": geometry.key.seed,
-        "index": geometry.key.index,
-        "slide": geometry.slide,
-        "bits": geometry.bits,
+        "seed": seed,
+        "index": frame.index,
+        "slide": frame.slide,
+        "bits": frame.bits,
         "planes_um": planes,
     });
     let image = Image {
-        name: numbered(geometry.key.index),
-        pyramid: of_image(geometry)?,
-        space: Space { pixel_um: geometry.view.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
+        name: numbered(frame.index),
+        pyramid: of_image(frame)?,
+        space: Space { pixel_um: frame.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
         channels,
         plane: planes.len() / 2,
         labels,
         attributes: Map::from_iter([("papsynth".to_owned(), own)]),
     };
-    image.documents().map_err(|error| geometry.wrong(error.to_string()))
+    image.documents().map_err(|error| frame.wrong(error.to_string()))
 }
 
 /// The one shard of a level, from the folder of its group.
@@ -164,36 +164,35 @@ fn shard_file(level: usize, array: &papsynth_zarr::Array) -> String {
 }
 
 impl Sink for Images {
-    fn begin(&mut self, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        let group = group_of(geometry.key.index);
+    fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        let group = group_of(frame.index);
         self.levels.clear();
-        for (level, array) in of_image(geometry)?.levels().iter().enumerate() {
+        for (level, array) in of_image(frame)?.levels().iter().enumerate() {
             let name = format!("{group}/{}", shard_file(level, array));
             let output = Output::new(files.folder.pending(&name)?)?;
-            let encoder =
-                ShardEncoder::new(array, Shard::default()).map_err(|error| geometry.wrong(error.to_string()))?;
+            let encoder = ShardEncoder::new(array, Shard::default()).map_err(|error| frame.wrong(error.to_string()))?;
             self.levels.push(Level { encoder, output });
         }
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        for channel in 0..geometry.channels {
-            let values = plane.grey.iter().skip(channel).step_by(geometry.channels);
-            let added = match geometry.bits {
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        for channel in 0..frame.channels {
+            let values = plane.grey.iter().skip(channel).step_by(frame.channels);
+            let added = match frame.bits {
                 // Checked to fit before it came here.
                 ..=8 => self.add(channel, plane.index, values.map(|&v| v.to_le_bytes()[0]).collect()),
                 _ => self.add(channel, plane.index, values.copied().collect()),
             };
-            added.map_err(|error| failed(error, files.folder, &group_of(geometry.key.index), geometry))?;
+            added.map_err(|error| failed(error, files.folder, &group_of(frame.index), frame))?;
         }
         Ok(())
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (geometry, group) = (field.geometry, group_of(field.index()));
+        let (frame, group) = (field.frame, group_of(field.frame.index));
         let folder = files.folder;
-        let broken = |error| failed(error, folder, &group, geometry);
+        let broken = |error| failed(error, folder, &group, frame);
         for Level { encoder, mut output } in self.levels.drain(..) {
             output.bytes(&encoder.end().map_err(broken)?)?;
             files.written.push(output.into_pending()?.commit()?);
@@ -206,7 +205,7 @@ impl Sink for Images {
             }
             described.push(labels);
         }
-        for (name, bytes) in documents(geometry, described)? {
+        for (name, bytes) in documents(field.seed, frame, described)? {
             files.write(&format!("{group}/{name}"), &bytes)?;
         }
         Ok(())
@@ -214,10 +213,10 @@ impl Sink for Images {
 }
 
 /// What went wrong while a frame was encoded.
-fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, geometry: &Geometry) -> Error {
+fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, frame: &FrameSummary) -> Error {
     match error {
         papsynth_zarr::Error::Io(source) => Error::io("write", &folder.path(group))(source),
-        other => geometry.wrong(other.to_string()),
+        other => frame.wrong(other.to_string()),
     }
 }
 
@@ -243,18 +242,18 @@ fn small(ids: &[u32]) -> Vec<u16> {
 /// Whether a frame is what its truth says: documents to the letter, levels each the half of that before, labels those of the masks.
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
-    let (geometry, group) = (field.geometry, group_of(field.index()));
+    let (frame, group) = (field.frame, group_of(field.frame.index));
     let layers = of_labels(field)?;
-    for (name, expected) in documents(geometry, layers.iter().map(|layer| layer.labels.clone()).collect())? {
+    for (name, expected) in documents(field.seed, frame, layers.iter().map(|layer| layer.labels.clone()).collect())? {
         written.file(&format!("{group}/{name}"), |bytes| match bytes == expected {
             true => Ok(()),
             false => differs("it does not say what the record and coco.json do"),
         })?;
     }
-    let pyramid = of_image(geometry)?;
+    let pyramid = of_image(frame)?;
     let first = format!("{group}/{}", shard_file(0, &pyramid.levels()[0]));
-    written.file(&first, |bytes| written.shown(geometry.planes_um.len(), &mut |take| planes(bytes, geometry, take)))?;
-    match geometry.bits {
+    written.file(&first, |bytes| written.shown(&mut |take| planes(bytes, frame, take)))?;
+    match frame.bits {
         ..=8 => are_halves::<u8>(written, &group, &pyramid)?,
         _ => are_halves::<u16>(written, &group, &pyramid)?,
     }
@@ -311,13 +310,13 @@ fn broken(error: papsynth_zarr::Error) -> Problem {
 }
 
 /// The planes of a frame, from the bytes of its image's one shard at full size.
-fn planes(bytes: &[u8], geometry: &Geometry, take: &mut Take) -> Result<(), Problem> {
-    let pyramid = of_image(geometry).map_err(|error| Problem::differs(error.to_string()))?;
+fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), Problem> {
+    let pyramid = of_image(frame).map_err(|error| Problem::unfit(error.to_string()))?;
     let array = &pyramid.levels()[0];
     let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
-    let (width, channels) = (geometry.view.width, geometry.channels);
-    for plane in 0..geometry.planes_um.len() {
-        let mut levels = vec![0; geometry.values()];
+    let (width, channels) = (frame.width, frame.channels);
+    for plane in 0..frame.planes_um.len() {
+        let mut levels = vec![0; frame.values()];
         for channel in 0..channels {
             let at = levels.iter_mut().skip(channel).step_by(channels);
             match array.kind() {
@@ -331,15 +330,15 @@ fn planes(bytes: &[u8], geometry: &Geometry, take: &mut Take) -> Result<(), Prob
                 }
             }
         }
-        take(LevelImage { width, channels, levels, white: white(if geometry.bits <= 8 { 8 } else { 16 }) })?;
+        take(LevelImage { width, channels, levels, white: white(if frame.bits <= 8 { 8 } else { 16 }) })?;
     }
     Ok(())
 }
 
 /// The planes of a frame of a data set, one after the other.
-pub(crate) fn read_planes(folder: &Folder, geometry: &Geometry, take: &mut Take) -> Result<(), Error> {
-    let array = of_image(geometry)?;
-    let path = folder.path(&format!("{}/{}", group_of(geometry.key.index), shard_file(0, &array.levels()[0])));
+pub(crate) fn read_planes(folder: &Folder, frame: &FrameSummary, take: &mut Take) -> Result<(), Error> {
+    let array = of_image(frame)?;
+    let path = folder.path(&format!("{}/{}", group_of(frame.index), shard_file(0, &array.levels()[0])));
     let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;
-    planes(&bytes, geometry, take).map_err(Error::input(&path))
+    planes(&bytes, frame, take).map_err(Error::input(&path))
 }

@@ -13,14 +13,14 @@ use serde_json::Value;
 
 use super::flat;
 use super::names::numbered;
-use super::ome::{Levels, description, page};
+use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
 use super::written::{LIMITS, Written, differs, is_described};
 use crate::bytes::json;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Handle, Pending};
-use crate::truth::{Form, Geometry, Split};
-use crate::write::{PageWriter, fits_16_bits, label_png, label_tiff};
+use crate::truth::{FrameSummary, Split};
+use crate::write::{PageWriter, fits_16_bits, label_png};
 
 pub(super) struct Shard {
     tar: tar::Builder<BufWriter<Handle>>,
@@ -70,9 +70,8 @@ pub(crate) fn tar(shard: u64) -> String {
     format!("webdataset/{shard:06}.tar")
 }
 
-pub(super) fn image(shard: u64, index: u64, form: Form) -> String {
-    let ending = if form == Form::Stack { "ome.tif" } else { "png" };
-    format!("{}/{index:06}.{ending}", tar(shard))
+pub(super) fn image(shard: u64, frame: &FrameSummary) -> String {
+    format!("{}/{:06}.{}", tar(shard), frame.index, if frame.is_stack() { "ome.tif" } else { "png" })
 }
 
 pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
@@ -82,10 +81,10 @@ pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
 /// What is known of a frame.
 fn head(field: &Field) -> Value {
     let split = serde_json::json!({
-        "field": Split::of_field(field.geometry.key.seed, field.index()).name(),
+        "field": Split::of_field(field.seed, field.frame.index).name(),
         "slide": field.split().name(),
     });
-    serde_json::json!({ "frame": field.summary, "split": split, "truth": field.document })
+    serde_json::json!({ "frame": field.frame, "split": split, "truth": field.document })
 }
 
 /// A tar file of a data set.
@@ -170,9 +169,8 @@ fn cannot_be_read(path: &Path) -> impl Fn(io::Error) -> Error {
 }
 
 pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
-    let (field, key) = (written.field, numbered(written.field.index()));
-    let form = Form::of(field.geometry.planes_um.len());
-    let images: &[&str] = if form == Form::Stack { &["ome.tif", "all-in-focus.png"] } else { &["png"] };
+    let (field, key) = (written.field, numbered(written.field.frame.index));
+    let images: &[&str] = if field.frame.is_stack() { &["ome.tif", "all-in-focus.png"] } else { &["png"] };
     for part in ["json"].iter().chain(images).copied().chain(flat::GROUPS.map(Group::name)) {
         let (name, bytes) = tar.next()?.unwrap_or_default();
         let path = tar.path.join(&name);
@@ -188,7 +186,7 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
                 Err(error) => Err(error.into()),
             },
             ("ome.tif", _) if ending == part => {
-                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.geometry)))
+                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.frame)))
             }
             (_, None) if ending == part => written.picture(&bytes),
             _ => {
@@ -202,28 +200,25 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
 }
 
 impl Sink for Shard {
-    fn begin(&mut self, geometry: &Geometry, _: &Files) -> Result<(), Error> {
-        let bytes = geometry.values() as u64 * geometry.planes_um.len() as u64 * 2;
-        self.stack = match Form::of(geometry.planes_um.len()) {
-            Form::Single => None,
-            Form::Stack => {
-                let memory = Memory::default();
-                let writer = PageWriter::new(memory.clone(), bytes);
-                Some((writer.map_err(Error::io("encode", self.pending.path()))?, memory))
-            }
-        };
+    fn begin(&mut self, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
+        self.stack = None;
+        if frame.is_stack() {
+            let (memory, bytes) = (Memory::default(), frame.values() as u64 * frame.planes_um.len() as u64 * 2);
+            let writer = PageWriter::new(memory.clone(), bytes).map_err(Error::io("encode", self.pending.path()))?;
+            self.stack = Some((writer, memory));
+        }
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, _: &Files) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         let Some((writer, _)) = &mut self.stack else { return Ok(()) };
-        let text = (plane.index == 0).then(|| description(geometry));
-        let written = writer.write(Levels::new(&plane.grey, geometry).pixels(), &page(geometry, text.as_deref()));
+        let text = (plane.index == 0).then(|| description(frame));
+        let written = writer.write(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()));
         written.map_err(Error::io("encode", self.pending.path()))
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (key, view) = (numbered(field.index()), field.geometry.view);
+        let key = numbered(field.frame.index);
         let failed = |path| Error::io("encode", path);
         let path = self.pending.path().to_owned();
         self.add(&format!("{key}.json"), &json(&head(field)))?;
@@ -237,8 +232,8 @@ impl Sink for Shard {
         for group in flat::GROUPS {
             let ids = files.layout.flatten.labels(field.truth, group);
             let (ending, bytes) = match fits_16_bits(&ids) {
-                true => ("png", label_png(&ids, view.width, view.pixel_um)),
-                false => ("tif", label_tiff(&ids, view.width, view.pixel_um)),
+                true => ("png", label_png(&ids, field.frame.width, field.frame.pixel_um)),
+                false => ("tif", label_tiff(&ids, field.frame)),
             };
             self.add(&format!("{key}.{}.{ending}", group.name()), &bytes.map_err(failed(&path))?)?;
         }

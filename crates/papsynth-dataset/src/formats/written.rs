@@ -10,7 +10,6 @@ use crate::bytes::sha256;
 use crate::error::{Error, Problem};
 use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
-use crate::truth::Form;
 
 /// What was written for one frame is read whole.
 pub(crate) const LIMITS: Limits =
@@ -54,8 +53,7 @@ impl<'a> Written<'a> {
 
     /// All planes are there and of the size that the record says, and the same in every format.
     pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
-        let planes = self.field.geometry.planes_um.len();
-        self.shown(planes, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
+        self.shown(&mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// The one picture of a frame, the same in every format.
@@ -64,20 +62,20 @@ impl<'a> Written<'a> {
     }
 
     /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
-    pub(super) fn shown(&self, planes: usize, read: &mut Read) -> Result<(), Problem> {
-        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
-        self.compare(planes, seen, read)
+    pub(super) fn shown(&self, read: &mut Read) -> Result<(), Problem> {
+        let frame = self.field.frame;
+        self.compare(frame.planes_um.len(), if frame.is_stack() { &self.planes } else { &self.picture }, read)
     }
 
     fn compare(&self, planes: usize, seen: &OnceCell<Vec<String>>, read: &mut Read) -> Result<(), Problem> {
-        let geometry = self.field.geometry;
+        let frame = self.field.frame;
         let mut found = Vec::new();
         read(&mut |page| {
-            if [page.width, page.height()] != [geometry.view.width, geometry.view.height] {
+            if [page.width, page.height()] != [frame.width, frame.height] {
                 return differs("it has not the size that the record says");
             }
-            let levels = levels(page, geometry.channels);
-            if levels.len() != geometry.values() {
+            let levels = levels(page, frame.channels);
+            if levels.len() != frame.values() {
                 return differs("it has not the channels that the record says");
             }
             if found.len() >= planes {
@@ -98,7 +96,7 @@ impl<'a> Written<'a> {
     /// A label image is what the masks give.
     pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), Problem> {
         let found = read::label_map(bytes, &LIMITS)?;
-        is_of_masks(found.width == self.field.geometry.view.width && found.ids == ids)
+        is_of_masks(found.width == self.field.frame.width && found.ids == ids)
     }
 
     /// Layers of labels are what the masks give.
@@ -138,5 +136,5 @@ fn is_of_masks(holds: bool) -> Result<(), Problem> {
 }
 
 pub(super) fn differs<T>(what: &str) -> Result<T, Problem> {
-    Err(Problem::differs(what))
+    Err(Problem::unfit(what))
 }

@@ -8,7 +8,7 @@ use papsynth::truth::LabelMap;
 use super::components::components;
 use super::file::{Limits, bytes, parse};
 use super::image::{LevelImage, read_label_map};
-use super::nucleus::image_files;
+use super::nucleus::{image_files, same_size};
 use crate::error::{Error, Problem};
 use papsynth::white_level as white;
 
@@ -115,11 +115,7 @@ impl FieldFile {
             }
             NucleiFile::Labels(path) => {
                 let labels = read_label_map(path, limits)?;
-                let size = |width: usize, len: usize| [width, len / width.max(1)];
-                let (mask, own) = (size(labels.width, labels.ids.len()), size(image.width, grey.len()));
-                if mask != own {
-                    return Err(Error::input(path)(Problem::MaskSize { mask, image: own }));
-                }
+                same_size(&labels, [image.width, grey.len()]).map_err(Error::input(path))?;
                 FieldNuclei::Labels(separate(labels, limits).map_err(Error::input(path))?)
             }
         };
@@ -203,7 +199,10 @@ fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();
     if 2 * outside > points.len() {
-        return Err(Problem::PointsOutside { outside, count: points.len(), image });
+        let (count, [width, height]) = (points.len(), image);
+        return Err(Problem::unfit(format!(
+            "{outside} of {count} points lie outside the image of {width} x {height} pixels; the columns wanted are y,x in pixels"
+        )));
     }
     Ok(())
 }
@@ -254,10 +253,8 @@ mod tests {
         let image = [100, 50];
         assert_eq!(within(&[], image), Ok(()));
         assert_eq!(within(&[[99.4, 49.0], [-3.0, 2.0]], image), Ok(()));
-        assert!(matches!(
-            within(&[[10.0, 90.0], [-3.0, 2.0], [1.0, 1.0]], image),
-            Err(Problem::PointsOutside { outside: 2, count: 3, .. })
-        ));
+        let refused = within(&[[10.0, 90.0], [-3.0, 2.0], [1.0, 1.0]], image).unwrap_err().to_string();
+        assert!(refused.starts_with("2 of 3 points"), "{refused}");
     }
 
     #[test]

@@ -33,4 +33,4 @@ pub use nucleus::{NucleusSample, image_files, read_nuclei, read_pairs};
 pub use outlines::{Outline, outlines, read_outlines};
 pub use stack::{Stack, natural_order};
 pub(crate) use tiff::{description, float_pages};
-pub use weights::{InputFile, label_weights, read_inputs, weights};
+pub use weights::{InputFile, read_inputs};

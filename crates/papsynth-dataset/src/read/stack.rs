@@ -86,10 +86,19 @@ impl Stack {
         }
         let (found, first) = ([width, plane.len() / width.max(1)], [self.width, self.height()]);
         if !self.planes.is_empty() && found != first {
-            return Err(Problem::PlaneSize { plane: self.planes.len(), found, first });
+            return Err(Problem::unfit(format!(
+                "plane {} is {} x {}, the first {} x {}; all must be the same",
+                self.planes.len(),
+                found[0],
+                found[1],
+                first[0],
+                first[1]
+            )));
         }
         if (self.planes.len() as u64 + 1) * plane.len() as u64 > MOST_PIXELS {
-            return Err(Problem::StackSize { limit: MOST_PIXELS });
+            return Err(Problem::unfit(format!(
+                "the stack has more than {MOST_PIXELS} pixels up to this file; crop it, or take fewer planes"
+            )));
         }
         self.width = width;
         self.planes.push(plane);

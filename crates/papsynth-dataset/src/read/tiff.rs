@@ -25,7 +25,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     if decoder.more_images() {
         // What is wrong with the first is told before.
         shape(&mut decoder, limits, ACCEPTED)?;
-        return Err(Problem::Pages);
+        return Err(Problem::unfit("holds several images; accepted is one image a file"));
     }
     match page(decoder, limits, ACCEPTED)?.0 {
         Raster { samples: Samples::F32(_), .. } => {
@@ -80,7 +80,7 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
 }
 
 pub(super) fn too_many(most: usize) -> Problem {
-    Problem::differs(format!("it has more than {most} pages"))
+    Problem::unfit(format!("it has more than {most} pages"))
 }
 
 /// What the first page of a file says that it shows, if it says anything.

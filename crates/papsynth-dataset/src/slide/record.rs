@@ -6,14 +6,14 @@ use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{json, json_lines, sha256};
-use crate::dataset::{Identity, WRITER, lies_inside, nested};
+use crate::dataset::{Identity, SLIDE, WRITER, lies_inside};
 use crate::error::{Error, Problem};
 use crate::files::{FileRecord, Folder};
 
 /// Name of the file that says what a slide is made from.
-pub(super) const HEAD: &str = nested::SLIDE[0];
+pub(super) const HEAD: &str = SLIDE[0];
 
-const FORMAT: &str = nested::SLIDE[1];
+const FORMAT: &str = SLIDE[1];
 const VERSION: u32 = 1;
 
 /// Largest record that is read back.

@@ -9,7 +9,7 @@ use papsynth_zarr::Shard;
 
 use super::document::{Forms, IMAGE};
 use super::record::{HEAD, RECORD_BYTES, SlideHead, SlideInfo, SlideRecord};
-use crate::dataset::{Identity, difference, nested, stranger};
+use crate::dataset::{Identity, recipe_difference, refuse_nested, stranger};
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder};
 use crate::formats::{HAS_PARQUET, names};
@@ -48,7 +48,7 @@ impl SlideSet {
         match stranger(&set.folder)? {
             // Of several that begin at once one is the first.
             None => {
-                nested::refuse(&set.folder)?;
+                refuse_nested(&set.folder)?;
                 look_at_the_middle(slide)?;
                 if !set.folder.write_unless_there(HEAD, |out| out.bytes(&text))? {
                     set.compare_or_restore(&recipe)?;
@@ -86,7 +86,7 @@ impl SlideSet {
         };
         let Some(what) = found.differs(&self.head) else { return Ok(()) };
         let same_recipe = found.identity.recipe_sha256 == self.head.identity.recipe_sha256;
-        let field = if same_recipe { String::new() } else { difference::of_recipe(&self.folder, recipe) };
+        let field = if same_recipe { String::new() } else { recipe_difference(&self.folder, recipe) };
         let message =
             format!("holds a slide of another {what}{field}; choose another folder, or give what it was begun with");
         Err(Error::folder(self.path(), message))

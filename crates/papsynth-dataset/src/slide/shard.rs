@@ -14,7 +14,7 @@ use crate::dataset::Share;
 use crate::error::Error;
 use crate::files::{Check, FileRecord};
 use crate::formats::parquet::Table;
-use crate::truth::{collection, slide_cells, slide_columns, slide_table};
+use crate::truth::{Row, collection, slide_columns, slide_table};
 
 /// Which shards to make, and how.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,7 @@ impl SlideSet {
         if self.head.objects_parquet {
             let pending = self.folder.pending(&format!("objects/{name}.parquet"))?;
             let mut table = Table::begin(pending.handle()?, pending.path(), slide_columns())?;
-            objects.iter().try_for_each(|object| table.row(slide_cells(object)))?;
+            Row::of_slide(objects).try_for_each(|row| table.row(&row))?;
             table.end()?;
             files.push(pending.commit()?);
         }

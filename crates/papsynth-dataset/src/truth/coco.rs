@@ -4,8 +4,7 @@ use papsynth::scene::{Kind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
 use serde::{Deserialize, Serialize};
 
-use super::category::{Category, category_name, group};
-use super::frame::FrameSummary;
+use super::frame::{Category, FrameSummary, category_name, group};
 use super::rle;
 use crate::error::Problem;
 
