@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::Threads;
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share, frames_of, truth_differs};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Layout, Outcome, Run, Share, images_of, truth_differs};
 use toml::Table;
 
 use crate::args::{self, EngineArgs, RecipeArgs, Rerender};
@@ -19,7 +19,7 @@ const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", 
 
 pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let source = Dataset::open(&args.dir)?;
-    let frames = frames_of(&source)?;
+    let frames: Vec<u64> = images_of(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     if before.recipe.recipe.to_toml() != source_recipe(&source)? {

@@ -61,7 +61,6 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
     Ok(cleaned)
 }
 
-/// What a folder belongs to.
 enum Owner {
     Dataset(Manifest),
     #[cfg(feature = "zarr")]

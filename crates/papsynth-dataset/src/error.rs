@@ -80,12 +80,9 @@ impl Error {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file is not there.
-    #[error("there is no such {wanted}")]
-    Missing {
-        /// "file" or "folder".
-        wanted: &'static str,
-    },
+    /// There is no such "file" or "folder".
+    #[error("there is no such {0}")]
+    Missing(&'static str),
     /// There is a folder of that name.
     #[error("is a folder; a file is expected")]
     Folder,
@@ -95,12 +92,9 @@ pub enum Problem {
     /// The file is of another format.
     #[error("is neither a PNG nor a TIFF file")]
     Format,
-    /// The file ends before its image does.
-    #[error("the {format} file is truncated: it ends before its image does")]
-    Truncated {
-        /// "PNG" or "TIFF".
-        format: &'static str,
-    },
+    /// The "PNG" or "TIFF" file ends before its image does.
+    #[error("the {0} file is truncated: it ends before its image does")]
+    Truncated(&'static str),
     /// The file does not follow its format.
     #[error("the {format} file cannot be decoded: {message}")]
     Broken {
@@ -150,12 +144,9 @@ pub enum Problem {
         accepted: &'static str,
     },
     /// What is in the file does not fit: an empty mask, a mask of another size than its image, a file of a data set that says
-    /// something else than the others.
-    #[error("{what}")]
-    Unfit {
-        /// What is wrong, and what would be accepted.
-        what: String,
-    },
+    /// something else than the others. The text says what is wrong, and what would be accepted.
+    #[error("{0}")]
+    Unfit(String),
     /// A folder without anything to read.
     #[error("holds no PNG or TIFF file")]
     NoImages,
@@ -175,7 +166,16 @@ impl Problem {
     }
 
     pub(crate) fn unfit(what: impl Into<String>) -> Self {
-        Self::Unfit { what: what.into() }
+        Self::Unfit(what.into())
+    }
+
+    /// What does not fit, unless it `fits`.
+    pub(crate) fn unless(fits: bool, what: impl Into<String>) -> Result<(), Self> {
+        if fits { Ok(()) } else { Err(Self::unfit(what)) }
+    }
+
+    pub(crate) fn samples(found: impl Into<String>, accepted: &'static str) -> Self {
+        Self::Samples { found: found.into(), accepted }
     }
 }
 

@@ -19,7 +19,7 @@ use crate::error::{Error, Problem};
 use crate::files::{Check, Folder, is_temporary};
 use crate::formats::{Field, Format, LIMITS, TarFile, Written, names, tar};
 use crate::read;
-use crate::truth::{Document, FrameSummary, Image, Info, Split, table};
+use crate::truth::{Document, FrameSummary, Info, Split, table};
 
 /// One thing that is wrong.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -87,10 +87,8 @@ impl Dataset {
         if record.identity != self.identity || record.layout != self.layout {
             return lacks("is of another data set".to_owned());
         }
-        for file in &record.files {
-            if let Some(message) = self.folder.flaw(file, check)? {
-                return Ok(Err(Finding::made_wrong(&file.path, message)));
-            }
+        if let Some((path, message)) = self.folder.first_flaw(&record.files, check)? {
+            return Ok(Err(Finding::made_wrong(path, message)));
         }
         if check == Check::Hashes
             && let Some(flaw) = flaw(self, &record)?
@@ -109,12 +107,7 @@ impl Dataset {
         if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
             return Ok(false);
         }
-        for file in &manifest.files {
-            if self.folder.flaw(file, Check::Sizes)?.is_some() {
-                return Ok(false);
-            }
-        }
-        Ok(true)
+        Ok(self.folder.first_flaw(&manifest.files, Check::Sizes)?.is_none())
     }
 }
 
@@ -138,15 +131,12 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
     let Dataset { folder, layout, .. } = dataset;
     let (coco, csv) = (&folder.path(&names::coco(record.shard)), &folder.inside(&names::table(record.shard))?);
     let document = dataset.document(record.shard)?;
-    if document.images.len() != record.frames.len() {
-        return differs(coco, format!("it has {} images, the record {}", document.images.len(), record.frames.len()));
-    }
-    if document.info != Info::default() || !document.licenses.is_empty() {
-        return differs(coco, "it does not say what a document of a data set says of itself".to_owned());
-    }
-    if document.categories != dataset.categories {
-        return differs(coco, "its categories are not those of the data set".to_owned());
-    }
+    let due = |fits: bool, what: String| Problem::unless(fits, what).map_err(Error::input(coco));
+    let (images, frames) = (document.images.len(), record.frames.len());
+    due(images == frames, format!("it has {images} images, the record {frames}"))?;
+    let is_ours = document.info == Info::default() && document.licenses.is_empty();
+    due(is_ours, "it does not say what a document of a data set says of itself".to_owned())?;
+    due(document.categories == dataset.categories, "its categories are not those of the data set".to_owned())?;
     held_by_their_hashes(dataset, record)?;
     let tar_file = layout.has(Format::Webdataset).then(|| TarFile::open(folder, &tar(record.shard)));
     let mut tar_file = tar_file.transpose()?;
@@ -163,23 +153,15 @@ fn compare(dataset: &Dataset, record: &ShardRecord) -> Result<(), Error> {
         }
         rows.extend(table(&truth, frame.index, number == 0));
         let count = own.annotations.len() as u64;
-        let there = document.annotations.iter().filter(|annotation| annotation.image() == frame.index);
-        if !own.annotations.into_iter().map(|annotation| annotation.renumbered(before)).eq(there.cloned()) {
-            return differs(
-                coco,
-                format!("ids, parents or categories of image {} are not as they are given", frame.index),
-            );
-        }
+        let there = document.annotations.iter().filter(|annotation| annotation.image_id == frame.index).cloned();
+        let same = own.annotations.into_iter().map(|annotation| annotation.renumbered(before)).eq(there);
+        due(same, format!("ids, parents or categories of image {} are not as they are given", frame.index))?;
         before += count;
     }
-    if before != document.annotations.len() as u64 {
-        return differs(coco, "it has annotations of no image".to_owned());
-    }
+    due(before == document.annotations.len() as u64, "it has annotations of no image".to_owned())?;
     tar.map_or(Ok(()), |mut tar| tar.end())?;
-    match read::bytes(csv, LIMITS.max_file_bytes)? == rows {
-        true => Ok(()),
-        false => differs(csv, format!("it is not the table of {}", names::coco(record.shard))),
-    }
+    let same = read::bytes(csv, LIMITS.max_file_bytes)? == rows;
+    Problem::unless(same, format!("it is not the table of {}", names::coco(record.shard))).map_err(Error::input(csv))
 }
 
 /// Files that no other is compared with, because their hashes tell enough, are in the record.
@@ -191,7 +173,7 @@ fn held_by_their_hashes(dataset: &Dataset, record: &ShardRecord) -> Result<(), E
         due.extend(record.frames.iter().map(|frame| names::huggingface_file(split(frame), record.shard)));
     }
     match due.iter().find(|name| record.files.iter().all(|file| file.path != **name)) {
-        Some(name) => Err(Error::input(&dataset.folder.path(name))(Problem::Missing { wanted: "file" })),
+        Some(name) => Err(Error::input(&dataset.folder.path(name))(Problem::Missing("file"))),
         None => Ok(()),
     }
 }
@@ -202,10 +184,8 @@ fn scene(folder: &Folder, frame: &FrameSummary, seed: u64) -> Result<(), Error> 
     let broken = |message: String| Error::input(&path)(Problem::Broken { format: "JSON", message });
     let text = String::from_utf8(read::bytes(&path, LIMITS.max_file_bytes)?).map_err(|e| broken(e.to_string()))?;
     let scene = Scene::from_json(&text).map_err(|e| broken(e.to_string()))?;
-    match scene.key.seed == seed && frame.is_of(&scene) {
-        true => Ok(()),
-        false => differs(&path, format!("it is not the scene of image {}", frame.index)),
-    }
+    let same = scene.key.seed == seed && frame.is_of(&scene);
+    Problem::unless(same, format!("it is not the scene of image {}", frame.index)).map_err(Error::input(&path))
 }
 
 /// The document of a frame as it is written: from its masks alone, if what lies in front and the record's summary follow from them, too.
@@ -217,35 +197,27 @@ fn own_document(
     record: &ShardRecord,
 ) -> Result<Document, Error> {
     let ShardRecord { identity, layout, shard, .. } = record;
-    if [truth.width, truth.height] != [frame.width, frame.height] {
-        return differs(coco, format!("image {} has not the size that the record says", frame.index));
-    }
+    let index = frame.index;
+    let due = |fits: bool, what: String| Problem::unless(fits, what).map_err(Error::input(coco));
+    let same = [truth.width, truth.height] == [frame.width, frame.height];
+    due(same, format!("image {index} has not the size that the record says"))?;
     for group in Group::ALL {
         let objects: Vec<&ObjectTruth> = truth.objects.iter().filter(|object| object.group() == group).collect();
         let stack: Vec<_> = objects.iter().map(|o| (o.id, o.depth_um, &o.amodal)).collect();
-        let fronts = front_masks(&stack, truth.width, truth.height);
-        if let Some((object, _)) = objects.iter().zip(fronts).find(|(object, front)| object.front != *front) {
-            let message = format!("image {}: not what lies in front of object {} is its front", frame.index, object.id);
-            return differs(coco, message);
+        for (object, front) in objects.iter().zip(front_masks(&stack, truth.width, truth.height)) {
+            let what = format!("image {index}: not what lies in front of object {} is its front", object.id);
+            due(object.front == front, what)?;
         }
     }
-    let image = document.images.iter().find(|image| image.index() == frame.index);
-    let mut saturated = image.map_or_else(|| Ok(Vec::new()), Image::saturated).map_err(Error::input(coco))?;
+    let mut saturated = document.saturated(index).map_err(Error::input(coco))?;
     if saturated.is_empty() {
         saturated.resize(frame.planes_um.len(), Mask::default());
     }
-    if frame.clone().counted(truth, &saturated, frame.floored.clone(), layout.flatten) != *frame {
-        return differs(coco, format!("image {}: the record's summary is of other objects", frame.index));
-    }
+    let counted = frame.clone().counted(truth, &saturated, frame.floored.clone(), layout.flatten);
+    due(counted == *frame, format!("image {index}: the record's summary is of other objects"))?;
     let files = layout.images_of(identity.seed, *shard, frame);
     let own = Document::of_frame(truth, frame, &saturated, &document.categories, files)
-        .or_else(|error| differs(coco, format!("it has no category `{}`", error.name)))?;
-    match own.images.first() == image {
-        true => Ok(own),
-        false => differs(coco, format!("image {} is not where, or as large as, it says", frame.index)),
-    }
-}
-
-fn differs<T>(path: &Path, what: String) -> Result<T, Error> {
-    Err(Error::input(path)(Problem::unfit(what)))
+        .map_err(|category| Error::input(coco)(Problem::unfit(format!("it has no category `{category}`"))))?;
+    let same = own.images.first() == document.image(index);
+    due(same, format!("image {index} is not where, or as large as, it says")).map(|()| own)
 }

@@ -14,7 +14,7 @@ use crate::error::{Error, Problem};
 use crate::files::Check;
 use crate::formats::{Format, LIMITS, Layout, levels, names};
 use crate::read::{self, LevelImage};
-use crate::truth::{Document, FrameSummary, Image};
+use crate::truth::{Document, FrameSummary};
 
 /// Largest recipe, model or map.
 const GIVEN_BYTES: u64 = 1 << 30;
@@ -85,7 +85,6 @@ fn refuse<T>(source: &Dataset, message: String) -> Result<T, Error> {
     Err(Error::folder(source.path(), message))
 }
 
-/// A data set of the same identity.
 fn begin(source: &Dataset, to: &Path, layout: &Layout) -> Result<Dataset, Error> {
     let Dataset { folder, identity, categories, map, .. } = source;
     let given = |name: &str| Ok::<_, Error>((name.to_owned(), read::bytes(&folder.inside(name)?, GIVEN_BYTES)?));
@@ -99,7 +98,6 @@ fn begin(source: &Dataset, to: &Path, layout: &Layout) -> Result<Dataset, Error>
     Dataset::begin(to, identity.clone(), layout.clone(), categories.clone(), map.clone(), &kept)
 }
 
-/// Every frame with its shard, by index.
 fn frames_in(source: &Dataset) -> Result<Vec<(u64, u64)>, Error> {
     let mut frames = Vec::new();
     for shard in source.shards()? {
@@ -128,15 +126,12 @@ struct Open<'a> {
 impl<'a> Open<'a> {
     fn of(source: &'a Dataset, shard: u64) -> Result<Self, Error> {
         let record = record(source, shard)?;
-        for file in &record.files {
-            if let Some(message) = source.folder.flaw(file, Check::Hashes)? {
-                return refuse(source, format!("{} {message}; `papsynth verify` says what is wrong", file.path));
-            }
+        if let Some((path, message)) = source.folder.first_flaw(&record.files, Check::Hashes)? {
+            return refuse(source, format!("{path} {message}; `papsynth verify` says what is wrong"));
         }
         Ok(Self { source, record, document: source.document(shard)? })
     }
 
-    /// Hands over the planes of a frame.
     fn planes(&self, frame: &FrameSummary, mut take: impl FnMut(Plane) -> Result<(), Error>) -> Result<(), Error> {
         let Self { source, record, document } = self;
         let Dataset { folder, layout, .. } = source;
@@ -155,8 +150,7 @@ impl<'a> Open<'a> {
             false => None,
         };
         let coco = folder.path(&names::coco(record.shard));
-        let image = document.images.iter().find(|image| image.index() == frame.index);
-        let saturated = image.map_or_else(|| Ok(Vec::new()), Image::saturated).map_err(Error::input(&coco))?;
+        let saturated = document.saturated(frame.index).map_err(Error::input(&coco))?;
         let mut index = 0;
         let mut failure = None;
         let mut hand_over = |page| {

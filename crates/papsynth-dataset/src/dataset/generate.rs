@@ -125,7 +125,6 @@ impl Dataset {
         outcome.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The frames of a shard that a run makes.
     fn frames_of(&self, shard: u64, run: &Run) -> Range<u64> {
         let room = self.frames_of_shard(shard);
         room.start.max(run.frames.start)..room.end.min(run.frames.end)
@@ -163,7 +162,6 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Run<'_> {
-    /// Counts the time of some work to the files.
     fn files<T>(&self, work: impl FnOnce() -> T) -> T {
         match self.profile {
             Some(profile) => profile.time(Stage::Files, work),

@@ -78,12 +78,10 @@ impl Dataset {
         let format = self.with_planes().filter(|_| due > 1);
         let Some(format) = format else {
             let page = picture(self, frame, shard)?;
-            let whole = whole(page, frame);
-            take(0, whole.map_err(|problem| Error::Frame { index: frame.index, message: problem.to_string() })?);
+            take(0, whole(page, frame).map_err(|problem| frame.wrong(problem.to_string()))?);
             return Ok(());
         };
         let name = format.image(self.identity.seed, shard, frame);
-        let failed = |what: String| Error::input(&self.folder.path(&name))(Problem::unfit(what));
         let mut number = 0;
         pages(self, &name, frame, shard, &mut |page| {
             if number < due {
@@ -92,7 +90,8 @@ impl Dataset {
             number += 1;
             Ok(())
         })?;
-        if number == due { Ok(()) } else { Err(failed(format!("has {number} planes; the record says {due}"))) }
+        let all = Problem::unless(number == due, format!("has {number} planes; the record says {due}"));
+        all.map_err(Error::input(&self.folder.path(&name)))
     }
 
     /// What is known of a frame.
@@ -188,14 +187,6 @@ fn whole(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, Problem> {
         )));
     }
     Ok(levels(page, channels))
-}
-
-/// Indices of all recorded frames, in order.
-///
-/// # Errors
-/// If a record cannot be read, or is missing of a shard that was merged.
-pub fn frames_of(dataset: &Dataset) -> Result<Vec<u64>, Error> {
-    Ok(images_of(dataset)?.into_keys().collect())
 }
 
 /// Of every recorded frame, by index, the slide and where its image lies.

@@ -202,7 +202,6 @@ fn documents(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Er
     out(b"]}\n")
 }
 
-/// The tables with types in one.
 fn objects(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     let mut pieces = Pieces { out, failure: None };
     let written = write_objects(dataset, shards, &mut pieces);
@@ -214,8 +213,8 @@ fn write_objects(dataset: &Dataset, shards: &[u64], pieces: &mut Pieces) -> Resu
     for &shard in shards {
         let document = dataset.document(shard)?;
         for image in &document.images {
-            let truth = dataset.truth_in(&document, shard, image.index())?;
-            Row::all(&truth, image.index()).try_for_each(|row| table.row(&row))?;
+            let truth = dataset.truth_in(&document, shard, image.id)?;
+            Row::all(&truth, image.id).try_for_each(|row| table.row(&row))?;
         }
     }
     table.end()
@@ -255,7 +254,7 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
         let path = folder.path(&names::coco(shard));
         for frame in record.frames.iter().take(left) {
             let image = picture(dataset, frame, shard)?;
-            let masks = document.annotations.iter().filter(|a| a.image() == frame.index).map(Annotation::amodal);
+            let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(Annotation::amodal);
             let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
             sheet.add(&names::numbered(frame.index), &image, white(frame.bits), &masks);
         }
@@ -318,7 +317,7 @@ fn manifest(
         head_sha256: String::new(),
         files: Vec::new(),
     };
-    let (head, _) = head.sealed();
+    let head = json(&head.sealed());
     // The list is put into the head's braces by hand: it may be longer than memory.
     out(head.strip_suffix(b"}").unwrap_or(&head))?;
     out(b",\"files\":[")?;

@@ -20,7 +20,7 @@ pub use begin::DatasetInfo;
 pub use contents::{Finding, Mend};
 pub use convert::convert;
 pub use generate::{Outcome, Progress, Run, Share};
-pub use images::{FramePlace, field_files, frames_of, images_of, truth_differs};
+pub use images::{FramePlace, field_files, images_of, truth_differs};
 pub use inspect::{Defect, Overview, inspect, shards_to_make};
 pub use manifest::Manifest;
 pub use picture::{Picture, write_png};

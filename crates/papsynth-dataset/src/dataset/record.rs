@@ -15,7 +15,6 @@ use crate::formats::{Layout, names};
 use crate::read;
 use crate::truth::FrameSummary;
 
-/// Version of the layout of data sets.
 pub(crate) const FORMAT_VERSION: u32 = 2;
 
 /// What says that a folder is one of ours.
@@ -25,7 +24,6 @@ pub(crate) const FORMAT: &str = "papsynth-dataset";
 /// `stream_version`, but not always the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
 
-/// Largest record of a shard that is read back.
 const RECORD_BYTES: u64 = 1 << 28;
 
 /// Largest side of an image, as wide as a field may be.
@@ -111,7 +109,6 @@ impl ShardRecord {
         Ok(record)
     }
 
-    /// The bytes of its file.
     pub(crate) fn to_json(&self) -> Vec<u8> {
         bytes::json_lines(self)
     }
@@ -142,7 +139,6 @@ impl ShardRecord {
         Ok(())
     }
 
-    /// The record with its own hash.
     pub(crate) fn sealed(&self) -> Self {
         let open = Self { sha256: String::new(), ..self.clone() };
         Self { sha256: sha256(&bytes::json(&open)), ..open }
@@ -181,7 +177,6 @@ pub(crate) fn lies_inside(path: &str) -> bool {
     !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name)
 }
 
-/// Files must lie in the data set.
 pub(super) fn inside(files: &[FileRecord]) -> Result<(), Problem> {
     match files.iter().find(|file| !lies_inside(&file.path)) {
         Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),

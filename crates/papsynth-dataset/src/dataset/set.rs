@@ -29,7 +29,6 @@ pub struct Dataset {
     pub(crate) identity: Identity,
     pub(crate) layout: Layout,
     pub(crate) categories: Vec<Category>,
-    /// Name of the map that it keeps.
     pub(crate) map: Option<String>,
     /// Files whose SHA-256 has been compared with their record.
     pub(super) trusted: Arc<Mutex<BTreeSet<String>>>,
@@ -61,7 +60,6 @@ impl Dataset {
         Ok(Self::of(folder, manifest))
     }
 
-    /// The data set of a manifest.
     pub(super) fn of(folder: Folder, manifest: Manifest) -> Self {
         let is_map =
             |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
@@ -122,12 +120,10 @@ impl Dataset {
         Ok(shards)
     }
 
-    /// Names of the files that it is begun with.
     pub(super) fn given(&self) -> impl Iterator<Item = &str> {
         [names::MODEL, names::RECIPE].into_iter().chain(self.map.as_deref())
     }
 
-    /// The COCO document of a shard.
     pub(super) fn document(&self, shard: u64) -> Result<Document, Error> {
         let (folder, name) = (&self.folder, names::coco(shard));
         let path = folder.inside(&name)?;
@@ -136,7 +132,6 @@ impl Dataset {
         serde_json::from_slice(&bytes).map_err(|error| Error::input(&path)(error.into()))
     }
 
-    /// The truth of a frame in the document of its shard.
     pub(super) fn truth_in(&self, document: &Document, shard: u64, index: u64) -> Result<Truth, Error> {
         document.truth(index).map_err(Error::input(&self.folder.path(&names::coco(shard))))
     }

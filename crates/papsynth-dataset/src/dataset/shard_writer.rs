@@ -1,6 +1,7 @@
 //! One shard, frame by frame, plane by plane, in every format of the data set.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Mask, Truth};
@@ -12,7 +13,7 @@ use crate::error::Error;
 use crate::files::{Output, Pending};
 use crate::formats::parquet::Table;
 use crate::formats::{Field, Files, Sink, names};
-use crate::truth::{Document, FrameSummary, Image, Info, Row, table, typed_columns};
+use crate::truth::{Document, FrameSummary, Image, Info, Row, leaves, table, typed_columns};
 
 impl Dataset {
     /// Writes a shard, whose frames will follow one by one.
@@ -20,7 +21,15 @@ impl Dataset {
     /// # Errors
     /// If the system refuses.
     pub fn shard_writer(&self, shard: u64) -> Result<ShardWriter<'_>, Error> {
-        ShardWriter::new(self, shard)
+        let folder = &self.folder;
+        // From now on the shard is not whole, whatever it was before.
+        folder.inside(names::SHARDS)?;
+        folders_are_own(self, shard)?;
+        folder.remove(&names::record(shard))?;
+        let files = Files::new(folder, &self.layout, self.identity.seed, shard);
+        let sinks = self.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
+        let truth = TruthFiles::begin(self, shard)?;
+        Ok(ShardWriter { dataset: self, shard, files, sinks, truth, frame: None, done: Vec::new() })
     }
 }
 
@@ -36,17 +45,14 @@ pub struct ShardWriter<'a> {
     done: Vec<FrameSummary>,
 }
 
-/// A frame of which planes are still to come.
 struct Begun {
     frame: FrameSummary,
-    /// Masks of the planes' saturated pixels.
     saturated: Vec<Mask>,
     floored: Vec<usize>,
     /// Grey levels of a single plane.
     picture: Vec<u16>,
 }
 
-/// COCO document and table of a shard, as they grow.
 struct TruthFiles {
     coco: Output,
     table: Output,
@@ -56,19 +62,7 @@ struct TruthFiles {
     images: Vec<Image>,
 }
 
-impl<'a> ShardWriter<'a> {
-    fn new(dataset: &'a Dataset, shard: u64) -> Result<Self, Error> {
-        let folder = &dataset.folder;
-        // From now on the shard is not whole, whatever it was before.
-        folder.inside(names::SHARDS)?;
-        folders_are_own(dataset, shard)?;
-        folder.remove(&names::record(shard))?;
-        let files = Files::new(folder, &dataset.layout, dataset.identity.seed, shard);
-        let sinks = dataset.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
-        let truth = TruthFiles::begin(dataset, shard)?;
-        Ok(Self { dataset, shard, files, sinks, truth, frame: None, done: Vec::new() })
-    }
-
+impl ShardWriter<'_> {
     /// Begins the frame of a scene, whose planes will follow.
     ///
     /// # Errors
@@ -76,32 +70,22 @@ impl<'a> ShardWriter<'a> {
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
         let frame = FrameSummary::of_scene(scene);
         let (there, here) = (scene.key.seed, self.dataset.identity.seed);
-        if there != here {
-            return Err(frame.wrong(format!("the scene is of seed {there}, the data set of {here}")));
-        }
+        frame.due(there == here, format!("the scene is of seed {there}, the data set of {here}"))?;
         self.begin_with(frame)
     }
 
     /// The same of a frame of the data set's seed, whatever is counted in it.
     pub(crate) fn begin_with(&mut self, frame: FrameSummary) -> Result<(), Error> {
-        let index = frame.index;
-        let wrong = |message: String| Err(frame.wrong(message));
-        let frames = self.dataset.frames_of_shard(self.shard);
-        if !frames.contains(&index) || self.done.last().is_some_and(|last| last.index >= index) {
-            return wrong(format!(
-                "shard {} has the frames {} to {}, in this order",
-                self.shard,
-                frames.start,
-                frames.end - 1
-            ));
-        }
+        let Range { start, end } = self.dataset.frames_of_shard(self.shard);
+        let follows = self.done.last().is_none_or(|last| last.index < frame.index);
+        let room = format!("shard {} has the frames {start} to {}, in this order", self.shard, end - 1);
+        frame.due((start..end).contains(&frame.index) && follows, room)?;
         if let Some(begun) = &self.frame {
-            return wrong(format!("frame {} is not finished yet", begun.frame.index));
+            return Err(frame.wrong(format!("frame {} is not finished yet", begun.frame.index)));
         }
         let (pixels, planes) = (frame.width * frame.height, frame.planes_um.len());
-        if pixels == 0 || planes == 0 {
-            return wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"));
-        }
+        let few = format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted");
+        frame.due(pixels > 0 && planes > 0, few)?;
         for sink in &mut self.sinks {
             sink.begin(&frame, &self.files)?;
         }
@@ -134,10 +118,8 @@ impl<'a> ShardWriter<'a> {
     pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
         let Begun { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         let key = finished.scene.key;
-        if key.seed != self.dataset.identity.seed || !frame.is_of(&finished.scene) {
-            let other = key.index;
-            return Err(frame.wrong(format!("the truth handed over is that of another scene, of frame {other}")));
-        }
+        let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
+        frame.due(same, format!("the truth handed over is that of another scene, of frame {}", key.index))?;
         let sharp = if frame.is_stack() { finished.sharp() } else { Vec::new() };
         if self.dataset.layout.scenes {
             self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
@@ -155,7 +137,7 @@ impl<'a> ShardWriter<'a> {
         let frame = frame.counted(truth, &saturated, floored, layout.flatten);
         let files = self.dataset.images_of(&frame, self.shard);
         let document = Document::of_frame(truth, &frame, &saturated, categories, files)
-            .map_err(|error| frame.wrong(format!("the recipe knows no category `{}`", error.name)))?;
+            .map_err(|category| frame.wrong(format!("the recipe knows no category `{category}`")))?;
         let field = Field::new(identity.seed, &frame, truth, &document, &picture);
         for sink in &mut self.sinks {
             sink.field(&field, &mut self.files)?;
@@ -253,7 +235,10 @@ impl TruthFiles {
 
     fn end(mut self) -> Result<Vec<Pending>, Error> {
         self.coco.bytes(b"],\"images\":[")?;
-        self.coco.json_lines(self.images.iter().map(Ok))?;
+        for (number, image) in self.images.iter().enumerate() {
+            self.coco.bytes(if number == 0 { b"\n" } else { b",\n" })?;
+            self.coco.json(image)?;
+        }
         self.coco.bytes(b"]}\n")?;
         let mut ended = vec![self.coco.into_pending()?, self.table.into_pending()?];
         if let Some((pending, table)) = self.objects {
@@ -266,53 +251,35 @@ impl TruthFiles {
 
 impl Begun {
     fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
-        let (values, bits) = (self.frame.values(), self.frame.bits);
-        let (next, planes) = (self.saturated.len(), self.frame.planes_um.len());
-        if plane.index != next || next >= planes {
-            let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
-            return Err(self.frame.wrong(message));
-        }
-        self.check_size("grey levels", plane.grey.len(), values)?;
-        self.check_size("noise-free values", plane.noise_free.len(), values)?;
-        match plane.grey.iter().copied().max() {
-            Some(brightest) if brightest > white(bits) => {
-                Err(self.frame.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
-            }
-            _ => Ok(()),
-        }
+        let Self { frame, saturated, .. } = self;
+        let (next, planes) = (saturated.len(), frame.planes_um.len());
+        let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
+        frame.due(plane.index == next && next < planes, message)?;
+        self.check_size("grey levels", plane.grey.len())?;
+        self.check_size("noise-free values", plane.noise_free.len())?;
+        let (brightest, bits) = (plane.grey.iter().copied().max().unwrap_or_default(), frame.bits);
+        frame.due(brightest <= white(bits), format!("grey level {brightest} does not fit into {bits} bits"))
     }
 
     /// Everything must fit to the scene before a file is written.
     fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
-        let FrameSummary { width, height, .. } = self.frame;
-        let due = self.frame.planes_um.len();
-        let wrong = |message: String| Err(self.frame.wrong(message));
-        if self.saturated.len() != due {
-            return wrong(format!("{} of {due} planes were written", self.saturated.len()));
+        let Self { frame, saturated, .. } = self;
+        let (found, due) = (saturated.len(), frame.planes_um.len());
+        frame.due(found == due, format!("{found} of {due} planes were written"))?;
+        if frame.is_stack() {
+            self.check_size("all-in-focus values", sharp.len())?;
         }
-        if due > 1 {
-            self.check_size("all-in-focus values", sharp.len(), self.frame.values())?;
-        }
-        let [w, h] = [truth.width, truth.height];
-        if [w, h] != [width, height] {
-            return wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}"));
-        }
-        let outside = truth.objects.iter().find(|object| {
-            [&object.amodal, &object.front]
-                .iter()
-                .filter_map(|mask| mask.bounds())
-                .any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
-        });
-        outside.map_or(Ok(()), |object| wrong(format!("the mask of object {} leaves the image", object.id)))
+        let ([w, h], [width, height]) = ([truth.width, truth.height], [frame.width, frame.height]);
+        let other = format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}");
+        frame.due([w, h] == [width, height], other)?;
+        let outside = truth.objects.iter().find(|object| leaves(object, width, height));
+        outside.map_or(Ok(()), |o| Err(frame.wrong(format!("the mask of object {} leaves the image", o.id))))
     }
 
-    fn check_size(&self, what: &str, found: usize, values: usize) -> Result<(), Error> {
-        if found == values {
-            return Ok(());
-        }
-        let channels = self.frame.channels;
-        let pixels = values / channels;
+    fn check_size(&self, what: &str, found: usize) -> Result<(), Error> {
+        let FrameSummary { width, height, channels, .. } = self.frame;
         let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
-        Err(self.frame.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
+        let message = format!("{found} {what} for an image of {} pixels{each}", width * height);
+        self.frame.due(found == self.frame.values(), message)
     }
 }

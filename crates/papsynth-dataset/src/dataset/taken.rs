@@ -38,7 +38,6 @@ fn around(path: &Path) -> Option<PathBuf> {
     known.ancestors().skip(usize::from(is_itself)).find(|folder| is_ours(folder)).map(Path::to_owned)
 }
 
-/// Whether a folder holds a data set or a slide.
 fn is_ours(folder: &Path) -> bool {
     [[names::MANIFEST, FORMAT], SLIDE].iter().any(|[name, format]| {
         // The format stands at the beginning of what may be a long file.

@@ -203,7 +203,6 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>,
     Ok(flaws)
 }
 
-/// The map that a recipe names.
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
         recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),

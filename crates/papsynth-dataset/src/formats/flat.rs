@@ -14,7 +14,6 @@ use crate::error::Error;
 /// The groups that segmenters are trained for, each in a folder of its own.
 pub(super) const GROUPS: [Group; 2] = [Group::Cytoplasm, Group::Nucleus];
 
-/// The files of image and labels.
 pub(super) fn names(format: Format, group: Group, index: u64) -> [String; 2] {
     let group = group.name();
     match format {

@@ -6,8 +6,8 @@ use papsynth::truth::Group;
 use super::names;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
-use super::written::{LIMITS, Written, differs, is_described};
-use crate::error::Error;
+use super::written::{LIMITS, Written, is_described};
+use crate::error::{Error, Problem};
 use crate::read;
 use crate::truth::FrameSummary;
 use crate::write::{Page, Pages, Pixels, compressed};
@@ -32,13 +32,9 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     written.file(&names::noise_free(index), |bytes| {
         let due = frame.planes_um.len();
         let pages = read::float_pages(bytes, &LIMITS, due)?;
-        if pages.len() != due {
-            return differs(&format!("it has {} planes, the record says {due}", pages.len()));
-        }
-        match pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite())) {
-            true => Ok(()),
-            false => differs("it has not the finite values of the size that the record says"),
-        }
+        Problem::unless(pages.len() == due, format!("it has {} planes, the record says {due}", pages.len()))?;
+        let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
+        Problem::unless(fits, "it has not the finite values of the size that the record says")
     })?;
     for group in Group::ALL {
         let ids = truth.labels(group).ids;

@@ -7,7 +7,6 @@
 mod flat;
 mod folder;
 mod format;
-mod layout;
 pub(crate) mod names;
 mod ome;
 #[cfg(feature = "zarr")]
@@ -20,12 +19,11 @@ mod webdataset;
 mod written;
 mod yolo;
 
-pub use format::Format;
 #[cfg(feature = "zarr")]
 pub(crate) use format::HAS_PARQUET;
-pub use layout::Layout;
+pub use format::{Format, Layout};
 #[cfg(feature = "zarr")]
-pub(crate) use ome_zarr::read_planes;
+pub(crate) use ome_zarr::{channels, read_planes};
 pub(crate) use sink::{Field, Files, Sink};
 pub(crate) use webdataset::{Tar, TarFile, tar};
 pub(crate) use written::{LIMITS, Take, Written, levels};

@@ -65,7 +65,6 @@ pub(crate) fn record(shard: u64) -> String {
     format!("{SHARDS}/{shard:06}.json")
 }
 
-/// Where the scene of a frame lies.
 pub(crate) fn scene(index: u64) -> String {
     format!("scenes/{index:06}.json")
 }

@@ -35,7 +35,6 @@ pub(super) fn description(frame: &FrameSummary) -> String {
     image(frame, &numbered(frame.index), planes.len(), &step, &positions)
 }
 
-/// The description of a frame's picture alone.
 pub(super) fn of_picture(frame: &FrameSummary) -> String {
     image(frame, &numbered(frame.index), 1, "", "")
 }
@@ -92,7 +91,6 @@ fn document(frame: &FrameSummary, name: &str, attributes: &str, content: &str) -
     )
 }
 
-/// A page of a frame.
 pub(super) fn page<'a>(frame: &FrameSummary, text: Option<&'a str>) -> Page<'a> {
     Page { width: frame.width, channels: frame.channels, pixel_um: frame.pixel_um, text }
 }
@@ -118,7 +116,6 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// The picture of a frame.
 pub(super) fn picture_tiff(picture: &[u16], frame: &FrameSummary, text: Option<&str>) -> io::Result<Vec<u8>> {
     compressed(&[Levels::new(picture, frame).pixels()], &page(frame, text))
 }

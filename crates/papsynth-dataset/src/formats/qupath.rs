@@ -5,9 +5,9 @@ use serde_json::{Value, json};
 
 use super::ome::{of_picture, ome_picture};
 use super::sink::{Field, Files};
-use super::written::{Written, differs, is_described};
+use super::written::{Written, is_described};
 use crate::bytes;
-use crate::error::Error;
+use crate::error::{Error, Problem};
 use crate::truth;
 
 pub(super) fn image(index: u64) -> String {
@@ -18,7 +18,6 @@ fn objects(index: u64) -> String {
     format!("qupath/{index:06}.geojson")
 }
 
-/// The objects of a frame as GeoJSON.
 fn collection(field: &Field) -> Value {
     // What no pixel shows has no outline.
     let objects: Vec<&ObjectTruth> = field.truth.objects.iter().filter(|o| !o.amodal.is_empty()).collect();
@@ -41,10 +40,9 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
         written.picture(bytes)?;
         is_described(bytes, &of_picture(field.frame))
     })?;
-    written.file(&objects(field.frame.index), |bytes| match serde_json::from_slice::<Value>(bytes) {
-        Ok(found) if collection(field) == found => Ok(()),
-        Ok(_) => differs("its features are not those of the masks of coco.json"),
-        Err(error) => Err(error.into()),
+    written.file(&objects(field.frame.index), |bytes| {
+        let found: Value = serde_json::from_slice(bytes)?;
+        Problem::unless(found == collection(field), "its features are not those of the masks of coco.json")
     })
 }
 

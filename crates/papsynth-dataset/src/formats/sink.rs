@@ -6,7 +6,7 @@ use std::io;
 use papsynth::Plane;
 use papsynth::truth::Truth;
 
-use super::layout::Layout;
+use super::format::Layout;
 use crate::error::Error;
 use crate::files::{FileRecord, Folder};
 use crate::truth::{Document, FrameSummary, Split};
@@ -14,17 +14,14 @@ use crate::write;
 
 /// Writes the frames of a shard, one after the other.
 pub(crate) trait Sink {
-    /// A frame begins.
     fn begin(&mut self, _: &FrameSummary, _: &Files) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The next plane of the frame.
     fn plane(&mut self, _: &Plane, _: &FrameSummary, _: &Files) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The frame is complete.
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error>;
 
     /// No further frame follows: the files of the shard get their names.
@@ -49,7 +46,6 @@ pub(crate) struct Field<'a> {
     pub(crate) seed: u64,
     pub(crate) frame: &'a FrameSummary,
     pub(crate) truth: &'a Truth,
-    /// The truth as COCO.
     pub(crate) document: &'a Document,
     /// Grey levels of the image or, of a stack, with every object in focus.
     pub(crate) picture: &'a [u16],
@@ -67,7 +63,6 @@ impl<'a> Field<'a> {
         Self { seed, frame, truth, document, picture, png: OnceCell::new() }
     }
 
-    /// The split of its slide.
     pub(crate) fn split(&self) -> Split {
         Split::of_slide(self.seed, self.frame.slide)
     }
@@ -83,7 +78,6 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Files of a shard as they are written.
 #[derive(Debug)]
 pub(crate) struct Files<'a> {
     pub(crate) folder: &'a Folder,
@@ -104,13 +98,11 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Encodes and writes a file.
     pub(crate) fn encode(&mut self, name: &str, encoded: io::Result<Vec<u8>>) -> Result<(), Error> {
         let bytes = encoded.map_err(Error::io("encode", &self.folder.path(name)))?;
         self.write(name, &bytes)
     }
 
-    /// Writes the picture of a frame as PNG.
     pub(crate) fn png(&mut self, name: &str, field: &Field) -> Result<(), Error> {
         let bytes = field.png().map_err(Error::io("encode", &self.folder.path(name)))?;
         self.write(name, bytes)

@@ -15,7 +15,7 @@ use super::flat;
 use super::names::numbered;
 use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
-use super::written::{LIMITS, Written, differs, is_described};
+use super::written::{LIMITS, Written, is_described};
 use crate::bytes::json;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Handle, Pending};
@@ -78,7 +78,6 @@ pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
     format!("{}/{index:06}.all-in-focus.png", tar(shard))
 }
 
-/// What is known of a frame.
 fn head(field: &Field) -> Value {
     let split = serde_json::json!({
         "field": Split::of_field(field.seed, field.frame.index).name(),
@@ -87,7 +86,6 @@ fn head(field: &Field) -> Value {
     serde_json::json!({ "frame": field.frame, "split": split, "truth": field.document })
 }
 
-/// A tar file of a data set.
 pub(crate) struct TarFile {
     path: PathBuf,
     archive: tar::Archive<BufReader<File>>,
@@ -97,19 +95,17 @@ impl TarFile {
     pub(crate) fn open(folder: &Folder, name: &str) -> Result<Self, Error> {
         let path = folder.inside(name)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => Error::input(&path)(Problem::Missing { wanted: "file" }),
+            ErrorKind::NotFound => Error::input(&path)(Problem::Missing("file")),
             _ => Error::io("read", &path)(e),
         })?;
         Ok(Self { path, archive: tar::Archive::new(BufReader::new(file)) })
     }
 
-    /// Its files, one after the other.
     pub(crate) fn files(&mut self) -> Result<Tar<'_>, Error> {
         let entries = self.archive.entries().map_err(cannot_be_read(&self.path))?;
         Ok(Tar { path: &self.path, entries })
     }
 
-    /// The content of the file of this name.
     pub(crate) fn content(&mut self, name: &str) -> Result<Vec<u8>, Error> {
         let mut files = self.files()?;
         while let Some(entry) = files.entry()? {
@@ -121,13 +117,11 @@ impl TarFile {
     }
 }
 
-/// The files of a tar file, one after the other.
 pub(crate) struct Tar<'a> {
     path: &'a Path,
     entries: tar::Entries<'a, BufReader<File>>,
 }
 
-/// A file in a tar file.
 type Entry<'a> = tar::Entry<'a, BufReader<File>>;
 
 impl<'a> Tar<'a> {
@@ -141,19 +135,19 @@ impl<'a> Tar<'a> {
         Ok(bytes)
     }
 
-    /// Name and content of the next file.
     fn next(&mut self) -> Result<Option<(String, Vec<u8>)>, Error> {
         let Some(entry) = self.entry()? else { return Ok(None) };
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         Ok(Some((name, self.bytes(entry)?)))
     }
 
-    /// No further file follows.
     pub(crate) fn end(&mut self) -> Result<(), Error> {
         match self.next()? {
             None => Ok(()),
-            Some((name, _)) => differs(&format!("it has a file `{}` of no frame", name.escape_default()))
-                .map_err(Error::input(self.path)),
+            Some((name, _)) => {
+                let what = format!("it has a file `{}` of no frame", name.escape_default());
+                Err(Error::input(self.path)(Problem::unfit(what)))
+            }
         }
     }
 }
@@ -180,18 +174,18 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
             (_, Some(group)) if [".png", ".tif"].iter().any(|end| ending == format!("{part}{end}")) => {
                 written.labels(&bytes, &written.flat(group))
             }
-            ("json", _) if ending == part => match serde_json::from_slice::<Value>(&bytes) {
-                Ok(found) if found == head(field) => Ok(()),
-                Ok(_) => differs("it does not say what the record and coco.json say"),
-                Err(error) => Err(error.into()),
-            },
+            ("json", _) if ending == part => {
+                let found = serde_json::from_slice::<Value>(&bytes).map_err(Problem::from);
+                let same = found.map(|found| found == head(field));
+                same.and_then(|same| Problem::unless(same, "it does not say what the record and coco.json say"))
+            }
             ("ome.tif", _) if ending == part => {
                 written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.frame)))
             }
             (_, None) if ending == part => written.picture(&bytes),
             _ => {
                 let what = format!("it has `{}` where {key}.{part} is due", name.escape_default());
-                return differs(&what).map_err(Error::input(tar.path));
+                return Err(Error::input(tar.path)(Problem::unfit(what)));
             }
         };
         looked.map_err(Error::input(&path))?;

@@ -5,8 +5,8 @@
 use std::fmt::Write;
 
 use super::sink::{Field, Files};
-use super::written::{Written, differs};
-use crate::error::Error;
+use super::written::Written;
+use crate::error::{Error, Problem};
 use crate::truth::{Split, outlines};
 
 pub(super) fn image(split: Split, index: u64) -> String {
@@ -49,9 +49,8 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
     let split = field.split();
     written.file(&image(split, field.frame.index), |bytes| written.picture(bytes))?;
-    written.file(&labels(split, field.frame.index), |bytes| match bytes == text(field).as_bytes() {
-        true => Ok(()),
-        false => differs("its outlines are not those of the masks of coco.json"),
+    written.file(&labels(split, field.frame.index), |bytes| {
+        Problem::unless(bytes == text(field).as_bytes(), "its outlines are not those of the masks of coco.json")
     })
 }
 

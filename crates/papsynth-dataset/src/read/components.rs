@@ -109,7 +109,6 @@ fn collect(runs: &[(u32, Run)], forest: &mut Forest, width: usize, height: usize
         .collect()
 }
 
-/// Disjoint sets of runs.
 #[derive(Debug, Default)]
 struct Forest {
     parents: Vec<usize>,

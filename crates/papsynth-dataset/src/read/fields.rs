@@ -15,10 +15,8 @@ use papsynth::white_level as white;
 /// The table that says which group each image of a folder belongs to.
 const GROUPS: &str = "frames.csv";
 
-/// Its columns.
 const GROUP_COLUMNS: [&str; 2] = ["frame", "grade"];
 
-/// Largest table that is read.
 const TABLE_BYTES: u64 = 1 << 26;
 
 /// Bits that cameras fill 16-bit files with.
@@ -198,16 +196,13 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
 fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();
-    if 2 * outside > points.len() {
-        let (count, [width, height]) = (points.len(), image);
-        return Err(Problem::unfit(format!(
-            "{outside} of {count} points lie outside the image of {width} x {height} pixels; the columns wanted are y,x in pixels"
-        )));
-    }
-    Ok(())
+    let (count, [width, height]) = (points.len(), image);
+    let what = format!(
+        "{outside} of {count} points lie outside the image of {width} x {height} pixels; the columns wanted are y,x in pixels"
+    );
+    Problem::unless(2 * outside <= count, what)
 }
 
-/// The group of each image, by its name.
 fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     let mut rows = rows(bytes)?.into_iter();
     match rows.next() {
@@ -216,7 +211,6 @@ fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     }
 }
 
-/// Lines of two values.
 fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
     let mut reader =
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);

@@ -16,7 +16,6 @@ mod file;
 mod image;
 mod nucleus;
 mod outlines;
-mod png;
 mod raster;
 mod stack;
 mod tiff;

@@ -58,13 +58,8 @@ impl NucleusSample {
 /// A mask is as large as its image, whose width and number of pixels these are.
 pub(super) fn same_size(mask: &LabelMap, [width, pixels]: [usize; 2]) -> Result<(), Problem> {
     let (rows, due) = (mask.ids.len() / mask.width.max(1), pixels / width.max(1));
-    match [mask.width, rows] == [width, due] {
-        true => Ok(()),
-        false => {
-            let size = format!("the mask is {} x {rows}, its image {width} x {due}; both must be the same", mask.width);
-            Err(Problem::unfit(size))
-        }
-    }
+    let sizes = format!("the mask is {} x {rows}, its image {width} x {due}; both must be the same", mask.width);
+    Problem::unless([mask.width, rows] == [width, due], sizes)
 }
 
 /// Reads every nucleus of a folder that has the folders `images` and `masks`; see [`read_pairs`].
@@ -107,9 +102,7 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
 /// If there is none, or two differ only in their endings.
 pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::input(folder)(Problem::Missing { wanted: "folder" })
-        }
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(Problem::Missing("folder")),
         _ => Error::io("read", folder)(e),
     };
     let mut found = BTreeMap::new();

@@ -48,10 +48,8 @@ fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Pr
         let LabelMap { width, ids } = label_map(bytes, limits)?;
         WeightMap { width, weights: ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect() }
     };
-    match map.weights.iter().any(|&w| w > 0.0) {
-        true => Ok(map),
-        false => Err(Problem::unfit("every pixel is 0, so that no place is allowed; some must be above 0")),
-    }
+    let has_place = map.weights.iter().any(|&w| w > 0.0);
+    Problem::unless(has_place, "every pixel is 0, so that no place is allowed; some must be above 0").map(|()| map)
 }
 
 /// The name of a map in a data set: by the beginning of its SHA-256.

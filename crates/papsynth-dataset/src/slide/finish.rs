@@ -6,8 +6,8 @@ use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid, Sample, halved, halved_labels};
 use sha2::{Digest, Sha256};
 
-use super::document::{LAYERS, folder};
 use super::read::parts;
+use super::record::{LAYERS, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place};
 use crate::bytes::hex;
 use crate::error::Error;

@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid};
 
-use super::document::{LAYERS, folder};
-use super::record::HEAD;
+use super::record::{HEAD, LAYERS, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
 use crate::bytes::sha256;
 use crate::dataset::Finding;
@@ -105,7 +104,6 @@ impl SlideSet {
         self.all().map(record_name).chain([UPPER.to_owned()])
     }
 
-    /// The names of these files and of all records.
     fn names_of(&self, files: &[FileRecord]) -> BTreeSet<String> {
         files.iter().map(|file| file.path.clone()).chain(self.record_names()).collect()
     }

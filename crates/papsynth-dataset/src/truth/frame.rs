@@ -98,7 +98,6 @@ impl FrameSummary {
         view(self) == view(&Self::of_scene(scene))
     }
 
-    /// Whether it is a focus stack.
     pub(crate) fn is_stack(&self) -> bool {
         self.planes_um.len() > 1
     }
@@ -106,6 +105,11 @@ impl FrameSummary {
     /// Numbers of a plane: channels of pixels.
     pub(crate) fn values(&self) -> usize {
         self.width * self.height * self.channels
+    }
+
+    /// What was handed over must fit.
+    pub(crate) fn due(&self, fits: bool, message: String) -> Result<(), Error> {
+        if fits { Ok(()) } else { Err(self.wrong(message)) }
     }
 
     /// What does not fit of what was handed over.
@@ -139,7 +143,6 @@ pub(crate) fn categories(recipe: &Recipe) -> Vec<Category> {
         .collect()
 }
 
-/// The name of the category of a part of a class.
 pub(crate) fn category_name(class: &str, part: Part) -> String {
     match part {
         Part::Whole => class.to_owned(),

@@ -138,7 +138,6 @@ fn twice_area(ring: &Ring) -> i64 {
     ring.iter().zip(next).map(|(a, b)| i64::from(a[0]) * i64::from(b[1]) - i64::from(b[0]) * i64::from(a[1])).sum()
 }
 
-/// Whether a pixel lies inside a ring.
 fn contains(ring: &Ring, [x, y]: [u32; 2]) -> bool {
     let next = ring.iter().cycle().skip(1);
     let crossed =

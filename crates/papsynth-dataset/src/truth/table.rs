@@ -13,7 +13,6 @@ pub(crate) struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// The rows of an image.
     pub(crate) fn all(truth: &'a Truth, image: u64) -> impl Iterator<Item = Self> {
         truth.objects.iter().map(move |object| Self { image, size: [truth.width, truth.height], object })
     }
@@ -64,7 +63,6 @@ impl Head {
     }
 }
 
-/// What stands in one place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Cell {
     Nothing,
@@ -76,7 +74,6 @@ pub(crate) enum Cell {
     #[cfg(feature = "parquet")]
     Bytes(Vec<u8>),
     List(Vec<Cell>),
-    /// A value for each field.
     #[cfg(feature = "parquet")]
     Struct(Vec<Cell>),
 }
@@ -170,7 +167,6 @@ const MORE: [Named; 4] = [
     (Head::new("front_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.front, row.size[0], row.size[1]))),
 ];
 
-/// The columns of the table with types.
 pub(crate) fn typed_columns() -> Vec<Named> {
     [&COLUMNS[..], &MORE].concat()
 }
@@ -195,39 +191,17 @@ fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>)
 
 /// The columns of the table of a slide that are those of a frame's table, in their order; another, `rle`, follows.
 #[cfg(feature = "zarr")]
-const OF_SLIDE: [&str; 21] = [
-    "id",
-    "part",
-    "kind",
-    "class",
-    "bethesda",
-    "traits",
-    "cluster",
-    "centre_x_um",
-    "centre_y_um",
-    "depth_um",
-    "rotation_deg",
-    "stain",
-    "tint",
-    "area_um2",
-    "area_px",
-    "truncated",
-    "bbox_x_px",
-    "bbox_y_px",
-    "bbox_width_px",
-    "bbox_height_px",
-    "defocus_um",
-];
+const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,centre_y_um,depth_um,rotation_deg,stain,\
+    tint,area_um2,area_px,truncated,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um";
 
 /// The columns of the table of a part of a slide. A mask stands in its box alone: the run lengths are those of an image of the box's size.
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_columns() -> Vec<Named> {
     let mask: Named = (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode_in_box(&row.object.amodal)));
-    let known = OF_SLIDE.into_iter().filter_map(|wanted| COLUMNS.into_iter().find(|(head, _)| head.name == wanted));
+    let known = OF_SLIDE.split(',').filter_map(|wanted| COLUMNS.into_iter().find(|(head, _)| head.name == wanted));
     known.chain([mask]).collect()
 }
 
-/// The table of a part of a slide as CSV.
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_table(objects: &[ObjectTruth]) -> Vec<u8> {
     csv(true, &slide_columns(), Row::of_slide(objects))

@@ -13,12 +13,10 @@ use tiff::{TiffError, TiffResult};
 use crate::error::Error;
 use crate::files::{FileRecord, Pending};
 
-/// Where a TIFF file is written to.
 pub(crate) trait Out: Write + Seek {}
 
 impl<T: Write + Seek> Out for T {}
 
-/// A page apart from its pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Page<'a> {
     /// Columns.
@@ -31,7 +29,6 @@ pub(crate) struct Page<'a> {
     pub(crate) text: Option<&'a str>,
 }
 
-/// The pixels of a page.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Pixels<'a> {
     U8(&'a [u8]),
@@ -108,7 +105,6 @@ impl<'a> PageWriter<'a> {
         }
     }
 
-    /// Writes a page of one channel or of three.
     pub(crate) fn write(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
         let written = match self {
             Self::Classic(encoder) => plain_page(encoder, pixels, page),
@@ -172,7 +168,6 @@ pub(crate) fn label_pages<I: AsRef<[u32]>>(pages: &[I], page: &Page) -> io::Resu
     compressed(&pages, page)
 }
 
-/// Whether no label needs more than 16 bits.
 pub(crate) fn fits_16_bits(ids: &[u32]) -> bool {
     ids.iter().all(|&id| id <= u16::MAX.into())
 }
@@ -283,23 +278,16 @@ const TILE: usize = 512;
 /// From this side on an image is written as a pyramid.
 const LARGE: usize = 2048;
 
-/// Whether an image is written as a pyramid.
 pub(crate) fn is_large(width: usize, height: usize) -> bool {
     width.max(height) >= LARGE
 }
 
 /// Grey levels of 8 or of 16 bits.
-trait Level: Copy + Default + Into<u32> + TryFrom<u32> {
-    const BITS: u16;
-}
+trait Level: Copy + Default + Into<u32> + TryFrom<u32> {}
 
-impl Level for u8 {
-    const BITS: u16 = 8;
-}
+impl Level for u8 {}
 
-impl Level for u16 {
-    const BITS: u16 = 16;
-}
+impl Level for u16 {}
 
 /// An image whose channels lie side by side.
 struct Image<'a, T> {
@@ -397,7 +385,7 @@ where
     }
     directory.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;
     directory.write_tag(Tag::ImageLength, u32::try_from(height)?)?;
-    directory.write_tag(Tag::BitsPerSample, vec![T::BITS; channels].as_slice())?;
+    directory.write_tag(Tag::BitsPerSample, vec![u16::try_from(8 * size_of::<T>())?; channels].as_slice())?;
     directory.write_tag(Tag::Compression, 1_u16)?;
     directory.write_tag(Tag::PhotometricInterpretation, photometric(channels))?;
     directory.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;

@@ -12,7 +12,6 @@ use crate::truth::{Named, Row};
 pub(crate) use frames::{card, images, sink};
 use writer::{Writer, failed};
 
-/// Writes a table of objects row by row.
 pub(crate) struct Table<'a> {
     path: PathBuf,
     columns: Vec<Named>,

@@ -38,7 +38,6 @@ fn leaves_of(columns: &[Head]) -> impl Iterator<Item = Kind> {
     columns.iter().flat_map(|column| leaves(column.kind))
 }
 
-/// A column as a file has it.
 fn in_file(column: &Head) -> Result<TypePtr, ParquetError> {
     node(column.name, column.kind, if column.nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED })
 }
@@ -170,7 +169,6 @@ fn shred(kind: Kind, nullable: bool, value: Cell, at: Level, leaves: &mut [Leaf]
     }
 }
 
-/// The same of a value for each column.
 fn shred_all(columns: &[Head], values: Vec<Cell>, at: Level, mut leaves: &mut [Leaf]) -> usize {
     let mut bytes = 0;
     for (column, value) in columns.iter().zip(values) {
@@ -225,14 +223,12 @@ impl<'a> Writer<'a> {
         Ok(Self { file, columns, leaves, rows: 0, bytes: 0 })
     }
 
-    /// Adds a row, of a value for each column.
     pub(super) fn row(&mut self, row: Vec<Cell>) -> Result<(), ParquetError> {
         self.bytes += shred_all(&self.columns, row, Level::default(), &mut self.leaves);
         self.rows += 1;
         if self.rows >= GROUP_ROWS || self.bytes >= GROUP_BYTES { self.flush() } else { Ok(()) }
     }
 
-    /// Writes the rows that are left, and the footer.
     pub(super) fn finish(mut self) -> Result<(), ParquetError> {
         self.flush()?;
         Ok(self.file.into_inner()?.flush()?)
@@ -254,12 +250,10 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The leaves of a table without rows.
 fn empty(columns: &[Head]) -> Vec<Leaf> {
     leaves_of(columns).map(Leaf::new).collect()
 }
 
-/// What an error of the library says of a file.
 pub(super) fn failed(action: &'static str, path: &Path) -> impl Fn(ParquetError) -> Error {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
