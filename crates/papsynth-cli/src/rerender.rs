@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Dataset, Layout, Outcome, Progress, frames_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, Progress, images_of, truth_differs};
 use toml::Table;
 
 use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
@@ -17,7 +17,7 @@ const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", 
 
 pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let source = Dataset::open(&args.dir)?;
-    let frames = frames_of(&source)?;
+    let frames: Vec<u64> = images_of(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     let path = source.path().join("recipe.toml");

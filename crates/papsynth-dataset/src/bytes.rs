@@ -1,7 +1,7 @@
 //! Bytes of values, and SHA-256.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -25,20 +25,10 @@ pub(crate) fn json_lines(value: &impl Serialize) -> Vec<u8> {
 /// Size and SHA-256 of the rest of a file.
 pub(crate) fn measure(file: &mut File) -> io::Result<(u64, String)> {
     let mut hash = Sha256::new();
-    let mut block = vec![0; HASH_BLOCK];
-    let mut bytes = 0;
-    loop {
-        match file.read(&mut block)? {
-            0 => return Ok((bytes, hex(&hash.finalize()))),
-            read => {
-                hash.update(&block[..read]);
-                bytes += read as u64;
-            }
-        }
-    }
+    let bytes = io::copy(&mut BufReader::with_capacity(HASH_BLOCK, file), &mut hash)?;
+    Ok((bytes, hex(&hash.finalize())))
 }
 
-/// SHA-256 as hexadecimal digits.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::dataset::{Manifest, nested, read_record, recorded_shards};
+use crate::dataset::{Manifest, nested_below, read_record, recorded_shards};
 use crate::error::Error;
 use crate::files::{Folder, Home, is_temporary};
 use crate::formats::names;
@@ -44,7 +44,7 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
     let mut found = folder.names()?;
     // A temporary file that is still there is somebody's work.
     found.retain(|name| !own.contains(name) && !is_temporary(name.rsplit('/').next().unwrap_or(name)));
-    if let Some(inner) = nested::below(folder, &found) {
+    if let Some(inner) = nested_below(folder, &found) {
         let message = format!("{} lies within and has files of its own; move it elsewhere first", inner.display());
         return Err(Error::folder(folder.root(), message));
     }
@@ -61,7 +61,6 @@ fn clean_in(folder: &Folder, strays: bool) -> Result<Cleaned, Error> {
     Ok(cleaned)
 }
 
-/// What a folder belongs to.
 enum Owner {
     Dataset(Manifest),
     #[cfg(feature = "zarr")]

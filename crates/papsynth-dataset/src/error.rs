@@ -80,12 +80,9 @@ impl Error {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// The file is not there.
-    #[error("there is no such {wanted}")]
-    Missing {
-        /// "file" or "folder".
-        wanted: &'static str,
-    },
+    /// There is no such "file" or "folder".
+    #[error("there is no such {0}")]
+    Missing(&'static str),
     /// There is a folder of that name.
     #[error("is a folder; a file is expected")]
     Folder,
@@ -95,12 +92,9 @@ pub enum Problem {
     /// The file is of another format.
     #[error("is neither a PNG nor a TIFF file")]
     Format,
-    /// The file ends before its image does.
-    #[error("the {format} file is truncated: it ends before its image does")]
-    Truncated {
-        /// "PNG" or "TIFF".
-        format: &'static str,
-    },
+    /// The "PNG" or "TIFF" file ends before its image does.
+    #[error("the {0} file is truncated: it ends before its image does")]
+    Truncated(&'static str),
     /// The file does not follow its format.
     #[error("the {format} file cannot be decoded: {message}")]
     Broken {
@@ -149,89 +143,10 @@ pub enum Problem {
         /// The types that can be read.
         accepted: &'static str,
     },
-    /// A TIFF file holds several images.
-    #[error("holds several images; accepted is one image a file")]
-    Pages,
-    /// A plane of a stack is of another size than the first.
-    #[error("plane {plane} is {} x {}, the first {} x {}; all must be the same", found[0], found[1], first[0], first[1])]
-    PlaneSize {
-        /// Which, counted from 0 over all files.
-        plane: usize,
-        /// Its columns and rows.
-        found: [usize; 2],
-        /// Columns and rows of the first.
-        first: [usize; 2],
-    },
-    /// A stack of too many pixels.
-    #[error("the stack has more than {limit} pixels up to this file; crop it, or take fewer planes")]
-    StackSize {
-        /// The limit.
-        limit: u64,
-    },
-    /// A mask is of another size than its image.
-    #[error("the mask is {} x {}, its image {} x {}; both must be the same", mask[0], mask[1], image[0], image[1])]
-    MaskSize {
-        /// Columns and rows of the mask.
-        mask: [usize; 2],
-        /// Columns and rows of the image.
-        image: [usize; 2],
-    },
-    /// Most points of a table lie outside its image.
-    #[error("{outside} of {count} points lie outside the image of {} x {} pixels; the columns wanted are y,x in pixels", image[0], image[1])]
-    PointsOutside {
-        /// How many lie outside.
-        outside: usize,
-        /// How many there are.
-        count: usize,
-        /// Columns and rows of the image.
-        image: [usize; 2],
-    },
-    /// No pixel of a mask is set.
-    #[error("the mask is empty: no pixel of it is above 0")]
-    EmptyMask,
-    /// A mask falls apart.
-    #[error("the mask falls into {count} separate components; a nucleus must be one")]
-    Components {
-        /// How many.
-        count: usize,
-    },
-    /// A nucleus of a single pixel.
-    #[error("the mask is a single pixel, at ({x}, {y}); a nucleus must have more")]
-    SinglePixel {
-        /// Column.
-        x: u32,
-        /// Row.
-        y: u32,
-    },
-    /// Too many regions for a label image.
-    #[error("has more than {limit} separate regions; is it a grey image rather than a mask or label image?")]
-    Regions {
-        /// The limit.
-        limit: usize,
-    },
-    /// A weight map that allows no place.
-    #[error("every pixel is 0, so that no place is allowed; some must be above 0")]
-    NoWeight,
-    /// A file without its counterpart.
-    #[error("has no {wanted} of the same name in {folder}")]
-    Unpaired {
-        /// "image" or "mask".
-        wanted: &'static str,
-        /// Where it was looked for.
-        folder: String,
-    },
-    /// Two files of one name.
-    #[error("has the same name as {other}, apart from its ending")]
-    Ambiguous {
-        /// The other.
-        other: String,
-    },
-    /// A file says something else than others of its data set.
-    #[error("{what}")]
-    Differs {
-        /// What it says, and what the others say.
-        what: String,
-    },
+    /// What is in the file does not fit: an empty mask, a mask of another size than its image, a file of a data set that says
+    /// something else than the others. The text says what is wrong, and what would be accepted.
+    #[error("{0}")]
+    Unfit(String),
     /// A folder without anything to read.
     #[error("holds no PNG or TIFF file")]
     NoImages,
@@ -250,8 +165,17 @@ impl Problem {
         Self::Broken { format, message: message.to_string() }
     }
 
-    pub(crate) fn differs(what: impl Into<String>) -> Self {
-        Self::Differs { what: what.into() }
+    pub(crate) fn unfit(what: impl Into<String>) -> Self {
+        Self::Unfit(what.into())
+    }
+
+    /// What does not fit, unless it `fits`.
+    pub(crate) fn unless(fits: bool, what: impl Into<String>) -> Result<(), Self> {
+        if fits { Ok(()) } else { Err(Self::unfit(what)) }
+    }
+
+    pub(crate) fn samples(found: impl Into<String>, accepted: &'static str) -> Self {
+        Self::Samples { found: found.into(), accepted }
     }
 }
 

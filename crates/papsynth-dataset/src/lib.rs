@@ -20,8 +20,8 @@ mod write;
 pub use clean::{Cleaned, clean};
 pub use dataset::{
     Dataset, DatasetInfo, Defect, Finding, FramePlace, Identity, Manifest, Mend, Outcome, Overview, Picture, Progress,
-    Run, ShardRecord, ShardWriter, Share, Summary, Verdict, convert, field_files, frames_of, images_of, inspect,
-    shards_to_make, truth_differs, verify, write_png,
+    Run, ShardRecord, ShardWriter, Share, Summary, Verdict, convert, field_files, images_of, inspect, shards_to_make,
+    truth_differs, verify, write_png,
 };
 pub use error::{Error, Problem};
 #[cfg(feature = "cloud")]

@@ -1,19 +1,17 @@
 //! Data sets begun and resumed.
 
-use std::fs;
-use std::io;
 use std::sync::Arc;
 
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
 
-use super::listing::{begin_manifest, write_manifest};
 use super::manifest::Manifest;
-use super::record::Identity;
-use super::set::{Dataset, read_record, recorded_shards};
-use super::{difference, nested};
+use super::merge::{begin_manifest, write_manifest};
+use super::record::{Identity, read_record, recorded_shards};
+use super::set::Dataset;
+use super::taken::{recipe_difference, refuse_nested, stranger};
 use crate::error::Error;
-use crate::files::{Folder, Home, is_temporary};
+use crate::files::{Folder, Home};
 use crate::formats::{Layout, names};
 use crate::read::InputFile;
 use crate::truth::{Category, categories};
@@ -79,7 +77,7 @@ impl Dataset {
         let recipe = given.first().map(|(_, bytes)| String::from_utf8_lossy(bytes)).unwrap_or_default();
         let stranger = stranger(&self.folder)?;
         if stranger.is_none() {
-            nested::refuse(&self.folder)?;
+            refuse_nested(&self.folder)?;
         }
         match stranger {
             // Of several that begin at once one is the first.
@@ -135,7 +133,7 @@ impl Dataset {
         let difference = if there.stream_version != here.stream_version {
             Some(format!("is of stream version {}, this program writes {}", there.stream_version, here.stream_version))
         } else if there.recipe_sha256 != here.recipe_sha256 {
-            Some(format!("is of another recipe{}", difference::of_recipe(&self.folder, recipe)))
+            Some(format!("is of another recipe{}", recipe_difference(&self.folder, recipe)))
         } else if there.model_sha256 != here.model_sha256 {
             Some("is of another model".to_owned())
         } else if there.seed != here.seed {
@@ -151,29 +149,4 @@ impl Dataset {
             Err(Error::folder(self.path(), message))
         })
     }
-}
-
-/// Something in a folder, if it is there and not empty. What was never finished does not count.
-pub(crate) fn stranger(folder: &Folder) -> Result<Option<String>, Error> {
-    if folder.is_remote() {
-        return Ok(folder.names()?.into_iter().next());
-    }
-    let path = folder.root();
-    let entries = match fs::read_dir(path) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(e) if e.kind() == io::ErrorKind::NotADirectory => {
-            let is =
-                if path.exists() { "is a file; a folder is wanted" } else { "lies below a file; a folder is wanted" };
-            return Err(Error::folder(path, is));
-        }
-        Err(e) => return Err(Error::io("read", path)(e)),
-    };
-    for entry in entries {
-        let name = entry.map_err(Error::io("read", path))?.file_name().to_string_lossy().into_owned();
-        if !is_temporary(&name) {
-            return Ok(Some(name));
-        }
-    }
-    Ok(None)
 }

@@ -155,7 +155,6 @@ pub(super) fn croissant(dataset: &Dataset, files: &[FileRecord]) -> Value {
 
 const PARQUET: &str = "application/x-parquet";
 
-/// Names of the sets of tables.
 const TABLES: &str = "objects-csv";
 const PARQUET_TABLES: &str = "objects-parquet";
 

@@ -1,8 +1,9 @@
 //! Making frames: several side by side, skipping those that are whole.
 
+use std::iter::StepBy;
 use std::ops::Range;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
@@ -45,6 +46,16 @@ pub struct Share {
 impl Share {
     /// All shards.
     pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// Those of these numbers that are its own, in order: there may be more of them than fit into memory.
+    pub(crate) fn among(self, numbers: Range<u64>) -> StepBy<Range<u64>> {
+        let of = self.of.max(1);
+        // No number leaves more than it is divided by.
+        let end = if self.index < of { numbers.end } else { numbers.start };
+        // The first from the start on that leaves `index`.
+        let first = numbers.start.saturating_add((self.index % of + of - numbers.start % of) % of);
+        (first..end).step_by(usize::try_from(of).unwrap_or(usize::MAX))
+    }
 }
 
 /// A frame is done.
@@ -57,7 +68,7 @@ pub enum Progress<'a> {
 }
 
 /// What a run did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Frames that were whole already.
     pub kept: u64,
@@ -65,34 +76,6 @@ pub struct Outcome {
     pub made: u64,
     /// Whether it was stopped before its end.
     pub stopped: bool,
-}
-
-/// Shards with the same number of others between them: there may be more of them than numbers fit into memory.
-#[derive(Debug, Clone, Copy)]
-struct Shards {
-    first: u64,
-    step: u64,
-    count: u64,
-}
-
-impl Shards {
-    /// A share of these numbers.
-    fn of(numbers: Range<u64>, Share { index, of }: Share) -> Self {
-        let step = of.max(1);
-        // No number leaves more than it is divided by.
-        let end = if index < step { numbers.end } else { numbers.start };
-        // The first from the start on that leaves `index`.
-        let first = numbers.start.saturating_add((index % step + step - numbers.start % step) % step);
-        Self { first, step, count: end.saturating_sub(first).div_ceil(step) }
-    }
-
-    fn get(&self, place: u64) -> Option<u64> {
-        (place < self.count).then(|| self.first + place * self.step)
-    }
-
-    fn last(&self) -> Option<u64> {
-        self.get(self.count.checked_sub(1)?)
-    }
 }
 
 impl Dataset {
@@ -108,67 +91,57 @@ impl Dataset {
             let message = "the engine is of another recipe than the data set".to_owned();
             return Err(Error::folder(self.path(), message));
         }
-        let shards = self.shards_of(run)?;
-        let wanted = shards.last().map_or(0, |last| {
-            (shards.count - 1) * self.layout.frames_per_shard + range_len(&self.frames_of(last, run))
-        });
-        let (next, kept, made) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
-        let failure = Mutex::new(None);
-        let failed = AtomicBool::new(false);
+        if let Some(message) = self.layout.refusal_of(&run.frames) {
+            return Err(Error::folder(self.path(), message));
+        }
+        let each = self.layout.frames_per_shard;
+        let shards = run.share.among(run.frames.start / each..run.frames.end.div_ceil(each));
+        let workers = run.at_once.min(shards.size_hint().0);
+        let (shards, outcome) = (Mutex::new(shards), Mutex::new(Ok(Outcome::default())));
         let work = || {
-            while !run.stop.load(Ordering::Relaxed) && !failed.load(Ordering::Relaxed) {
-                let Some(shard) = shards.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
-                match self.make(engine, shard, run, report) {
-                    Ok(Made::Now(frames)) => made.fetch_add(frames, Ordering::Relaxed),
-                    Ok(Made::Before(frames)) => kept.fetch_add(frames, Ordering::Relaxed),
-                    Ok(Made::Stopped) => return,
-                    Err(error) => {
-                        failed.store(true, Ordering::Relaxed);
-                        failure.lock().unwrap_or_else(|e| e.into_inner()).get_or_insert(error);
-                        return;
+            loop {
+                let Some(shard) = locked(&shards).next() else { return };
+                if locked(&outcome).is_err() {
+                    return;
+                }
+                let stops = run.stop.load(Ordering::Relaxed);
+                let made = if stops { Ok(STOPPED) } else { self.make(engine, shard, run, report) };
+                let mut outcome = locked(&outcome);
+                match (&mut *outcome, made) {
+                    (Ok(sum), Ok(made)) => {
+                        let stopped = sum.stopped || made.stopped;
+                        *sum = Outcome { kept: sum.kept + made.kept, made: sum.made + made.made, stopped };
                     }
-                };
+                    (Ok(_), Err(error)) => *outcome = Err(error),
+                    (Err(_), _) => {}
+                }
             }
         };
-        let workers = run.at_once.min(usize::try_from(shards.count).unwrap_or(usize::MAX));
         if workers <= 1 {
             work();
         } else {
             std::thread::scope(|scope| (0..workers).for_each(|_| drop(scope.spawn(work))));
         }
-        if let Some(error) = failure.into_inner().unwrap_or_else(|e| e.into_inner()) {
-            return Err(error);
-        }
-        let (kept, made) = (kept.into_inner(), made.into_inner());
-        Ok(Outcome { kept, made, stopped: kept + made < wanted })
+        outcome.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The shards that a run makes.
-    fn shards_of(&self, run: &Run) -> Result<Shards, Error> {
-        let (frames, each) = (&run.frames, self.layout.frames_per_shard);
-        if let Some(message) = self.layout.refusal_of(frames) {
-            return Err(Error::folder(self.path(), message));
-        }
-        Ok(Shards::of(frames.start / each..frames.end.div_ceil(each), run.share))
-    }
-
-    /// The frames of a shard that a run makes.
     fn frames_of(&self, shard: u64, run: &Run) -> Range<u64> {
         let room = self.frames_of_shard(shard);
         room.start.max(run.frames.start)..room.end.min(run.frames.end)
     }
 
-    fn make(&self, engine: &Engine, shard: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Made, Error> {
+    fn make(&self, engine: &Engine, shard: u64, run: &Run, report: &dyn Fn(Progress)) -> Result<Outcome, Error> {
         let frames = self.frames_of(shard, run);
+        let count = frames.end.saturating_sub(frames.start);
         if self.whole(shard, run.check)?.is_some_and(|record| record.covers(&frames)) {
-            frames.clone().for_each(|index| report(Progress::Kept(index)));
-            return Ok(Made::Before(range_len(&frames)));
+            frames.for_each(|index| report(Progress::Kept(index)));
+            return Ok(Outcome { kept: count, ..Outcome::default() });
         }
         let mut writer = run.files(|| self.shard_writer(shard))?;
         for index in frames.clone() {
             // A shard may take minutes: it is given up, and made again from its beginning.
             if index > frames.start && run.stop.load(Ordering::Relaxed) {
-                return Ok(Made::Stopped);
+                return Ok(STOPPED);
             }
             let scene = engine.scene(Key { seed: self.identity.seed, index })?;
             run.files(|| writer.begin(&scene))?;
@@ -177,29 +150,24 @@ impl Dataset {
             report(Progress::Made(run.files(|| writer.end(&finished))?));
         }
         run.files(|| writer.commit())?;
-        Ok(Made::Now(range_len(&frames)))
+        Ok(Outcome { made: count, ..Outcome::default() })
     }
 }
 
-fn range_len(range: &Range<u64>) -> u64 {
-    range.end.saturating_sub(range.start)
+/// A shard that was given up, or not begun.
+const STOPPED: Outcome = Outcome { kept: 0, made: 0, stopped: true };
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Run<'_> {
-    /// Counts the time of some work to the files.
     fn files<T>(&self, work: impl FnOnce() -> T) -> T {
         match self.profile {
             Some(profile) => profile.time(Stage::Files, work),
             None => work(),
         }
     }
-}
-
-/// Frames of a shard.
-enum Made {
-    Before(u64),
-    Now(u64),
-    Stopped,
 }
 
 #[cfg(test)]
@@ -210,14 +178,11 @@ mod tests {
     fn a_share_is_what_leaves_its_number_when_divided() {
         for (start, end) in [(0, 0), (0, 1), (0, 17), (5, 17), (6, 6), (9, 4)] {
             for (index, of) in [(0, 1), (0, 4), (1, 4), (3, 4), (4, 4), (7, 4), (16, 40), (30, 40)] {
-                let shards = Shards::of(start..end, Share { index, of });
-                let found: Vec<u64> = (0..).map_while(|place| shards.get(place)).collect();
+                let found: Vec<u64> = Share { index, of }.among(start..end).collect();
                 let slow: Vec<u64> = (start..end).filter(|number| number % of == index).collect();
                 assert_eq!(found, slow, "{index}/{of} of {start}..{end}");
-                assert_eq!(shards.last(), slow.last().copied());
             }
         }
-        let all = Shards::of(0..u64::MAX, Share::ALL);
-        assert_eq!((all.get(7), all.last()), (Some(7), Some(u64::MAX - 1)));
+        assert_eq!(Share::ALL.among(0..u64::MAX).nth(7), Some(7));
     }
 }

@@ -1,17 +1,21 @@
-//! Frames of a data set read back: their images and their truth, whatever the format.
+//! Frames of a data set read back: their images and their truth, whatever the format; compared with those of another, and as fields to measure.
 
+use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::PoisonError;
 
-use papsynth::truth::Truth;
+use papsynth::truth::{Group, ObjectTruth, Truth};
+use papsynth::white_level as white;
 
-use super::set::{Dataset, read_record, recorded_shards};
+use super::record::{read_record, recorded_shards};
+use super::set::Dataset;
 use crate::error::{Error, Problem};
 use crate::files::Check;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
-use crate::read::{self, LevelImage};
-use crate::truth::FrameSummary;
 #[cfg(feature = "zarr")]
-use crate::{formats::read_planes, truth::Geometry};
+use crate::formats::read_planes;
+use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
+use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
+use crate::truth::FrameSummary;
 
 /// Where a recorded frame lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,12 +78,10 @@ impl Dataset {
         let format = self.with_planes().filter(|_| due > 1);
         let Some(format) = format else {
             let page = picture(self, frame, shard)?;
-            let whole = whole(page, frame);
-            take(0, whole.map_err(|problem| Error::Frame { index: frame.index, message: problem.to_string() })?);
+            take(0, whole(page, frame).map_err(|problem| frame.wrong(problem.to_string()))?);
             return Ok(());
         };
         let name = format.image(self.identity.seed, shard, frame);
-        let failed = |what: String| Error::input(&self.folder.path(&name))(Problem::differs(what));
         let mut number = 0;
         pages(self, &name, frame, shard, &mut |page| {
             if number < due {
@@ -88,7 +90,8 @@ impl Dataset {
             number += 1;
             Ok(())
         })?;
-        if number == due { Ok(()) } else { Err(failed(format!("has {number} planes; the record says {due}"))) }
+        let all = Problem::unless(number == due, format!("has {number} planes; the record says {due}"));
+        all.map_err(Error::input(&self.folder.path(&name)))
     }
 
     /// What is known of a frame.
@@ -131,7 +134,7 @@ pub(super) fn pages(
         return read.map_err(Error::input(&dataset.folder.path(name)));
     }
     #[cfg(feature = "zarr")]
-    return read_planes(&dataset.folder, &Geometry::of_summary(frame, dataset.identity.seed), take);
+    return read_planes(&dataset.folder, frame, take);
     #[cfg(not(feature = "zarr"))]
     {
         let _ = (frame, take);
@@ -165,7 +168,7 @@ fn is_as_recorded(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error
         None => Some("is in no record".to_owned()),
     };
     match flaw {
-        Some(flaw) => Err(Error::input(&dataset.folder.path(file))(Problem::differs(flaw))),
+        Some(flaw) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(flaw))),
         None => {
             trusted.insert(file.to_owned());
             Ok(())
@@ -178,10 +181,116 @@ fn whole(page: LevelImage, frame: &FrameSummary) -> Result<Vec<u16>, Problem> {
     let FrameSummary { width, height, channels, .. } = *frame;
     let found = [page.width, page.height(), page.channels];
     if found[..2] != [width, height] || found[2] > channels {
-        return Err(Problem::differs(format!(
+        return Err(Problem::unfit(format!(
             "an image is {} x {} of {} channels; the record says {width} x {height} of {channels}",
             found[0], found[1], found[2]
         )));
     }
     Ok(levels(page, channels))
+}
+
+/// Of every recorded frame, by index, the slide and where its image lies.
+///
+/// # Errors
+/// If a record cannot be read, or is missing of a shard that was merged.
+pub fn images_of(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Error> {
+    let mut images = BTreeMap::new();
+    for shard in dataset.shards()? {
+        for frame in read_record(&dataset.folder, shard)?.frames {
+            let (image, _) = dataset.images_of(&frame, shard);
+            images.insert(frame.index, (frame.slide, image));
+        }
+    }
+    Ok(images)
+}
+
+/// The first difference between what lies where in two data sets: objects, classes, places, complete and visible masks. Stain,
+/// defocus and detectability may differ.
+///
+/// # Errors
+/// If one is no data set, or its truth cannot be read.
+pub fn truth_differs(one: &Path, other: &Path) -> Result<Option<String>, Error> {
+    let (one, other) = (Dataset::open(one)?, Dataset::open(other)?);
+    let mut there = Vec::new();
+    for shard in recorded_shards(&other.folder)? {
+        there.extend(read_record(&other.folder, shard)?.frames.into_iter().map(|frame| (frame.index, shard)));
+    }
+    for shard in recorded_shards(&one.folder)? {
+        let here = one.document(shard)?;
+        for frame in read_record(&one.folder, shard)?.frames {
+            let index = frame.index;
+            let Ok(at) = there.binary_search_by_key(&index, |(index, _)| *index) else {
+                return Ok(Some(format!("frame {index} is missing")));
+            };
+            let a = one.truth_in(&here, shard, index)?;
+            let b = other.truth_in(&other.document(there[at].1)?, there[at].1, index)?;
+            if let Some(difference) = difference(&a, &b) {
+                return Ok(Some(format!("frame {index}: {difference}")));
+            }
+        }
+    }
+    Ok(None)
+}
+
+fn difference(one: &Truth, other: &Truth) -> Option<String> {
+    if one.objects.len() != other.objects.len() {
+        return Some(format!("{} objects and parts, not {}", other.objects.len(), one.objects.len()));
+    }
+    let what = |a: &ObjectTruth, b: &ObjectTruth| {
+        let claims = [
+            ("id", a.id == b.id && a.part == b.part && a.kind == b.kind),
+            ("class", a.class == b.class),
+            ("place", a.centre_um == b.centre_um && a.depth_um == b.depth_um && a.rotation_deg == b.rotation_deg),
+            ("complete mask", a.amodal == b.amodal),
+            ("visible mask", a.front == b.front),
+        ];
+        claims.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("object {} has another {what}", a.id))
+    };
+    one.objects.iter().zip(&other.objects).find_map(|(a, b)| what(a, b))
+}
+
+/// The fields in a folder, in the order of their names: a data set of ours with its masks of nuclei; or images (in the folder,
+/// or in `images`), with masks of the same names in `masks` (labels, or anything above 0), or for each image
+/// a table `NAME.csv` of `y,x` points beside it, and `frames.csv` that says which group each belongs to.
+///
+/// # Errors
+/// If there is no image, the folder cannot be read, or its tables make no sense.
+pub fn field_files(folder: &Path) -> Result<Vec<FieldFile>, Error> {
+    if folder.join(names::MANIFEST).exists() { of_dataset(folder) } else { files_in(folder) }
+}
+
+/// The frames of a data set, which must all be whole; of a stack, its image with everything in focus.
+fn of_dataset(path: &Path) -> Result<Vec<FieldFile>, Error> {
+    let dataset = Dataset::open(path)?;
+    let Dataset { folder, layout, .. } = &dataset;
+    if !layout.has(Format::Folder) {
+        let message =
+            format!("the data set lies in files as {layout}; images and labels are read from the format `folder`");
+        return Err(Error::folder(path, message));
+    }
+    let mut fields = Vec::new();
+    for shard in recorded_shards(folder)? {
+        let record = dataset.whole_or_flaw(shard, Check::Sizes)?.map_err(|flaw| {
+            let message =
+                format!("shard {shard} is not whole: {flaw}; `papsynth generate` with its recipe makes it again");
+            Error::folder(path, message)
+        })?;
+        for frame in record.frames {
+            let index = frame.index;
+            let image = if frame.is_stack() { names::all_in_focus(index) } else { names::image(&frame) };
+            fields.push(FieldFile {
+                name: names::numbered(index),
+                group: String::new(),
+                pixel_um: Some(frame.pixel_um),
+                slide: Some(frame.slide),
+                image: folder.inside(&image)?,
+                nuclei: NucleiFile::Labels(folder.inside(&names::labels(Group::Nucleus, index))?),
+                white: Some(white(frame.bits)),
+            });
+        }
+    }
+    match fields.is_empty() {
+        true => Err(Error::folder(path, "the data set has no whole frame")),
+        false => Ok(fields),
+    }
 }

@@ -7,7 +7,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::manifest::Manifest;
-use super::set::{Dataset, recorded_shards};
+use super::record::recorded_shards;
+use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{Check, Folder};
 

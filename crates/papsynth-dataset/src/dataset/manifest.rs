@@ -52,11 +52,11 @@ pub(super) struct ManifestFile {
 }
 
 impl ManifestFile {
-    /// The compact JSON of the head, with its SHA-256.
-    pub(super) fn sealed(mut self) -> (Vec<u8>, String) {
+    /// With the SHA-256 of the head.
+    pub(super) fn sealed(mut self) -> Self {
         self.head_sha256 = String::new();
         self.head_sha256 = sha256(&json(&self));
-        (json(&self), self.head_sha256)
+        self
     }
 }
 
@@ -85,7 +85,6 @@ fn of_no_shard<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<FileRec
     deserializer.deserialize_seq(Top)
 }
 
-/// A file as the manifest lists it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Entry {
@@ -106,7 +105,6 @@ impl Manifest {
         Self::from_reader(&mut &*bytes)
     }
 
-    /// The manifest in a folder.
     pub(crate) fn read(folder: &Folder) -> Result<Self, Error> {
         let path = folder.inside(names::MANIFEST)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
@@ -127,19 +125,12 @@ impl Manifest {
         version(file.version)?;
         inside(&file.files)?;
         file.layout.check()?;
-        let manifest = Self {
-            writer: file.writer.clone(),
-            identity: file.identity.clone(),
-            layout: file.layout.clone(),
-            frames: file.frames,
-            shards: file.shards,
-            categories: file.categories.clone(),
-            files: file.files.clone(),
-        };
         let said = file.head_sha256.clone();
-        match file.sealed() {
-            (_, sha256) if sha256 == said => Ok(manifest),
-            _ => Err(Problem::broken("JSON", "is not as it was written: the SHA-256 of its head is another")),
+        let ManifestFile { writer, identity, layout, frames, shards, categories, files, head_sha256, .. } =
+            file.sealed();
+        match head_sha256 == said {
+            true => Ok(Self { writer, identity, layout, categories, frames, shards, files }),
+            false => Err(Problem::broken("JSON", "is not as it was written: the SHA-256 of its head is another")),
         }
     }
 }

@@ -7,18 +7,21 @@ use sha2::{Digest, Sha256};
 
 use super::card::{card, croissant};
 use super::images::picture;
-use super::listing::{Sink, write_manifest};
+use super::manifest::{Entry, ManifestFile};
 use super::picture::ContactSheet;
-use super::record::WRITER;
-use super::set::{Dataset, SHARD_FILE_BYTES, Summary, read_record, recorded_shards};
+use super::record::{FORMAT, FORMAT_VERSION, WRITER, read_record, recorded_shards};
+use super::set::{Dataset, SHARD_FILE_BYTES, Summary};
 use crate::bytes::{hex, json, json_lines};
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder};
 use crate::formats::parquet::Table;
 use crate::formats::{Format, names};
 use crate::read;
-use crate::truth::{Annotation, Info, Split, typed_cells, typed_columns};
+use crate::truth::{Annotation, Info, Row, Split, typed_columns};
 use papsynth::white_level as white;
+
+/// Takes the content of a file piece by piece.
+pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
 
 /// Does with a file of this name and content what is to be done, and says how it is.
 type Keep<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
@@ -199,7 +202,6 @@ fn documents(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Er
     out(b"]}\n")
 }
 
-/// The tables with types in one.
 fn objects(dataset: &Dataset, shards: &[u64], out: &mut Sink) -> Result<(), Error> {
     let mut pieces = Pieces { out, failure: None };
     let written = write_objects(dataset, shards, &mut pieces);
@@ -211,9 +213,8 @@ fn write_objects(dataset: &Dataset, shards: &[u64], pieces: &mut Pieces) -> Resu
     for &shard in shards {
         let document = dataset.document(shard)?;
         for image in &document.images {
-            let truth = dataset.truth_in(&document, shard, image.index())?;
-            let mut objects = truth.objects.iter();
-            objects.try_for_each(|object| table.row(typed_cells(&truth, object, image.index())))?;
+            let truth = dataset.truth_in(&document, shard, image.id)?;
+            Row::all(&truth, image.id).try_for_each(|row| table.row(&row))?;
         }
     }
     table.end()
@@ -253,7 +254,7 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
         let path = folder.path(&names::coco(shard));
         for frame in record.frames.iter().take(left) {
             let image = picture(dataset, frame, shard)?;
-            let masks = document.annotations.iter().filter(|a| a.image() == frame.index).map(Annotation::amodal);
+            let masks = document.annotations.iter().filter(|a| a.image_id == frame.index).map(Annotation::amodal);
             let masks = masks.collect::<Result<Vec<_>, _>>().map_err(Error::input(&path))?;
             sheet.add(&names::numbered(frame.index), &image, white(frame.bits), &masks);
         }
@@ -261,6 +262,77 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
         left = left.saturating_sub(record.frames.len());
     }
     sheet.into_picture().to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
+}
+
+/// The head, then every file: those of no shard, then shard by shard, each record after the files it vouches for.
+pub(super) fn write_manifest(
+    dataset: &Dataset,
+    merged: &[FileRecord],
+    shards: &[u64],
+    frames: u64,
+) -> Result<FileRecord, Error> {
+    dataset
+        .folder
+        .write_if_new(names::MANIFEST, |out| manifest(dataset, WRITER, merged, shards, frames, &mut |b| out.bytes(b)))
+}
+
+/// The manifest of a data set without a frame, unless there is any manifest by now. Says whether it was written.
+pub(super) fn begin_manifest(dataset: &Dataset) -> Result<bool, Error> {
+    dataset
+        .folder
+        .write_unless_there(names::MANIFEST, |out| manifest(dataset, WRITER, &[], &[], 0, &mut |b| out.bytes(b)))
+}
+
+/// The SHA-256 of the manifest of all shards that are recorded.
+pub(super) fn manifest_sha256(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<String, Error> {
+    let shards = recorded_shards(&dataset.folder)?;
+    let frames = shards.iter().map(|&shard| Ok(read_record(&dataset.folder, shard)?.frames.len() as u64));
+    let frames = frames.sum::<Result<u64, Error>>()?;
+    let mut hash = Sha256::new();
+    manifest(dataset, writer, merged, &shards, frames, &mut |bytes| {
+        hash.update(bytes);
+        Ok(())
+    })?;
+    Ok(hex(&hash.finalize()))
+}
+
+fn manifest(
+    dataset: &Dataset,
+    writer: &str,
+    merged: &[FileRecord],
+    shards: &[u64],
+    frames: u64,
+    out: &mut Sink,
+) -> Result<(), Error> {
+    let folder = &dataset.folder;
+    let head = ManifestFile {
+        format: FORMAT.to_owned(),
+        version: FORMAT_VERSION,
+        writer: writer.to_owned(),
+        identity: dataset.identity.clone(),
+        layout: dataset.layout.clone(),
+        frames,
+        shards: shards.len() as u64,
+        categories: dataset.categories.clone(),
+        head_sha256: String::new(),
+        files: Vec::new(),
+    };
+    let head = json(&head.sealed());
+    // The list is put into the head's braces by hand: it may be longer than memory.
+    out(head.strip_suffix(b"}").unwrap_or(&head))?;
+    out(b",\"files\":[")?;
+    let mut first = true;
+    let mut list = |file: &FileRecord, shard: Option<u64>| {
+        out(if std::mem::take(&mut first) { b"\n" } else { b",\n" })?;
+        let FileRecord { path, bytes, sha256 } = file.clone();
+        out(&json(&Entry { path, bytes, sha256, shard }))
+    };
+    merged.iter().try_for_each(|file| list(file, None))?;
+    for &shard in shards {
+        read_record(folder, shard)?.files.iter().try_for_each(|file| list(file, Some(shard)))?;
+        list(&folder.record(&names::record(shard))?, Some(shard))?;
+    }
+    out(b"]}\n")
 }
 
 #[cfg(test)]
@@ -273,7 +345,7 @@ mod tests {
     use super::*;
     use crate::files::fault;
     use crate::formats::Layout;
-    use crate::support::{SEED, Scratch, contents, frame, recipe};
+    use crate::support::{SEED, frame, recipe};
 
     /// A data set of one stack, from nothing.
     fn make(path: &Path) -> Result<(), Error> {
@@ -293,32 +365,8 @@ mod tests {
 
     #[test]
     fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_set() {
-        let good = Scratch::new("faults-none");
-        make(good.path()).unwrap();
-        let expected = contents(good.path());
-        let mut failures = 0;
-        // Every call of the beginning, then a choice.
-        for passed in (0..40).chain((40..).step_by(7)) {
-            let scratch = Scratch::new("faults");
-            let kinds = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied, io::ErrorKind::Other];
-            fault::KIND.set(kinds[failures % 3]);
-            fault::LEFT.set(Some(passed));
-            let result = make(scratch.path());
-            fault::LEFT.set(None);
-            if result.is_ok() {
-                break;
-            }
-            failures += 1;
-            let error = result.unwrap_err();
-            assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
-            for (name, bytes) in contents(scratch.path()) {
-                // The manifest alone changes: it is written at the beginning and at the end.
-                let whole = expected.iter().any(|(n, b)| *n == name && (*b == bytes || name == "manifest.json"));
-                assert!(whole, "{name} after {passed} calls");
-            }
-            make(scratch.path()).unwrap();
-            assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
-        }
+        // The manifest is written at the beginning and at the end.
+        let failures = fault::everywhere("faults", 40, names::MANIFEST, make);
         assert!(failures > 50, "{failures}");
     }
 }

@@ -113,7 +113,6 @@ impl Picture {
     }
 }
 
-/// A rectangle of a picture.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     x: usize,

@@ -9,12 +9,12 @@ use papsynth::recipe::Recipe;
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{self, sha256};
-use crate::error::Problem;
-use crate::files::FileRecord;
-use crate::formats::Layout;
+use crate::error::{Error, Problem};
+use crate::files::{FileRecord, Folder};
+use crate::formats::{Layout, names};
+use crate::read;
 use crate::truth::FrameSummary;
 
-/// Version of the layout of data sets.
 pub(crate) const FORMAT_VERSION: u32 = 2;
 
 /// What says that a folder is one of ours.
@@ -23,6 +23,8 @@ pub(crate) const FORMAT: &str = "papsynth-dataset";
 /// The program that wrote a file: the same recipe gives the same pixels by every release with the same
 /// `stream_version`, but not always the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
+
+const RECORD_BYTES: u64 = 1 << 28;
 
 /// Largest side of an image, as wide as a field may be.
 const LARGEST_SIDE_PX: usize = 1 << 15;
@@ -107,7 +109,6 @@ impl ShardRecord {
         Ok(record)
     }
 
-    /// The bytes of its file.
     pub(crate) fn to_json(&self) -> Vec<u8> {
         bytes::json_lines(self)
     }
@@ -138,7 +139,6 @@ impl ShardRecord {
         Ok(())
     }
 
-    /// The record with its own hash.
     pub(crate) fn sealed(&self) -> Self {
         let open = Self { sha256: String::new(), ..self.clone() };
         Self { sha256: sha256(&bytes::json(&open)), ..open }
@@ -152,6 +152,24 @@ impl ShardRecord {
     }
 }
 
+/// The record of a shard; a missing one is an [`Problem::Missing`].
+pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
+    let path = folder.inside(&names::record(shard))?;
+    let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
+    if record.shard != shard {
+        return Err(Error::input(&path)(json(format!("is the record of shard {}", record.shard))));
+    }
+    Ok(record)
+}
+
+/// Numbers of all shards with a record, in order.
+pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
+    let names = folder.names_in(names::SHARDS)?;
+    let mut found: Vec<u64> = names.iter().filter_map(|name| names::number_of_record(name)).collect();
+    found.sort_unstable();
+    Ok(found)
+}
+
 /// Whether a path is relative and stays below where it starts.
 pub(crate) fn lies_inside(path: &str) -> bool {
     // A name as it stands is one part of a path: no `.`, `..`, drive or root, and nothing between two slashes.
@@ -159,7 +177,6 @@ pub(crate) fn lies_inside(path: &str) -> bool {
     !path.is_empty() && !path.contains(['\0', '\\']) && path.split('/').all(is_name)
 }
 
-/// Files must lie in the data set.
 pub(super) fn inside(files: &[FileRecord]) -> Result<(), Problem> {
     match files.iter().find(|file| !lies_inside(&file.path)) {
         Some(file) => Err(json(format!("the file `{}` lies outside the data set", file.path.escape_default()))),

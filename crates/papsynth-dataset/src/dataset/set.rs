@@ -9,15 +9,12 @@ use papsynth::truth::Truth;
 use serde::Serialize;
 
 use super::manifest::Manifest;
-use super::record::{Identity, ShardRecord};
-use crate::error::{Error, Problem};
+use super::record::{Identity, recorded_shards};
+use crate::error::Error;
 use crate::files::{FileRecord, Folder, Home};
 use crate::formats::{Layout, names};
 use crate::read;
 use crate::truth::{Category, Document, FrameSummary};
-
-/// Largest record of a shard that is read back.
-const RECORD_BYTES: u64 = 1 << 28;
 
 /// What was written for one shard is read whole.
 pub(super) const SHARD_FILE_BYTES: u64 = 1 << 32;
@@ -32,7 +29,6 @@ pub struct Dataset {
     pub(crate) identity: Identity,
     pub(crate) layout: Layout,
     pub(crate) categories: Vec<Category>,
-    /// Name of the map that it keeps.
     pub(crate) map: Option<String>,
     /// Files whose SHA-256 has been compared with their record.
     pub(super) trusted: Arc<Mutex<BTreeSet<String>>>,
@@ -64,7 +60,6 @@ impl Dataset {
         Ok(Self::of(folder, manifest))
     }
 
-    /// The data set of a manifest.
     pub(super) fn of(folder: Folder, manifest: Manifest) -> Self {
         let is_map =
             |file: &&FileRecord| !file.path.contains('/') && !names::OF_EVERY_SET.contains(&file.path.as_str());
@@ -125,12 +120,10 @@ impl Dataset {
         Ok(shards)
     }
 
-    /// Names of the files that it is begun with.
     pub(super) fn given(&self) -> impl Iterator<Item = &str> {
         [names::MODEL, names::RECIPE].into_iter().chain(self.map.as_deref())
     }
 
-    /// The COCO document of a shard.
     pub(super) fn document(&self, shard: u64) -> Result<Document, Error> {
         let (folder, name) = (&self.folder, names::coco(shard));
         let path = folder.inside(&name)?;
@@ -139,27 +132,7 @@ impl Dataset {
         serde_json::from_slice(&bytes).map_err(|error| Error::input(&path)(error.into()))
     }
 
-    /// The truth of a frame in the document of its shard.
     pub(super) fn truth_in(&self, document: &Document, shard: u64, index: u64) -> Result<Truth, Error> {
         document.truth(index).map_err(Error::input(&self.folder.path(&names::coco(shard))))
     }
-}
-
-/// The record of a shard; a missing one is an [`Problem::Missing`].
-pub(crate) fn read_record(folder: &Folder, shard: u64) -> Result<ShardRecord, Error> {
-    let path = folder.inside(&names::record(shard))?;
-    let record = ShardRecord::from_json(&read::bytes(&path, RECORD_BYTES)?).map_err(Error::input(&path))?;
-    if record.shard != shard {
-        let message = format!("is the record of shard {}", record.shard);
-        return Err(Error::input(&path)(Problem::broken("JSON", message)));
-    }
-    Ok(record)
-}
-
-/// Numbers of all shards with a record, in order.
-pub(crate) fn recorded_shards(folder: &Folder) -> Result<Vec<u64>, Error> {
-    let names = folder.names_in(names::SHARDS)?;
-    let mut found: Vec<u64> = names.iter().filter_map(|name| names::number_of_record(name)).collect();
-    found.sort_unstable();
-    Ok(found)
 }

@@ -1,18 +1,19 @@
 //! One shard, frame by frame, plane by plane, in every format of the data set.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use papsynth::scene::Scene;
 use papsynth::truth::{Mask, Truth};
 use papsynth::{Finished, Plane, white_level as white};
 
-use super::record::{FORMAT_VERSION, ShardRecord, WRITER};
-use super::set::{Dataset, read_record};
+use super::record::{FORMAT_VERSION, ShardRecord, WRITER, read_record};
+use super::set::Dataset;
 use crate::error::Error;
 use crate::files::{Output, Pending};
 use crate::formats::parquet::Table;
 use crate::formats::{Field, Files, Sink, names};
-use crate::truth::{Document, Form, FrameSummary, Geometry, Image, Info, table, typed_cells, typed_columns};
+use crate::truth::{Document, FrameSummary, Image, Info, Row, leaves, table, typed_columns};
 
 impl Dataset {
     /// Writes a shard, whose frames will follow one by one.
@@ -20,7 +21,15 @@ impl Dataset {
     /// # Errors
     /// If the system refuses.
     pub fn shard_writer(&self, shard: u64) -> Result<ShardWriter<'_>, Error> {
-        ShardWriter::new(self, shard)
+        let folder = &self.folder;
+        // From now on the shard is not whole, whatever it was before.
+        folder.inside(names::SHARDS)?;
+        folders_are_own(self, shard)?;
+        folder.remove(&names::record(shard))?;
+        let files = Files::new(folder, &self.layout, self.identity.seed, shard);
+        let sinks = self.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
+        let truth = TruthFiles::begin(self, shard)?;
+        Ok(ShardWriter { dataset: self, shard, files, sinks, truth, frame: None, done: Vec::new() })
     }
 }
 
@@ -36,17 +45,14 @@ pub struct ShardWriter<'a> {
     done: Vec<FrameSummary>,
 }
 
-/// A frame of which planes are still to come.
 struct Begun {
-    geometry: Geometry,
-    /// Masks of the planes' saturated pixels.
+    frame: FrameSummary,
     saturated: Vec<Mask>,
     floored: Vec<usize>,
     /// Grey levels of a single plane.
     picture: Vec<u16>,
 }
 
-/// COCO document and table of a shard, as they grow.
 struct TruthFiles {
     coco: Output,
     table: Output,
@@ -56,55 +62,34 @@ struct TruthFiles {
     images: Vec<Image>,
 }
 
-impl<'a> ShardWriter<'a> {
-    fn new(dataset: &'a Dataset, shard: u64) -> Result<Self, Error> {
-        let folder = &dataset.folder;
-        // From now on the shard is not whole, whatever it was before.
-        folder.inside(names::SHARDS)?;
-        folders_are_own(dataset, shard)?;
-        folder.remove(&names::record(shard))?;
-        let files = Files::new(folder, &dataset.layout, shard);
-        let sinks = dataset.layout.formats.iter().map(|format| format.sink(&files)).collect::<Result<_, _>>()?;
-        let truth = TruthFiles::begin(dataset, shard)?;
-        Ok(Self { dataset, shard, files, sinks, truth, frame: None, done: Vec::new() })
-    }
-
+impl ShardWriter<'_> {
     /// Begins the frame of a scene, whose planes will follow.
     ///
     /// # Errors
     /// If the scene is not one of this shard or not the next one, or the system refuses.
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
-        self.begin_with(Geometry::of(scene))
+        let frame = FrameSummary::of_scene(scene);
+        let (there, here) = (scene.key.seed, self.dataset.identity.seed);
+        frame.due(there == here, format!("the scene is of seed {there}, the data set of {here}"))?;
+        self.begin_with(frame)
     }
 
-    pub(crate) fn begin_with(&mut self, geometry: Geometry) -> Result<(), Error> {
-        let index = geometry.key.index;
-        let wrong = |message: String| Err(Error::Frame { index, message });
-        if geometry.key.seed != self.dataset.identity.seed {
-            let (there, here) = (geometry.key.seed, self.dataset.identity.seed);
-            return wrong(format!("the scene is of seed {there}, the data set of {here}"));
+    /// The same of a frame of the data set's seed, whatever is counted in it.
+    pub(crate) fn begin_with(&mut self, frame: FrameSummary) -> Result<(), Error> {
+        let Range { start, end } = self.dataset.frames_of_shard(self.shard);
+        let follows = self.done.last().is_none_or(|last| last.index < frame.index);
+        let room = format!("shard {} has the frames {start} to {}, in this order", self.shard, end - 1);
+        frame.due((start..end).contains(&frame.index) && follows, room)?;
+        if let Some(begun) = &self.frame {
+            return Err(frame.wrong(format!("frame {} is not finished yet", begun.frame.index)));
         }
-        let frames = self.dataset.frames_of_shard(self.shard);
-        if !frames.contains(&index) || self.done.last().is_some_and(|last| last.index >= index) {
-            return wrong(format!(
-                "shard {} has the frames {} to {}, in this order",
-                self.shard,
-                frames.start,
-                frames.end - 1
-            ));
-        }
-        if let Some(frame) = &self.frame {
-            return wrong(format!("frame {} is not finished yet", frame.geometry.key.index));
-        }
-        let (pixels, planes) = (geometry.pixels(), geometry.planes_um.len());
-        if pixels == 0 || planes == 0 {
-            return wrong(format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted"));
-        }
+        let (pixels, planes) = (frame.width * frame.height, frame.planes_um.len());
+        let few = format!("the scene has {pixels} pixels and {planes} planes; at least one of each is wanted");
+        frame.due(pixels > 0 && planes > 0, few)?;
         for sink in &mut self.sinks {
-            sink.begin(&geometry, &self.files)?;
+            sink.begin(&frame, &self.files)?;
         }
-        let (saturated, floored) = (Vec::with_capacity(planes), Vec::with_capacity(planes));
-        self.frame = Some(Begun { geometry, saturated, floored, picture: Vec::new() });
+        self.frame = Some(Begun { frame, saturated: Vec::new(), floored: Vec::new(), picture: Vec::new() });
         Ok(())
     }
 
@@ -113,16 +98,16 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If it is not the next one or of another size than the scene, or the system refuses.
     pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
-        let frame = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        frame.check_plane(plane)?;
+        let begun = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check_plane(plane)?;
         for sink in &mut self.sinks {
-            sink.plane(plane, &frame.geometry, &self.files)?;
+            sink.plane(plane, &begun.frame, &self.files)?;
         }
-        if Form::of(frame.geometry.planes_um.len()) == Form::Single {
-            frame.picture.clone_from(&plane.grey);
+        if !begun.frame.is_stack() {
+            begun.picture.clone_from(&plane.grey);
         }
-        frame.saturated.push(plane.saturated.clone());
-        frame.floored.push(plane.floored);
+        begun.saturated.push(plane.saturated.clone());
+        begun.floored.push(plane.floored);
         Ok(())
     }
 
@@ -131,41 +116,35 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If planes are missing, something is of another size than the scene, or the system refuses.
     pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
-        let frame = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        if Geometry::of(&finished.scene) != frame.geometry {
-            let other = finished.scene.key.index;
-            return Err(frame
-                .geometry
-                .wrong(format!("the truth handed over is that of another scene, of frame {other}")));
-        }
-        let sharp = match Form::of(frame.geometry.planes_um.len()) {
-            Form::Single => Vec::new(),
-            Form::Stack => finished.sharp(),
-        };
+        let Begun { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        let key = finished.scene.key;
+        let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
+        frame.due(same, format!("the truth handed over is that of another scene, of frame {}", key.index))?;
+        let sharp = if frame.is_stack() { finished.sharp() } else { Vec::new() };
         if self.dataset.layout.scenes {
-            let name = names::scene(finished.scene.key.index);
-            self.files.write(&name, finished.scene.to_json().as_bytes())?;
+            self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
         }
         self.end_with(&finished.truth, sharp)
     }
 
     /// The same with the grey levels of the picture of a stack with everything in focus.
     pub(crate) fn end_with(&mut self, truth: &Truth, sharp: Vec<u16>) -> Result<&FrameSummary, Error> {
-        let frame = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
-        frame.check(truth, &sharp)?;
-        let geometry = &frame.geometry;
-        let picture = if sharp.is_empty() { frame.picture } else { sharp };
-        let summary = FrameSummary::of(geometry, truth, &frame.saturated, frame.floored, self.dataset.layout.flatten);
-        let files = self.dataset.images_of(&summary, self.shard);
-        let document = Document::of_frame(truth, &summary, &frame.saturated, &self.dataset.categories, files)
-            .map_err(|error| geometry.wrong(format!("the recipe knows no category `{}`", error.name)))?;
-        let field = Field::new(geometry, &summary, truth, &document, &picture);
+        let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check(truth, &sharp)?;
+        let Begun { frame, saturated, floored, picture } = begun;
+        let picture = if sharp.is_empty() { picture } else { sharp };
+        let Dataset { identity, layout, categories, .. } = self.dataset;
+        let frame = frame.counted(truth, &saturated, floored, layout.flatten);
+        let files = self.dataset.images_of(&frame, self.shard);
+        let document = Document::of_frame(truth, &frame, &saturated, categories, files)
+            .map_err(|category| frame.wrong(format!("the recipe knows no category `{category}`")))?;
+        let field = Field::new(identity.seed, &frame, truth, &document, &picture);
         for sink in &mut self.sinks {
             sink.field(&field, &mut self.files)?;
         }
-        let rows = table(truth, geometry.key.index, self.done.is_empty());
-        self.truth.add(document, &rows, truth, geometry.key.index)?;
-        self.done.push(summary);
+        let rows = table(truth, frame.index, self.done.is_empty());
+        self.truth.add(document, &rows, truth, frame.index)?;
+        self.done.push(frame);
         Ok(&self.done[self.done.len() - 1])
     }
 
@@ -174,8 +153,8 @@ impl<'a> ShardWriter<'a> {
     /// # Errors
     /// If a frame was begun and not ended, or the system refuses.
     pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
-        if let Some(frame) = &self.frame {
-            return Err(frame.geometry.wrong("is not finished".to_owned()));
+        if let Some(begun) = &self.frame {
+            return Err(begun.frame.wrong("is not finished"));
         }
         let mut files = self.files;
         for sink in self.sinks {
@@ -249,14 +228,17 @@ impl TruthFiles {
         }
         self.images.extend(frame.images);
         if let Some((_, table)) = &mut self.objects {
-            truth.objects.iter().try_for_each(|object| table.row(typed_cells(truth, object, index)))?;
+            Row::all(truth, index).try_for_each(|row| table.row(&row))?;
         }
         self.table.bytes(rows)
     }
 
     fn end(mut self) -> Result<Vec<Pending>, Error> {
         self.coco.bytes(b"],\"images\":[")?;
-        self.coco.json_lines(self.images.iter().map(Ok))?;
+        for (number, image) in self.images.iter().enumerate() {
+            self.coco.bytes(if number == 0 { b"\n" } else { b",\n" })?;
+            self.coco.json(image)?;
+        }
         self.coco.bytes(b"]}\n")?;
         let mut ended = vec![self.coco.into_pending()?, self.table.into_pending()?];
         if let Some((pending, table)) = self.objects {
@@ -269,52 +251,35 @@ impl TruthFiles {
 
 impl Begun {
     fn check_plane(&self, plane: &Plane) -> Result<(), Error> {
-        let (values, bits) = (self.geometry.values(), self.geometry.bits);
-        let (next, planes) = (self.saturated.len(), self.geometry.planes_um.len());
-        if plane.index != next || next >= planes {
-            let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
-            return Err(self.geometry.wrong(message));
-        }
-        self.check_size("grey levels", plane.grey.len(), values)?;
-        self.check_size("noise-free values", plane.noise_free.len(), values)?;
-        match plane.grey.iter().copied().max() {
-            Some(brightest) if brightest > white(bits) => {
-                Err(self.geometry.wrong(format!("grey level {brightest} does not fit into {bits} bits")))
-            }
-            _ => Ok(()),
-        }
+        let Self { frame, saturated, .. } = self;
+        let (next, planes) = (saturated.len(), frame.planes_um.len());
+        let message = format!("plane {} came where plane {next} of {planes} was due", plane.index);
+        frame.due(plane.index == next && next < planes, message)?;
+        self.check_size("grey levels", plane.grey.len())?;
+        self.check_size("noise-free values", plane.noise_free.len())?;
+        let (brightest, bits) = (plane.grey.iter().copied().max().unwrap_or_default(), frame.bits);
+        frame.due(brightest <= white(bits), format!("grey level {brightest} does not fit into {bits} bits"))
     }
 
     /// Everything must fit to the scene before a file is written.
     fn check(&self, truth: &Truth, sharp: &[u16]) -> Result<(), Error> {
-        let (view, due) = (&self.geometry.view, self.geometry.planes_um.len());
-        let wrong = |message: String| Err(self.geometry.wrong(message));
-        if self.saturated.len() != due {
-            return wrong(format!("{} of {due} planes were written", self.saturated.len()));
+        let Self { frame, saturated, .. } = self;
+        let (found, due) = (saturated.len(), frame.planes_um.len());
+        frame.due(found == due, format!("{found} of {due} planes were written"))?;
+        if frame.is_stack() {
+            self.check_size("all-in-focus values", sharp.len())?;
         }
-        if due > 1 {
-            self.check_size("all-in-focus values", sharp.len(), self.geometry.values())?;
-        }
-        if [truth.width, truth.height] != [view.width, view.height] {
-            let ([w, h], [width, height]) = ([truth.width, truth.height], [view.width, view.height]);
-            return wrong(format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}"));
-        }
-        let outside = truth.objects.iter().find(|object| {
-            [&object.amodal, &object.front]
-                .iter()
-                .filter_map(|mask| mask.bounds())
-                .any(|b| (b.x + b.width) as usize > view.width || (b.y + b.height) as usize > view.height)
-        });
-        outside.map_or(Ok(()), |object| wrong(format!("the mask of object {} leaves the image", object.id)))
+        let ([w, h], [width, height]) = ([truth.width, truth.height], [frame.width, frame.height]);
+        let other = format!("the truth is that of {w} x {h} pixels, the image has {width} x {height}");
+        frame.due([w, h] == [width, height], other)?;
+        let outside = truth.objects.iter().find(|object| leaves(object, width, height));
+        outside.map_or(Ok(()), |o| Err(frame.wrong(format!("the mask of object {} leaves the image", o.id))))
     }
 
-    fn check_size(&self, what: &str, found: usize, values: usize) -> Result<(), Error> {
-        if found == values {
-            return Ok(());
-        }
-        let channels = self.geometry.channels;
-        let pixels = values / channels;
+    fn check_size(&self, what: &str, found: usize) -> Result<(), Error> {
+        let FrameSummary { width, height, channels, .. } = self.frame;
         let each = if channels == 1 { String::new() } else { format!(" with {channels} channels") };
-        Err(self.geometry.wrong(format!("{found} {what} for an image of {pixels} pixels{each}")))
+        let message = format!("{found} {what} for an image of {} pixels{each}", width * height);
+        self.frame.due(found == self.frame.values(), message)
     }
 }

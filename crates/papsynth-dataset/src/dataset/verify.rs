@@ -9,16 +9,15 @@ use papsynth::key::STREAM_VERSION;
 use papsynth::recipe::{self, Recipe};
 use serde::Serialize;
 
-use super::contents::Flaw;
-use super::listing::manifest_sha256;
+use super::contents::{Finding, Mend};
 use super::manifest::{Entry, Manifest};
-use super::merge;
-use super::record::WRITER;
-use super::set::{Dataset, read_record, recorded_shards};
+use super::merge::{self, manifest_sha256};
+use super::record::{WRITER, read_record, recorded_shards};
+use super::set::Dataset;
 use crate::bytes::sha256;
 use crate::error::Error;
-use crate::files::{Check, FileRecord, Folder, Home, is_temporary};
-use crate::formats::{huggingface, names};
+use crate::files::{Check, FileRecord, Folder, Home};
+use crate::formats::names;
 use crate::read;
 use crate::truth::categories;
 
@@ -39,29 +38,6 @@ pub struct Verdict {
     pub findings: Vec<Finding>,
 }
 
-/// One thing that is wrong.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Finding {
-    /// The file, relative to the data set.
-    pub path: String,
-    /// What is wrong with it.
-    pub message: String,
-    /// What mends it.
-    pub mend: Mend,
-}
-
-/// What mends a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mend {
-    /// `papsynth generate --verify`, of a slide `papsynth slide make --verify`, with the same recipe makes it again.
-    Generate,
-    /// `papsynth clean` takes it away.
-    Clean,
-    /// `papsynth merge`, when all shards are there.
-    Merge,
-}
-
 /// Reads every file of a data set, compares the files of each shard with each other, and makes again what is merged of them. With `expected`, every frame of that range must be there; without, every frame up to the last.
 ///
 /// # Errors
@@ -74,12 +50,11 @@ pub fn verify(home: impl Into<Home>, expected: Option<Range<u64>>) -> Result<Ver
 
 fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Result<Verdict, Error> {
     let mut findings = Vec::new();
-    let mut find = |path: String, message: String, mend| findings.push(Finding { path, message, mend });
     let dataset = match Dataset::open(&home) {
         Ok(dataset) => Dataset { folder: folder.clone(), ..dataset },
         // Where there is a manifest, there is a data set: its first finding is that the manifest is broken.
         Err(Error::Input { problem, path }) if path == folder.shown().join(names::MANIFEST) => {
-            find(names::MANIFEST.to_owned(), problem.to_string(), Mend::Generate);
+            let findings = vec![Finding::made_wrong(names::MANIFEST, problem.to_string())];
             return Ok(Verdict { root: None, frames: 0, files: 1, findings });
         }
         Err(error) => return Err(error),
@@ -110,7 +85,7 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
                     listed.extend(record.files.into_iter().map(|file| file.path));
                 }
                 is_damaged = true;
-                find(flaw.path, flaw.message, Mend::Generate);
+                findings.push(flaw);
             }
         }
     }
@@ -120,31 +95,26 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
             1 => format!("is missing with frame {}", gap.start),
             _ => format!("is missing with frame {}, as are all up to frame {}", gap.start, gap.end - 1),
         };
-        find(names::record(gap.start / dataset.layout.frames_per_shard), message, Mend::Generate);
+        findings.push(Finding::made_wrong(names::record(gap.start / dataset.layout.frames_per_shard), message));
     }
     for file in &merged {
         listed.insert(file.path.clone());
-        if let Some(message) = folder.flaw(file, Check::Hashes)? {
-            find(file.path.clone(), message, Mend::Generate);
-        }
+        let flaw = folder.flaw(file, Check::Hashes)?;
+        findings.extend(flaw.map(|message| Finding::made_wrong(&file.path, message)));
     }
     if merged.is_empty() {
         listed.extend(dataset.given().map(str::to_owned).chain(named_map(folder)));
     }
     let given = given_flaws(&dataset, &merged)?;
     let is_known = given.is_empty();
-    for Flaw { path, message } in given {
-        find(path, message, Mend::Generate);
-    }
+    findings.extend(given);
     // What is merged is made again and compared, and then the list of files, if all are there to make them from.
     let is_closed = closed >= recorded.len() as u64 && !merged.is_empty();
     if is_known && !is_damaged && is_closed {
         let found: BTreeSet<String> = findings.iter().map(|finding| finding.path.clone()).collect();
-        for Flaw { path, message } in merged_flaws(&dataset, &writer, &merged)? {
-            listed.insert(path.clone());
-            if !found.contains(&path) {
-                findings.push(Finding { path, message, mend: Mend::Generate });
-            }
+        for flaw in merged_flaws(&dataset, &writer, &merged)? {
+            listed.insert(flaw.path.clone());
+            findings.extend((!found.contains(&flaw.path)).then_some(flaw));
         }
     }
     if !is_closed {
@@ -155,19 +125,11 @@ fn verify_in(folder: &Folder, home: Home, expected: Option<Range<u64>>) -> Resul
         findings.push(Finding { path: names::MANIFEST.to_owned(), message, mend: Mend::Merge });
     }
     if findings.is_empty() && manifest_sha256(&dataset, &writer, &merged)? != manifest.sha256 {
-        let message = "does not name the files that are there".to_owned();
-        findings.push(Finding { path: names::MANIFEST.to_owned(), message, mend: Mend::Generate });
+        findings.push(Finding::made_wrong(names::MANIFEST, "does not name the files that are there"));
     }
     let files = listed.len() as u64;
-    for path in folder.names()? {
-        if !listed.contains(&path) {
-            let message = match is_temporary(path.rsplit('/').next().unwrap_or(&path)) {
-                true => "was left behind by a run that was killed",
-                false => "is no file of the data set",
-            };
-            findings.push(Finding { path, message: message.to_owned(), mend: Mend::Clean });
-        }
-    }
+    let there = folder.names()?;
+    findings.extend(there.iter().filter(|path| !listed.contains(*path)).map(|path| Finding::stray(path, "data set")));
     findings.sort();
     let root = findings.is_empty().then_some(manifest.sha256);
     Ok(Verdict { root, frames, files, findings })
@@ -191,11 +153,10 @@ fn names_of_lost(folder: &Folder, recorded: &[u64]) -> Result<Vec<String>, Error
 }
 
 /// What is wrong with the files that the data set was begun with, and with what the manifest says of them.
-fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Error> {
+fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
     let folder = &dataset.folder;
     let record = |name: &str| merged.iter().find(|file| file.path == name);
     let mut flaws = Vec::new();
-    let flaw = |path: &str, message: &str| Flaw { path: path.to_owned(), message: message.to_owned() };
     let identity = &dataset.identity;
     for (name, sha256) in [(names::RECIPE, &identity.recipe_sha256), (names::MODEL, &identity.model_sha256)] {
         // A data set that was only begun lists none; of one that is merged, none is left out.
@@ -204,7 +165,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
             false => record(name).is_some_and(|file| file.sha256 == *sha256),
         };
         if !is_it {
-            flaws.push(flaw(name, "is not what the manifest says the data set is made from"));
+            flaws.push(Finding::made_wrong(name, "is not what the manifest says the data set is made from"));
         }
     }
     if !flaws.is_empty() || merged.is_empty() || identity.stream_version != STREAM_VERSION {
@@ -219,28 +180,29 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Flaw>, Er
         Err(failure) => return Err(failure),
     };
     let Ok(recipe) = Recipe::from_toml(&String::from_utf8_lossy(&text)) else {
-        flaws.push(flaw(names::RECIPE, "is no recipe that this program reads"));
+        flaws.push(Finding::made_wrong(names::RECIPE, "is no recipe that this program reads"));
         return Ok(flaws);
     };
     if dataset.categories != categories(&recipe) {
-        flaws.push(flaw(names::MANIFEST, "names other categories than the recipe gives"));
+        flaws.push(Finding::made_wrong(names::MANIFEST, "names other categories than the recipe gives"));
     }
     let named = map_of(&recipe);
     match (named, &dataset.map) {
-        (Some(named), None) => flaws.push(flaw(named, "is missing from the list of files")),
-        (_, Some(kept)) if named != Some(kept) => flaws.push(flaw(kept, "follows neither from recipe nor from shards")),
+        (Some(named), None) => flaws.push(Finding::made_wrong(named, "is missing from the list of files")),
+        (_, Some(kept)) if named != Some(kept) => {
+            flaws.push(Finding::made_wrong(kept, "follows neither from recipe nor from shards"))
+        }
         // The name of a map begins with the hash of its content.
         (Some(named), Some(_))
             if record(named).is_some_and(|file| !named.contains(&format!("{:.16}", file.sha256))) =>
         {
-            flaws.push(flaw(named, "is another map than the recipe names"));
+            flaws.push(Finding::made_wrong(named, "is another map than the recipe names"));
         }
         _ => {}
     }
     Ok(flaws)
 }
 
-/// The map that a recipe names.
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
         recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
@@ -255,24 +217,24 @@ fn named_map(folder: &Folder) -> Option<String> {
 }
 
 /// Merged files that are not as the shards make them.
-fn merged_flaws(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Flaw>, Error> {
+fn merged_flaws(dataset: &Dataset, writer: &str, merged: &[FileRecord]) -> Result<Vec<Finding>, Error> {
     let given: Vec<&str> = dataset.given().collect();
     let given = merged.iter().filter(|file| given.contains(&file.path.as_str())).cloned().collect();
     let expected = merge::expected(dataset, writer, given)?;
     let mut flaws = Vec::new();
     for file in &expected {
         // The words of a card and the bytes of what is compressed are those of one program.
-        let of_program = [names::CARD, names::CROISSANT, names::SHEET, names::OBJECTS, huggingface::CARD];
+        let of_program = [names::CARD, names::CROISSANT, names::SHEET, names::OBJECTS, names::HUGGINGFACE_CARD];
         let is_ours = writer == WRITER || !of_program.contains(&file.path.as_str());
         let message = match merged.iter().find(|found| found.path == file.path) {
             Some(found) if found == file || !is_ours => continue,
             Some(_) => "is not what the shards make it",
             None => "is missing from the list of files",
         };
-        flaws.push(Flaw { path: file.path.clone(), message: message.to_owned() });
+        flaws.push(Finding::made_wrong(&file.path, message));
     }
     for file in merged.iter().filter(|file| expected.iter().all(|expected| expected.path != file.path)) {
-        flaws.push(Flaw { path: file.path.clone(), message: "follows neither from recipe nor from shards".to_owned() });
+        flaws.push(Finding::made_wrong(&file.path, "follows neither from recipe nor from shards"));
     }
     Ok(flaws)
 }

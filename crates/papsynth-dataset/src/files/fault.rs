@@ -36,3 +36,38 @@ pub(crate) fn point() -> std::io::Result<()> {
         }
     })
 }
+
+/// Makes something with `make` while the disk fails at one call after the other, every call of the beginning and then a choice: whatever happens,
+/// no file is partial but those that `may_change`, the error names the folder, and the next run completes it. Gives how often the disk failed.
+#[cfg(test)]
+pub(crate) fn everywhere<T: std::fmt::Debug>(
+    name: &str,
+    first: usize,
+    may_change: &str,
+    make: impl Fn(&std::path::Path) -> Result<T, crate::error::Error>,
+) -> usize {
+    use std::io::ErrorKind;
+
+    use crate::support::{Scratch, contents};
+
+    let good = Scratch::new(&format!("{name}-none"));
+    make(good.path()).unwrap();
+    let expected = contents(good.path());
+    let kinds = [ErrorKind::StorageFull, ErrorKind::PermissionDenied, ErrorKind::Other];
+    for (failures, passed) in (0..first).chain((first..).step_by(7)).enumerate() {
+        let scratch = Scratch::new(name);
+        KIND.set(kinds[failures % 3]);
+        LEFT.set(Some(passed));
+        let result = make(scratch.path());
+        LEFT.set(None);
+        let Err(error) = result else { return failures };
+        assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
+        for (name, bytes) in contents(scratch.path()) {
+            let whole = expected.iter().any(|(n, b)| *n == name && (*b == bytes || name == may_change));
+            assert!(whole, "{name} after {passed} calls");
+        }
+        make(scratch.path()).unwrap();
+        assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
+    }
+    unreachable!("a run has an end")
+}

@@ -7,11 +7,19 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::fault;
-use super::file_record::{Check, FileRecord};
-use super::pending::{Output, Pending, is_temporary};
+use super::pending::{FileRecord, Output, Pending, is_temporary};
 use super::store::{Home, Remote};
 use crate::bytes::{measure, sha256};
 use crate::error::{Error, Problem};
+
+/// How carefully files are looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Check {
+    /// They are there and of the right size.
+    Sizes,
+    /// Their SHA-256 is right, too; all are read.
+    Hashes,
+}
 
 /// Writes a file under a temporary name in the same folder, brings it to the disk, and renames it.
 ///
@@ -35,7 +43,6 @@ fn entries(path: &Path) -> Result<Vec<fs::DirEntry>, Error> {
     }
 }
 
-/// Whether there is no such file or folder.
 fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
@@ -82,12 +89,10 @@ impl Folder {
         }
     }
 
-    /// Whether it belongs to an object store.
     pub(crate) fn is_remote(&self) -> bool {
         self.remote.is_some()
     }
 
-    /// Whether there is a file.
     pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
         match &self.remote {
             Some(_) => Ok(self.size(name)?.is_some()),
@@ -95,7 +100,6 @@ impl Folder {
         }
     }
 
-    /// Size of a file in the store.
     fn size(&self, name: &str) -> Result<Option<u64>, Error> {
         match (&self.listing, &self.remote) {
             (Some(listing), _) => Ok(listing.get(name).copied()),
@@ -104,7 +108,6 @@ impl Folder {
         }
     }
 
-    /// Removes a file, if there is one.
     pub(crate) fn remove(&self, name: &str) -> Result<(), Error> {
         if let Some(remote) = &self.remote {
             remote.remove(name)?;
@@ -154,7 +157,6 @@ impl Folder {
         Ok(())
     }
 
-    /// Writes a whole file.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         self.pending(name)?.write_whole(bytes)
     }
@@ -203,7 +205,6 @@ impl Folder {
         Pending::open(self.path(name), name, self.remote.clone())
     }
 
-    /// What is wrong with a file, if anything is.
     pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
         let missing = || Ok(Some("is missing".to_owned()));
         if self.remote.is_some() {
@@ -232,7 +233,20 @@ impl Folder {
         })
     }
 
-    /// Size and hash of a file that is there.
+    /// The first of these files of which something is wrong, and what.
+    pub(crate) fn first_flaw<'f>(
+        &self,
+        files: &'f [FileRecord],
+        check: Check,
+    ) -> Result<Option<(&'f str, String)>, Error> {
+        for file in files {
+            if let Some(message) = self.flaw(file, check)? {
+                return Ok(Some((&file.path, message)));
+            }
+        }
+        Ok(None)
+    }
+
     pub(crate) fn record(&self, name: &str) -> Result<FileRecord, Error> {
         let path = self.inside(name)?;
         let measured = File::open(&path).and_then(|mut file| measure(&mut file));

@@ -3,16 +3,34 @@
 #[cfg(feature = "cloud")]
 mod cloud;
 pub(crate) mod fault;
-mod file_record;
 mod folder;
 mod pending;
-mod place;
 mod store;
 
 #[cfg(feature = "cloud")]
 pub use cloud::Bucket;
-pub use file_record::{Check, FileRecord};
 pub(crate) use folder::Folder;
-pub use folder::write_file;
+pub use folder::{Check, write_file};
+pub use pending::FileRecord;
 pub(crate) use pending::{Handle, Output, Pending, is_temporary};
 pub use store::{Home, Store};
+
+use std::path::Path;
+
+use crate::error::Error;
+
+impl Home {
+    /// The home of a data set at a path, or at an address such as `s3://bucket/prefix` in a build with the feature `cloud`.
+    ///
+    /// # Errors
+    /// If an address names no object store, this build lacks the feature `cloud`, or the folder for temporary files cannot be made.
+    pub fn at(path: &Path) -> Result<Self, Error> {
+        if !Self::is_address(path) {
+            return Ok(Self::from(path));
+        }
+        #[cfg(feature = "cloud")]
+        return Self::in_store(Bucket::open(&path.to_string_lossy())?);
+        #[cfg(not(feature = "cloud"))]
+        Err(Error::folder(path, "object stores need a build of papsynth with `--features cloud`"))
+    }
+}

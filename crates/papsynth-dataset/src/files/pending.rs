@@ -6,13 +6,24 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::fault;
-use super::file_record::FileRecord;
 use super::store::Remote;
 use crate::bytes::{json, measure, sha256};
 use crate::error::Error;
+
+/// A file of a data set.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileRecord {
+    /// Path relative to the data set, with `/` between folders.
+    pub path: String,
+    /// Size in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+}
 
 const TEMPORARY_ENDING: &str = ".tmp";
 
@@ -55,7 +66,6 @@ impl Pending {
         Ok(Self { file, temporary, path, name: name.to_owned(), committed: false, remote })
     }
 
-    /// The path that the file will have.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -105,7 +115,6 @@ impl Pending {
         Ok(FileRecord { path: self.name.clone(), bytes, sha256 })
     }
 
-    /// Gives a sealed file its name.
     pub(super) fn rename(&mut self) -> Result<(), Error> {
         let rename = || fault::point().and_then(|()| fs::rename(&self.temporary, &self.path));
         let renamed = rename().or_else(|error| match error.kind() {
@@ -128,7 +137,6 @@ impl Drop for Pending {
     }
 }
 
-/// A file that is written piece by piece.
 pub(crate) struct Output {
     writer: BufWriter<Handle>,
     pending: Pending,
@@ -147,26 +155,12 @@ impl Output {
         self.bytes(&json(value))
     }
 
-    /// The elements of a JSON array between its brackets, one a line.
-    pub(crate) fn json_lines<T: Serialize>(
-        &mut self,
-        items: impl IntoIterator<Item = Result<T, Error>>,
-    ) -> Result<(), Error> {
-        for (i, item) in items.into_iter().enumerate() {
-            self.bytes(if i == 0 { b"\n" } else { b",\n" })?;
-            self.json(&item?)?;
-        }
-        Ok(())
-    }
-
-    /// Everything is written.
     pub(crate) fn into_pending(mut self) -> Result<Pending, Error> {
         self.writer.flush().map_err(Error::io("write", &self.pending.path))?;
         Ok(self.pending)
     }
 }
 
-/// Writes to a pending file.
 #[derive(Debug)]
 pub(crate) struct Handle(File);
 

@@ -100,7 +100,6 @@ pub(crate) struct Remote {
 }
 
 impl Remote {
-    /// Where a file is, for messages.
     pub(crate) fn shown(&self, name: &str) -> PathBuf {
         PathBuf::from(format!("{}/{name}", self.url))
     }

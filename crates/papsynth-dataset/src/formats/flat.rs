@@ -6,16 +6,14 @@
 use papsynth::truth::Group;
 
 use super::format::Format;
-use super::ome::picture_tiff;
+use super::ome::{label_tiff, picture_tiff};
 use super::sink::{Field, Files};
 use super::written::Written;
 use crate::error::Error;
-use crate::write::label_tiff;
 
 /// The groups that segmenters are trained for, each in a folder of its own.
 pub(super) const GROUPS: [Group; 2] = [Group::Cytoplasm, Group::Nucleus];
 
-/// The files of image and labels.
 pub(super) fn names(format: Format, group: Group, index: u64) -> [String; 2] {
     let group = group.name();
     match format {
@@ -26,19 +24,18 @@ pub(super) fn names(format: Format, group: Group, index: u64) -> [String; 2] {
 
 /// Labels are the ids of the truth, so that numbers have gaps.
 pub(super) fn write(format: Format, field: &Field, files: &mut Files) -> Result<(), Error> {
-    let view = field.geometry.view;
     for group in GROUPS {
-        let [image, masks] = names(format, group, field.index());
-        files.encode(&image, picture_tiff(field.picture, field.geometry, None))?;
+        let [image, masks] = names(format, group, field.frame.index);
+        files.encode(&image, picture_tiff(field.picture, field.frame, None))?;
         let ids = files.layout.flatten.labels(field.truth, group);
-        files.encode(&masks, label_tiff(&ids, view.width, view.pixel_um))?;
+        files.encode(&masks, label_tiff(&ids, field.frame))?;
     }
     Ok(())
 }
 
 pub(super) fn check(format: Format, written: &Written) -> Result<(), Error> {
     GROUPS.into_iter().try_for_each(|group| {
-        let [image, masks] = names(format, group, written.field.index());
+        let [image, masks] = names(format, group, written.field.frame.index);
         written.file(&image, |bytes| written.picture(bytes))?;
         written.file(&masks, |bytes| written.labels(bytes, &written.flat(group)))
     })

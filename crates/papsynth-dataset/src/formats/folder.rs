@@ -4,13 +4,13 @@ use papsynth::Plane;
 use papsynth::truth::Group;
 
 use super::names;
-use super::ome::{Levels, description, page};
+use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
-use super::written::{LIMITS, Written, differs, is_described};
-use crate::error::Error;
+use super::written::{LIMITS, Written, is_described};
+use crate::error::{Error, Problem};
 use crate::read;
-use crate::truth::{Form, Geometry};
-use crate::write::{Page, Pages, Pixels, compressed, label_tiff};
+use crate::truth::FrameSummary;
+use crate::write::{Page, Pages, Pixels, compressed};
 
 #[derive(Default)]
 pub(super) struct Frames {
@@ -20,25 +20,21 @@ pub(super) struct Frames {
 }
 
 pub(super) fn check(written: &Written) -> Result<(), Error> {
-    let (index, geometry, truth) = (written.field.index(), written.field.geometry, written.field.truth);
-    let form = Form::of(geometry.planes_um.len());
-    written.file(&names::image(index, form), |bytes| {
+    let (frame, truth) = (written.field.frame, written.field.truth);
+    let index = frame.index;
+    written.file(&names::image(frame), |bytes| {
         written.planes(bytes)?;
-        if form == Form::Stack { is_described(bytes, &description(geometry)) } else { Ok(()) }
+        if frame.is_stack() { is_described(bytes, &description(frame)) } else { Ok(()) }
     })?;
-    if form == Form::Stack {
+    if frame.is_stack() {
         written.file(&names::all_in_focus(index), |bytes| written.picture(bytes))?;
     }
     written.file(&names::noise_free(index), |bytes| {
-        let due = geometry.planes_um.len();
+        let due = frame.planes_um.len();
         let pages = read::float_pages(bytes, &LIMITS, due)?;
-        if pages.len() != due {
-            return differs(&format!("it has {} planes, the record says {due}", pages.len()));
-        }
-        match pages.iter().all(|page| page.len() == geometry.values() && page.iter().all(|v| v.is_finite())) {
-            true => Ok(()),
-            false => differs("it has not the finite values of the size that the record says"),
-        }
+        Problem::unless(pages.len() == due, format!("it has {} planes, the record says {due}", pages.len()))?;
+        let fits = pages.iter().all(|page| page.len() == frame.values() && page.iter().all(|v| v.is_finite()));
+        Problem::unless(fits, "it has not the finite values of the size that the record says")
     })?;
     for group in Group::ALL {
         let ids = truth.labels(group).ids;
@@ -49,46 +45,42 @@ pub(super) fn check(written: &Written) -> Result<(), Error> {
 }
 
 impl Sink for Frames {
-    fn begin(&mut self, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        let index = geometry.key.index;
-        let planes = geometry.planes_um.len();
-        let values = geometry.values() as u64 * planes as u64;
-        self.stack = match Form::of(planes) {
-            Form::Single => None,
-            form => Some(Pages::new(files.folder.pending(&names::image(index, form))?, values * 2)?),
-        };
-        self.noise_free = Some(Pages::new(files.folder.pending(&names::noise_free(index))?, values * 4)?);
+    fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        let values = frame.values() as u64 * frame.planes_um.len() as u64;
+        let pages = |name: &str, bytes| Pages::new(files.folder.pending(name)?, bytes);
+        self.stack = frame.is_stack().then(|| pages(&names::image(frame), values * 2)).transpose()?;
+        self.noise_free = Some(pages(&names::noise_free(frame.index), values * 4)?);
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, _: &Files) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         if let Some(pages) = &mut self.stack {
-            let text = (plane.index == 0).then(|| description(geometry));
-            pages.write(Levels::new(&plane.grey, geometry).pixels(), &page(geometry, text.as_deref()))?;
+            let text = (plane.index == 0).then(|| description(frame));
+            pages.write(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()))?;
         }
         match &mut self.noise_free {
-            Some(pages) => pages.write(Pixels::F32(&plane.noise_free), &page(geometry, None)),
+            Some(pages) => pages.write(Pixels::F32(&plane.noise_free), &page(frame, None)),
             None => Ok(()),
         }
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (index, view) = (field.index(), field.geometry.view);
+        let (frame, index) = (field.frame, field.frame.index);
         let picture = match self.stack.take() {
             Some(pages) => {
                 files.written.push(pages.commit()?);
                 names::all_in_focus(index)
             }
-            None => names::image(index, Form::Single),
+            None => names::image(frame),
         };
         files.png(&picture, field)?;
         let mut ids = Vec::new();
         for group in Group::ALL {
             field.truth.labels_into(group, &mut ids);
-            files.encode(&names::labels(group, index), label_tiff(&ids, view.width, view.pixel_um))?;
+            files.encode(&names::labels(group, index), label_tiff(&ids, frame))?;
         }
         let layers = &[Pixels::U16(&field.truth.layers())];
-        let layers = compressed(layers, &Page { channels: 1, ..page(field.geometry, None) });
+        let layers = compressed(layers, &Page { channels: 1, ..page(frame, None) });
         files.encode(&names::layers(index), layers)?;
         if let Some(pages) = self.noise_free.take() {
             files.written.push(pages.commit()?);

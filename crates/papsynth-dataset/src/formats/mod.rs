@@ -7,11 +7,8 @@
 mod flat;
 mod folder;
 mod format;
-pub(crate) mod huggingface;
-mod layout;
 pub(crate) mod names;
 mod ome;
-mod ome_tiff;
 #[cfg(feature = "zarr")]
 mod ome_zarr;
 #[cfg_attr(not(feature = "parquet"), path = "no_parquet.rs")]
@@ -22,12 +19,11 @@ mod webdataset;
 mod written;
 mod yolo;
 
-pub use format::Format;
 #[cfg(feature = "zarr")]
 pub(crate) use format::HAS_PARQUET;
-pub use layout::Layout;
+pub use format::{Format, Layout};
 #[cfg(feature = "zarr")]
-pub(crate) use ome_zarr::read_planes;
+pub(crate) use ome_zarr::{channels, read_planes};
 pub(crate) use sink::{Field, Files, Sink};
 pub(crate) use webdataset::{Tar, TarFile, tar};
 pub(crate) use written::{LIMITS, Take, Written, levels};
@@ -35,7 +31,7 @@ pub(crate) use written::{LIMITS, Take, Written, levels};
 use papsynth::truth::Group;
 
 use crate::error::Error;
-use crate::truth::{Form, FrameSummary, Split};
+use crate::truth::{FrameSummary, Split};
 use sink::AtOnce;
 
 impl Format {
@@ -44,7 +40,7 @@ impl Format {
         Ok(match self {
             Self::Folder => Box::new(folder::Frames::default()),
             Self::Webdataset => Box::new(webdataset::Shard::new(files)?),
-            Self::OmeTiff => Box::new(ome_tiff::Images::default()),
+            Self::OmeTiff => Box::new(ome::Images::default()),
             Self::Cellpose => Box::new(AtOnce(|field, files| flat::write(Self::Cellpose, field, files))),
             Self::Stardist => Box::new(AtOnce(|field, files| flat::write(Self::Stardist, field, files))),
             Self::YoloSeg => Box::new(AtOnce(yolo::write)),
@@ -62,7 +58,7 @@ impl Format {
         match self {
             Self::Folder => folder::check(written),
             Self::Webdataset => tar.map_or(Ok(()), |tar| webdataset::check(written, tar)),
-            Self::OmeTiff => ome_tiff::check(written),
+            Self::OmeTiff => ome::check(written),
             Self::Cellpose | Self::Stardist => flat::check(self, written),
             Self::YoloSeg => yolo::check(written),
             Self::Qupath => qupath::check(written),
@@ -76,11 +72,11 @@ impl Format {
 
     /// Where the image of a frame lies; of one in a tar file, the path goes on behind that file's name.
     pub(crate) fn image(self, seed: u64, shard: u64, frame: &FrameSummary) -> String {
-        let (index, form) = (frame.index, Form::of(frame.planes_um.len()));
+        let index = frame.index;
         match self {
-            Self::Folder => names::image(index, form),
-            Self::Webdataset => webdataset::image(shard, index, form),
-            Self::OmeTiff => ome_tiff::image(index),
+            Self::Folder => names::image(frame),
+            Self::Webdataset => webdataset::image(shard, frame),
+            Self::OmeTiff => ome::name(index),
             Self::Cellpose | Self::Stardist => {
                 let [image, _] = flat::names(self, Group::Cytoplasm, index);
                 image
@@ -88,7 +84,8 @@ impl Format {
             Self::YoloSeg => yolo::image(Split::of_slide(seed, frame.slide), index),
             Self::Qupath => qupath::image(index),
             Self::OmeZarr => names::zarr_group(index),
-            Self::Huggingface => huggingface::image(seed, shard, frame, form),
+            Self::Huggingface if frame.is_stack() => names::huggingface_image(seed, shard, frame, names::PLANES),
+            Self::Huggingface => names::huggingface_image(seed, shard, frame, names::PICTURE),
         }
     }
 
@@ -97,7 +94,7 @@ impl Format {
         match self {
             Self::Folder => Some(names::all_in_focus(frame.index)),
             Self::Webdataset => Some(webdataset::all_in_focus(shard, frame.index)),
-            Self::Huggingface => Some(huggingface::image(seed, shard, frame, Form::Single)),
+            Self::Huggingface => Some(names::huggingface_image(seed, shard, frame, names::PICTURE)),
             _ => None,
         }
     }
@@ -117,6 +114,6 @@ impl Layout {
     pub(crate) fn images_of(&self, seed: u64, shard: u64, frame: &FrameSummary) -> (String, Option<String>) {
         let image = self.formats.first().expect("a layout has a format").image(seed, shard, frame);
         let mut sharp = self.formats.iter().filter_map(|format| format.all_in_focus(seed, shard, frame));
-        (image, (Form::of(frame.planes_um.len()) == Form::Stack).then(|| sharp.next()).flatten())
+        (image, frame.is_stack().then(|| sharp.next()).flatten())
     }
 }

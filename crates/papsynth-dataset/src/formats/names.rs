@@ -2,7 +2,7 @@
 
 use papsynth::truth::Group;
 
-use crate::truth::Form;
+use crate::truth::{FrameSummary, Split};
 
 pub(crate) const MANIFEST: &str = "manifest.json";
 pub(crate) const RECIPE: &str = "recipe.toml";
@@ -29,12 +29,8 @@ pub(crate) fn numbered(number: u64) -> String {
     format!("{number:06}")
 }
 
-pub(crate) fn image(index: u64, form: Form) -> String {
-    let ending = match form {
-        Form::Single => "png",
-        Form::Stack => "ome.tif",
-    };
-    format!("images/{index:06}.{ending}")
+pub(crate) fn image(frame: &FrameSummary) -> String {
+    format!("images/{:06}.{}", frame.index, if frame.is_stack() { "ome.tif" } else { "png" })
 }
 
 pub(crate) fn noise_free(index: u64) -> String {
@@ -69,7 +65,6 @@ pub(crate) fn record(shard: u64) -> String {
     format!("{SHARDS}/{shard:06}.json")
 }
 
-/// Where the scene of a frame lies.
 pub(crate) fn scene(index: u64) -> String {
     format!("scenes/{index:06}.json")
 }
@@ -88,3 +83,29 @@ pub(crate) fn zarr_group(index: u64) -> String {
 
 /// How the name of such a folder ends.
 pub(crate) const ZARR_GROUP: &str = ".ome.zarr";
+
+/// The card of the format `huggingface` that names the files of each split.
+pub(crate) const HUGGINGFACE_CARD: &str = "huggingface/README.md";
+
+/// The file of the frames of a shard that fall into a split. Its name tells no total: shards are written in any order.
+pub(crate) fn huggingface_file(split: Split, shard: u64) -> String {
+    format!("huggingface/data/{}-{shard:06}.parquet", huggingface_split(split))
+}
+
+/// The name of a split as Hugging Face has it.
+pub(crate) fn huggingface_split(split: Split) -> &'static str {
+    match split {
+        Split::Train => "train",
+        Split::Val => "validation",
+        Split::Test => "test",
+    }
+}
+
+/// The picture of a frame or all planes of a stack, by how their names end, behind the name of their file.
+pub(super) fn huggingface_image(seed: u64, shard: u64, frame: &FrameSummary, ending: &str) -> String {
+    format!("{}/{}{ending}", huggingface_file(Split::of_slide(seed, frame.slide), shard), numbered(frame.index))
+}
+
+/// How names within a file end: of a picture, and of all planes of a stack.
+pub(crate) const PICTURE: &str = ".png";
+pub(crate) const PLANES: &str = ".planes";

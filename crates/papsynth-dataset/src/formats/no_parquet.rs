@@ -6,10 +6,10 @@ use std::marker::PhantomData;
 use std::path::Path;
 
 use super::format::Format;
-use super::huggingface;
+use super::names;
 use super::sink::{Files, Sink};
 use crate::error::Error;
-use crate::truth::{Cell, Sort, Split};
+use crate::truth::{Named, Row, Split};
 
 pub(crate) fn sink(files: &Files) -> Result<Box<dyn Sink>, Error> {
     Err(Format::Huggingface.missing(files.folder.root()))
@@ -20,22 +20,18 @@ pub(crate) fn images(path: &Path, _: &str) -> Result<Vec<Vec<u8>>, Error> {
 }
 
 pub(crate) fn card(_: &[String], _: &[Split]) -> Result<(String, Vec<u8>), Error> {
-    Err(Format::Huggingface.missing(Path::new(huggingface::CARD)))
+    Err(Format::Huggingface.missing(Path::new(names::HUGGINGFACE_CARD)))
 }
 
 /// A table that is not written.
 pub(crate) struct Table<'a>(Infallible, PhantomData<&'a ()>);
 
 impl Table<'_> {
-    pub(crate) fn begin(
-        _: impl Write + Send,
-        path: &Path,
-        _: impl IntoIterator<Item = (&'static str, Sort)>,
-    ) -> Result<Self, Error> {
+    pub(crate) fn begin(_: impl Write + Send, path: &Path, _: Vec<Named>) -> Result<Self, Error> {
         Err(Error::missing_feature("the table of objects as Parquet", "parquet", path))
     }
 
-    pub(crate) fn row(&mut self, _: impl Iterator<Item = Cell>) -> Result<(), Error> {
+    pub(crate) fn row(&mut self, _: &Row) -> Result<(), Error> {
         match self.0 {}
     }
 

@@ -1,19 +1,24 @@
-//! Frames and labels as TIFF, and OME-XML that says what its pages are.
+//! Frames and labels as TIFF, and OME-XML that says what its pages are; `ome-tiff`: every frame an OME-TIFF, with its labels as layers that never
+//! overlap in a second one.
 
 use std::io::{self, Cursor};
 
+use papsynth::Plane;
 use papsynth::truth::Group;
 
 use super::names::numbered;
-use crate::truth::Geometry;
-use crate::write::{Page, PageWriter, Pixels, compressed, fits_16_bits, is_large, label_pages};
+use super::sink::{Field, Files, Sink};
+use super::written::{Written, is_described};
+use crate::error::Error;
+use crate::truth::{FrameSummary, layers};
+use crate::write::{Page, PageWriter, Pages, Pixels, compressed, fits_16_bits, is_large, label_pages};
 
 /// The µ of µm, as XML that is ASCII: readers of TIFF expect no other.
 const MICROMETRE: &str = "&#181;m";
 
-/// The description of a frame, one page a plane in the order of the geometry.
-pub(super) fn description(geometry: &Geometry) -> String {
-    let planes = &geometry.planes_um;
+/// The description of a frame, one page a plane in the order of the frame.
+pub(super) fn description(frame: &FrameSummary) -> String {
+    let planes = &frame.planes_um;
     let step = match planes.as_slice() {
         [first, second, ..] => {
             format!(" PhysicalSizeZ=\"{}\" PhysicalSizeZUnit=\"{MICROMETRE}\"", (second - first).abs())
@@ -27,21 +32,20 @@ pub(super) fn description(geometry: &Geometry) -> String {
             format!("<Plane TheZ=\"{z}\" TheC=\"0\" TheT=\"0\" PositionZ=\"{um}\" PositionZUnit=\"{MICROMETRE}\"/>")
         })
         .collect();
-    image(geometry, &numbered(geometry.key.index), planes.len(), &step, &positions)
+    image(frame, &numbered(frame.index), planes.len(), &step, &positions)
 }
 
-/// The description of a frame's picture alone.
-pub(super) fn of_picture(geometry: &Geometry) -> String {
-    image(geometry, &numbered(geometry.key.index), 1, "", "")
+pub(super) fn of_picture(frame: &FrameSummary) -> String {
+    image(frame, &numbered(frame.index), 1, "", "")
 }
 
-fn image(geometry: &Geometry, name: &str, planes: usize, step: &str, positions: &str) -> String {
-    let (bits, channels) = (geometry.bits, geometry.channels);
+fn image(frame: &FrameSummary, name: &str, planes: usize, step: &str, positions: &str) -> String {
+    let (bits, channels) = (frame.bits, frame.channels);
     let kind = if bits <= 8 { "uint8" } else { "uint16" };
     // The samples of a pixel lie side by side.
     let (order, interleaved) = if channels == 1 { ("XYZCT", "") } else { ("XYCZT", " Interleaved=\"true\"") };
     document(
-        geometry,
+        frame,
         name,
         &format!(
             "DimensionOrder=\"{order}\"{interleaved} Type=\"{kind}\" SignificantBits=\"{bits}\" SizeZ=\"{planes}\" \
@@ -55,7 +59,7 @@ fn image(geometry: &Geometry, name: &str, planes: usize, step: &str, positions: 
 }
 
 /// The description of layers of labels: each is a channel.
-pub(super) fn of_labels(geometry: &Geometry, group: Group, layers: &[Vec<u32>]) -> String {
+pub(super) fn of_labels(frame: &FrameSummary, group: Group, layers: &[Vec<u32>]) -> String {
     let kind = if layers.iter().all(|layer| fits_16_bits(layer)) { "uint16" } else { "uint32" };
     let layers = layers.len();
     let channels: String = (0..layers)
@@ -64,15 +68,14 @@ pub(super) fn of_labels(geometry: &Geometry, group: Group, layers: &[Vec<u32>]) 
         })
         .collect();
     document(
-        geometry,
-        &format!("{} {}", numbered(geometry.key.index), group.name()),
+        frame,
+        &format!("{} {}", numbered(frame.index), group.name()),
         &format!("DimensionOrder=\"XYCZT\" Type=\"{kind}\" SizeZ=\"1\" SizeC=\"{layers}\" SizeT=\"1\""),
         &format!("{channels}<TiffData IFD=\"0\" PlaneCount=\"{layers}\"/>"),
     )
 }
 
-fn document(geometry: &Geometry, name: &str, attributes: &str, content: &str) -> String {
-    let view = geometry.view;
+fn document(frame: &FrameSummary, name: &str, attributes: &str, content: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\
          <OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\" \
@@ -82,15 +85,14 @@ fn document(geometry: &Geometry, name: &str, attributes: &str, content: &str) ->
          <Image ID=\"Image:0\" Name=\"{name}\"><Pixels ID=\"Pixels:0\" SizeX=\"{width}\" SizeY=\"{height}\" \
          PhysicalSizeX=\"{pixel}\" PhysicalSizeXUnit=\"{MICROMETRE}\" \
          PhysicalSizeY=\"{pixel}\" PhysicalSizeYUnit=\"{MICROMETRE}\" {attributes}>{content}</Pixels></Image></OME>",
-        width = view.width,
-        height = view.height,
-        pixel = view.pixel_um,
+        width = frame.width,
+        height = frame.height,
+        pixel = frame.pixel_um,
     )
 }
 
-/// A page of a frame.
-pub(super) fn page<'a>(geometry: &Geometry, text: Option<&'a str>) -> Page<'a> {
-    Page { width: geometry.view.width, channels: geometry.channels, pixel_um: geometry.view.pixel_um, text }
+pub(super) fn page<'a>(frame: &FrameSummary, text: Option<&'a str>) -> Page<'a> {
+    Page { width: frame.width, channels: frame.channels, pixel_um: frame.pixel_um, text }
 }
 
 /// Levels of a camera in as many bits as files have for them.
@@ -100,10 +102,10 @@ pub(super) enum Levels<'a> {
 }
 
 impl<'a> Levels<'a> {
-    pub(super) fn new(levels: &'a [u16], geometry: &Geometry) -> Self {
+    pub(super) fn new(levels: &'a [u16], frame: &FrameSummary) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "levels of at most 8 bits")]
         let narrow = |&level: &u16| level as u8;
-        if geometry.bits <= 8 { Self::U8(levels.iter().map(narrow).collect()) } else { Self::U16(levels) }
+        if frame.bits <= 8 { Self::U8(levels.iter().map(narrow).collect()) } else { Self::U16(levels) }
     }
 
     pub(super) fn pixels(&self) -> Pixels<'_> {
@@ -114,26 +116,82 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// The picture of a frame.
-pub(super) fn picture_tiff(picture: &[u16], geometry: &Geometry, text: Option<&str>) -> io::Result<Vec<u8>> {
-    compressed(&[Levels::new(picture, geometry).pixels()], &page(geometry, text))
+pub(super) fn picture_tiff(picture: &[u16], frame: &FrameSummary, text: Option<&str>) -> io::Result<Vec<u8>> {
+    compressed(&[Levels::new(picture, frame).pixels()], &page(frame, text))
 }
 
 /// The same as OME-TIFF, a pyramid if it is large.
-pub(super) fn ome_picture(picture: &[u16], geometry: &Geometry) -> io::Result<Vec<u8>> {
-    let text = of_picture(geometry);
-    if !is_large(geometry.view.width, geometry.view.height) {
-        return picture_tiff(picture, geometry, Some(&text));
+pub(super) fn ome_picture(picture: &[u16], frame: &FrameSummary) -> io::Result<Vec<u8>> {
+    let text = of_picture(frame);
+    if !is_large(frame.width, frame.height) {
+        return picture_tiff(picture, frame, Some(&text));
     }
     let mut out = Cursor::new(Vec::new());
-    let levels = Levels::new(picture, geometry);
-    PageWriter::new(&mut out, 3 * picture.len() as u64)?
-        .write_pyramid(levels.pixels(), &page(geometry, Some(&text)))?;
+    let levels = Levels::new(picture, frame);
+    PageWriter::new(&mut out, 3 * picture.len() as u64)?.write_pyramid(levels.pixels(), &page(frame, Some(&text)))?;
     Ok(out.into_inner())
 }
 
+/// A label image of 16 bits, or of 32 if a label needs them.
+pub(super) fn label_tiff(ids: &[u32], frame: &FrameSummary) -> io::Result<Vec<u8>> {
+    label_pages(&[ids], &Page { channels: 1, ..page(frame, None) })
+}
+
 /// Layers of labels as channels of an OME-TIFF.
-pub(super) fn ome_labels(layers: &[Vec<u32>], group: Group, geometry: &Geometry) -> io::Result<Vec<u8>> {
-    let text = of_labels(geometry, group, layers);
-    label_pages(layers, &Page { channels: 1, ..page(geometry, Some(&text)) })
+pub(super) fn ome_labels(layers: &[Vec<u32>], group: Group, frame: &FrameSummary) -> io::Result<Vec<u8>> {
+    let text = of_labels(frame, group, layers);
+    label_pages(layers, &Page { channels: 1, ..page(frame, Some(&text)) })
+}
+
+#[derive(Default)]
+pub(super) struct Images {
+    image: Option<Pages>,
+}
+
+pub(super) fn name(index: u64) -> String {
+    format!("ome-tiff/{index:06}.ome.tif")
+}
+
+fn labels_name(group: Group, index: u64) -> String {
+    format!("ome-tiff/{index:06}.{}.ome.tif", group.name())
+}
+
+pub(super) fn check(written: &Written) -> Result<(), Error> {
+    let frame = written.field.frame;
+    written.file(&name(frame.index), |bytes| {
+        written.planes(bytes)?;
+        is_described(bytes, &description(frame))
+    })?;
+    Group::ALL.into_iter().try_for_each(|group| {
+        let pages = layers(written.field.truth, group);
+        written.file(&labels_name(group, frame.index), |bytes| {
+            written.layers(bytes, &pages)?;
+            is_described(bytes, &of_labels(frame, group, &pages))
+        })
+    })
+}
+
+impl Sink for Images {
+    fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        let bytes = frame.values() as u64 * frame.planes_um.len() as u64 * 3;
+        self.image = Some(Pages::new(files.folder.pending(&name(frame.index))?, bytes)?);
+        Ok(())
+    }
+
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
+        let Some(pages) = &mut self.image else { return Ok(()) };
+        let text = (plane.index == 0).then(|| description(frame));
+        pages.write_pyramid(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()))
+    }
+
+    fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
+        if let Some(pages) = self.image.take() {
+            files.written.push(pages.commit()?);
+        }
+        for group in Group::ALL {
+            let pages = layers(field.truth, group);
+            files.encode(&labels_name(group, field.frame.index), ome_labels(&pages, group, field.frame))?;
+        }
+        Ok(())
+    }
 }

@@ -15,11 +15,11 @@ use serde_json::{Map, Value, json};
 
 use super::names::{numbered, zarr_group as group_of};
 use super::sink::{Field, Files, Sink};
-use super::written::{LIMITS, Take, Written, differs};
+use super::written::{LIMITS, Take, Written, is_of_masks};
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Output};
 use crate::read::{self, LevelImage};
-use crate::truth::{Geometry, category_name, layers};
+use crate::truth::{FrameSummary, category_name, layers};
 use crate::write::{fits_16_bits, is_large};
 use papsynth::white_level as white;
 
@@ -28,18 +28,15 @@ const CHUNK: usize = 512;
 
 #[derive(Default)]
 pub(super) struct Images {
-    /// The levels of the image whose planes are coming.
     levels: Vec<Level>,
 }
 
-/// A level of an image, the file of its one shard.
 struct Level {
     encoder: ShardEncoder,
     output: Output,
 }
 
 impl Images {
-    /// Adds one channel of a plane to every level.
     fn add<T: Sample>(&mut self, channel: usize, plane: usize, mut values: Vec<T>) -> Result<(), papsynth_zarr::Error> {
         for level in &mut self.levels {
             let width = level.encoder.block().columns.len();
@@ -55,8 +52,8 @@ impl Images {
 }
 
 /// The arrays of an image or label image of a frame.
-fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
-    let [width, height] = [geometry.view.width, geometry.view.height];
+fn pyramid(frame: &FrameSummary, kind: Kind, [channels, planes]: [Option<usize>; 2]) -> Result<Pyramid, Error> {
+    let [width, height] = [frame.width, frame.height];
     let form = Form {
         kind,
         channels,
@@ -66,23 +63,20 @@ fn pyramid(geometry: &Geometry, kind: Kind, [channels, planes]: [Option<usize>; 
         tiling: Tiling::whole(CHUNK, planes.unwrap_or(1), width, height),
         levels: if is_large(width, height) { levels_until(CHUNK, width, height) } else { 1 },
     };
-    Pyramid::new(&form).map_err(|error| geometry.wrong(error.to_string()))
+    Pyramid::new(&form).map_err(|error| frame.wrong(error.to_string()))
 }
 
-/// The arrays of the image of a frame.
-fn of_image(geometry: &Geometry) -> Result<Pyramid, Error> {
+fn of_image(frame: &FrameSummary) -> Result<Pyramid, Error> {
     let many = |count: usize| (count > 1).then_some(count);
-    let kind = if geometry.bits <= 8 { Kind::U8 } else { Kind::U16 };
-    pyramid(geometry, kind, [many(geometry.channels), many(geometry.planes_um.len())])
+    let kind = if frame.bits <= 8 { Kind::U8 } else { Kind::U16 };
+    pyramid(frame, kind, [many(frame.channels), many(frame.planes_um.len())])
 }
 
-/// A label image: one layer of a group.
 struct Layer {
     labels: Labels,
     ids: Vec<u32>,
 }
 
-/// All label images of a frame.
 fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
     let mut found = Vec::new();
     for group in Group::ALL {
@@ -92,7 +86,7 @@ fn of_labels(field: &Field) -> Result<Vec<Layer>, Error> {
             let shown: BTreeSet<u32> = ids.iter().copied().filter(|&id| id > 0).collect();
             let labels = Labels {
                 name: format!("{}-{number}", group.name()),
-                pyramid: pyramid(field.geometry, kind, [None, None])?,
+                pyramid: pyramid(field.frame, kind, [None, None])?,
                 colors: Vec::new(),
                 properties: properties(field, group, &shown),
             };
@@ -114,7 +108,7 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
                 ("bethesda", json!(object.bethesda)),
                 ("kind", json!(object.kind.name())),
                 // A nucleus has the label of its cell.
-                ("parent", json!(annotation.has_parent().then_some(object.id))),
+                ("parent", json!(annotation.parent_id.map(|_| object.id))),
                 ("depth_um", json!(object.depth_um)),
                 ("stain", json!(object.stain)),
                 ("area_um2", json!(object.area_um2)),
@@ -127,35 +121,39 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
 }
 
 /// Every `zarr.json` of a frame.
-fn documents(geometry: &Geometry, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let range = [0.0, f64::from(white(geometry.bits))];
-    let channel = |(label, color): (&str, [u8; 3])| Channel { label: label.to_owned(), color, range, window: range };
-    let channels = match geometry.channels {
-        3 => [("red", [255, 0, 0]), ("green", [0, 255, 0]), ("blue", [0, 0, 255])].map(channel).to_vec(),
-        _ => vec![channel(("grey", [255; 3]))],
-    };
-    let planes = &geometry.planes_um;
+fn documents(seed: u64, frame: &FrameSummary, labels: Vec<Labels>) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let planes = &frame.planes_um;
     let step_um = match planes.as_slice() {
         [first, second, ..] if first != second => second - first,
         _ => 1.0,
     };
     let own = json!({
-        "seed": geometry.key.seed,
-        "index": geometry.key.index,
-        "slide": geometry.slide,
-        "bits": geometry.bits,
+        "seed": seed,
+        "index": frame.index,
+        "slide": frame.slide,
+        "bits": frame.bits,
         "planes_um": planes,
     });
     let image = Image {
-        name: numbered(geometry.key.index),
-        pyramid: of_image(geometry)?,
-        space: Space { pixel_um: geometry.view.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
-        channels,
+        name: numbered(frame.index),
+        pyramid: of_image(frame)?,
+        space: Space { pixel_um: frame.pixel_um, step_um, first_um: planes.first().copied().unwrap_or(0.0) },
+        channels: channels(frame.channels, frame.bits),
         plane: planes.len() / 2,
         labels,
         attributes: Map::from_iter([("papsynth".to_owned(), own)]),
     };
-    image.documents().map_err(|error| geometry.wrong(error.to_string()))
+    image.documents().map_err(|error| frame.wrong(error.to_string()))
+}
+
+/// What the channels of an image are.
+pub(crate) fn channels(count: usize, bits: u32) -> Vec<Channel> {
+    let range = [0.0, f64::from(white(bits))];
+    let channel = |(label, color): (&str, [u8; 3])| Channel { label: label.to_owned(), color, range, window: range };
+    match count {
+        3 => [("red", [255, 0, 0]), ("green", [0, 255, 0]), ("blue", [0, 0, 255])].map(channel).to_vec(),
+        _ => vec![channel(("grey", [255; 3]))],
+    }
 }
 
 /// The one shard of a level, from the folder of its group.
@@ -164,36 +162,35 @@ fn shard_file(level: usize, array: &papsynth_zarr::Array) -> String {
 }
 
 impl Sink for Images {
-    fn begin(&mut self, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        let group = group_of(geometry.key.index);
+    fn begin(&mut self, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        let group = group_of(frame.index);
         self.levels.clear();
-        for (level, array) in of_image(geometry)?.levels().iter().enumerate() {
+        for (level, array) in of_image(frame)?.levels().iter().enumerate() {
             let name = format!("{group}/{}", shard_file(level, array));
             let output = Output::new(files.folder.pending(&name)?)?;
-            let encoder =
-                ShardEncoder::new(array, Shard::default()).map_err(|error| geometry.wrong(error.to_string()))?;
+            let encoder = ShardEncoder::new(array, Shard::default()).map_err(|error| frame.wrong(error.to_string()))?;
             self.levels.push(Level { encoder, output });
         }
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        for channel in 0..geometry.channels {
-            let values = plane.grey.iter().skip(channel).step_by(geometry.channels);
-            let added = match geometry.bits {
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        for channel in 0..frame.channels {
+            let values = plane.grey.iter().skip(channel).step_by(frame.channels);
+            let added = match frame.bits {
                 // Checked to fit before it came here.
                 ..=8 => self.add(channel, plane.index, values.map(|&v| v.to_le_bytes()[0]).collect()),
                 _ => self.add(channel, plane.index, values.copied().collect()),
             };
-            added.map_err(|error| failed(error, files.folder, &group_of(geometry.key.index), geometry))?;
+            added.map_err(|error| failed(error, files.folder, &group_of(frame.index), frame))?;
         }
         Ok(())
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (geometry, group) = (field.geometry, group_of(field.index()));
+        let (frame, group) = (field.frame, group_of(field.frame.index));
         let folder = files.folder;
-        let broken = |error| failed(error, folder, &group, geometry);
+        let broken = |error| failed(error, folder, &group, frame);
         for Level { encoder, mut output } in self.levels.drain(..) {
             output.bytes(&encoder.end().map_err(broken)?)?;
             files.written.push(output.into_pending()?.commit()?);
@@ -206,18 +203,17 @@ impl Sink for Images {
             }
             described.push(labels);
         }
-        for (name, bytes) in documents(geometry, described)? {
+        for (name, bytes) in documents(field.seed, frame, described)? {
             files.write(&format!("{group}/{name}"), &bytes)?;
         }
         Ok(())
     }
 }
 
-/// What went wrong while a frame was encoded.
-fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, geometry: &Geometry) -> Error {
+fn failed(error: papsynth_zarr::Error, folder: &Folder, group: &str, frame: &FrameSummary) -> Error {
     match error {
         papsynth_zarr::Error::Io(source) => Error::io("write", &folder.path(group))(source),
-        other => geometry.wrong(other.to_string()),
+        other => frame.wrong(other.to_string()),
     }
 }
 
@@ -235,55 +231,41 @@ fn label_shards(labels: &Labels, mut ids: Vec<u32>) -> Result<Vec<(String, Vec<u
     Ok(shards)
 }
 
-/// Ids of which none needs more than 16 bits.
-fn small(ids: &[u32]) -> Vec<u16> {
-    ids.iter().map(|&id| u16::try_from(id).unwrap_or(u16::MAX)).collect()
+/// Values of which none needs more than 16 bits.
+fn small(values: &[u32]) -> Vec<u16> {
+    values.iter().map(|&value| u16::try_from(value).unwrap_or(u16::MAX)).collect()
 }
 
 /// Whether a frame is what its truth says: documents to the letter, levels each the half of that before, labels those of the masks.
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
-    let (geometry, group) = (field.geometry, group_of(field.index()));
+    let (frame, group) = (field.frame, group_of(field.frame.index));
     let layers = of_labels(field)?;
-    for (name, expected) in documents(geometry, layers.iter().map(|layer| layer.labels.clone()).collect())? {
-        written.file(&format!("{group}/{name}"), |bytes| match bytes == expected {
-            true => Ok(()),
-            false => differs("it does not say what the record and coco.json do"),
+    for (name, expected) in documents(field.seed, frame, layers.iter().map(|layer| layer.labels.clone()).collect())? {
+        written.file(&format!("{group}/{name}"), |bytes| {
+            Problem::unless(bytes == expected, "it does not say what the record and coco.json do")
         })?;
     }
-    let pyramid = of_image(geometry)?;
+    let pyramid = of_image(frame)?;
     let first = format!("{group}/{}", shard_file(0, &pyramid.levels()[0]));
-    written.file(&first, |bytes| written.shown(geometry.planes_um.len(), &mut |take| planes(bytes, geometry, take)))?;
-    match geometry.bits {
-        ..=8 => are_halves::<u8>(written, &group, &pyramid)?,
-        _ => are_halves::<u16>(written, &group, &pyramid)?,
-    }
-    for Layer { labels, ids } in layers {
-        match labels.pyramid.levels()[0].kind() {
-            Kind::U16 => are_labels(written, &group, &labels, small(&ids))?,
-            _ => are_labels(written, &group, &labels, ids)?,
-        }
-    }
-    Ok(())
+    written.file(&first, |bytes| written.shown(&mut |take| planes(bytes, frame, take)))?;
+    are_halves(written, &group, &pyramid)?;
+    layers.into_iter().try_for_each(|Layer { labels, ids }| are_labels(written, &group, &labels, ids))
 }
 
-/// Every level is the half of that before.
-fn are_halves<T: Sample>(written: &Written, group: &str, pyramid: &Pyramid) -> Result<(), Error> {
+fn are_halves(written: &Written, group: &str, pyramid: &Pyramid) -> Result<(), Error> {
     for (number, pair) in pyramid.levels().windows(2).enumerate() {
         let [full, half] = [&pair[0], &pair[1]];
         let name = |level: usize, array| format!("{group}/{}", shard_file(level, array));
         let above = written.folder.path(&name(number, full));
         let bytes = read::bytes(&above, LIMITS.max_file_bytes)?;
-        let mut above = ShardReader::open(full, Shard::default(), Cursor::new(bytes))
-            .map_err(|error| Error::input(&above)(broken(error)))?;
+        let mut above = Reader::open(full, &bytes).map_err(Error::input(&above))?;
         written.file(&name(number + 1, half), |bytes| {
-            let mut below = ShardReader::open(half, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
+            let mut below = Reader::open(half, bytes)?;
             let [channels, planes, _, width] = full.shape();
             for (plane, channel) in (0..planes).flat_map(|plane| (0..channels).map(move |channel| (plane, channel))) {
-                let expected: Vec<T> = halved(&above.plane(channel, plane).map_err(broken)?, width);
-                if below.plane::<T>(channel, plane).map_err(broken)? != expected {
-                    return differs("it is not the half of the level before");
-                }
+                let expected = halved(&above.plane(channel, plane)?, width);
+                Problem::unless(below.plane(channel, plane)? == expected, "it is not the half of the level before")?;
             }
             Ok(())
         })?;
@@ -291,19 +273,36 @@ fn are_halves<T: Sample>(written: &Written, group: &str, pyramid: &Pyramid) -> R
     Ok(())
 }
 
-/// Every level of a label image shows these ids.
-fn are_labels<T: Sample>(written: &Written, group: &str, labels: &Labels, mut ids: Vec<T>) -> Result<(), Error> {
+fn are_labels(written: &Written, group: &str, labels: &Labels, mut ids: Vec<u32>) -> Result<(), Error> {
     for (level, array) in labels.pyramid.levels().iter().enumerate() {
         written.file(&format!("{group}/{}/{}", labels.folder(), shard_file(level, array)), |bytes| {
-            let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
-            match reader.plane::<T>(0, 0).map_err(broken)? == ids {
-                true => Ok(()),
-                false => differs("it is not what the masks of coco.json give"),
-            }
+            is_of_masks(Reader::open(array, bytes)?.plane(0, 0)? == ids)
         })?;
         ids = halved_labels(&ids, array.shape()[3]);
     }
     Ok(())
+}
+
+/// Reads the one shard of an array, whatever the type of its values.
+struct Reader<'a> {
+    shard: ShardReader<Cursor<&'a [u8]>>,
+    kind: Kind,
+}
+
+impl<'a> Reader<'a> {
+    fn open(array: &papsynth_zarr::Array, bytes: &'a [u8]) -> Result<Self, Problem> {
+        let shard = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
+        Ok(Self { shard, kind: array.kind() })
+    }
+
+    fn plane(&mut self, channel: usize, plane: usize) -> Result<Vec<u32>, Problem> {
+        let values = match self.kind {
+            Kind::U8 => self.shard.plane::<u8>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
+            Kind::U16 => self.shard.plane::<u16>(channel, plane).map(|v| v.into_iter().map(u32::from).collect()),
+            _ => self.shard.plane(channel, plane),
+        };
+        values.map_err(broken)
+    }
 }
 
 fn broken(error: papsynth_zarr::Error) -> Problem {
@@ -311,35 +310,25 @@ fn broken(error: papsynth_zarr::Error) -> Problem {
 }
 
 /// The planes of a frame, from the bytes of its image's one shard at full size.
-fn planes(bytes: &[u8], geometry: &Geometry, take: &mut Take) -> Result<(), Problem> {
-    let pyramid = of_image(geometry).map_err(|error| Problem::differs(error.to_string()))?;
-    let array = &pyramid.levels()[0];
-    let mut reader = ShardReader::open(array, Shard::default(), Cursor::new(bytes)).map_err(broken)?;
-    let (width, channels) = (geometry.view.width, geometry.channels);
-    for plane in 0..geometry.planes_um.len() {
-        let mut levels = vec![0; geometry.values()];
+fn planes(bytes: &[u8], frame: &FrameSummary, take: &mut Take) -> Result<(), Problem> {
+    let pyramid = of_image(frame).map_err(|error| Problem::unfit(error.to_string()))?;
+    let mut reader = Reader::open(&pyramid.levels()[0], bytes)?;
+    let (width, channels) = (frame.width, frame.channels);
+    for plane in 0..frame.planes_um.len() {
+        let mut levels = vec![0; frame.values()];
         for channel in 0..channels {
             let at = levels.iter_mut().skip(channel).step_by(channels);
-            match array.kind() {
-                Kind::U8 => {
-                    let values: Vec<u8> = reader.plane(channel, plane).map_err(broken)?;
-                    at.zip(values).for_each(|(level, value)| *level = value.into());
-                }
-                _ => {
-                    let values: Vec<u16> = reader.plane(channel, plane).map_err(broken)?;
-                    at.zip(values).for_each(|(level, value)| *level = value);
-                }
-            }
+            at.zip(small(&reader.plane(channel, plane)?)).for_each(|(level, value)| *level = value);
         }
-        take(LevelImage { width, channels, levels, white: white(if geometry.bits <= 8 { 8 } else { 16 }) })?;
+        take(LevelImage { width, channels, levels, white: white(if frame.bits <= 8 { 8 } else { 16 }) })?;
     }
     Ok(())
 }
 
 /// The planes of a frame of a data set, one after the other.
-pub(crate) fn read_planes(folder: &Folder, geometry: &Geometry, take: &mut Take) -> Result<(), Error> {
-    let array = of_image(geometry)?;
-    let path = folder.path(&format!("{}/{}", group_of(geometry.key.index), shard_file(0, &array.levels()[0])));
+pub(crate) fn read_planes(folder: &Folder, frame: &FrameSummary, take: &mut Take) -> Result<(), Error> {
+    let array = of_image(frame)?;
+    let path = folder.path(&format!("{}/{}", group_of(frame.index), shard_file(0, &array.levels()[0])));
     let bytes = read::bytes(&path, LIMITS.max_file_bytes)?;
-    planes(&bytes, geometry, take).map_err(Error::input(&path))
+    planes(&bytes, frame, take).map_err(Error::input(&path))
 }

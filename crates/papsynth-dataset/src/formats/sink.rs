@@ -6,25 +6,22 @@ use std::io;
 use papsynth::Plane;
 use papsynth::truth::Truth;
 
-use super::layout::Layout;
+use super::format::Layout;
 use crate::error::Error;
 use crate::files::{FileRecord, Folder};
-use crate::truth::{Document, FrameSummary, Geometry, Split};
+use crate::truth::{Document, FrameSummary, Split};
 use crate::write;
 
 /// Writes the frames of a shard, one after the other.
 pub(crate) trait Sink {
-    /// A frame begins.
-    fn begin(&mut self, _: &Geometry, _: &Files) -> Result<(), Error> {
+    fn begin(&mut self, _: &FrameSummary, _: &Files) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The next plane of the frame.
-    fn plane(&mut self, _: &Plane, _: &Geometry, _: &Files) -> Result<(), Error> {
+    fn plane(&mut self, _: &Plane, _: &FrameSummary, _: &Files) -> Result<(), Error> {
         Ok(())
     }
 
-    /// The frame is complete.
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error>;
 
     /// No further frame follows: the files of the shard get their names.
@@ -45,10 +42,10 @@ impl Sink for AtOnce {
 /// A frame of which everything is known.
 #[derive(Debug)]
 pub(crate) struct Field<'a> {
-    pub(crate) geometry: &'a Geometry,
-    pub(crate) summary: &'a FrameSummary,
+    /// Seed of the data set.
+    pub(crate) seed: u64,
+    pub(crate) frame: &'a FrameSummary,
     pub(crate) truth: &'a Truth,
-    /// The truth as COCO.
     pub(crate) document: &'a Document,
     /// Grey levels of the image or, of a stack, with every object in focus.
     pub(crate) picture: &'a [u16],
@@ -57,22 +54,17 @@ pub(crate) struct Field<'a> {
 
 impl<'a> Field<'a> {
     pub(crate) fn new(
-        geometry: &'a Geometry,
-        summary: &'a FrameSummary,
+        seed: u64,
+        frame: &'a FrameSummary,
         truth: &'a Truth,
         document: &'a Document,
         picture: &'a [u16],
     ) -> Self {
-        Self { geometry, summary, truth, document, picture, png: OnceCell::new() }
+        Self { seed, frame, truth, document, picture, png: OnceCell::new() }
     }
 
-    pub(crate) fn index(&self) -> u64 {
-        self.geometry.key.index
-    }
-
-    /// The split of its slide.
     pub(crate) fn split(&self) -> Split {
-        Split::of_slide(self.geometry.key.seed, self.geometry.slide)
+        Split::of_slide(self.seed, self.frame.slide)
     }
 
     /// The picture as PNG, made once for all formats.
@@ -80,24 +72,25 @@ impl<'a> Field<'a> {
         if let Some(png) = self.png.get() {
             return Ok(png);
         }
-        let Geometry { view, bits, channels, .. } = self.geometry;
-        let png = write::png(self.picture, view.width, *channels, *bits, view.pixel_um)?;
+        let FrameSummary { width, channels, bits, pixel_um, .. } = *self.frame;
+        let png = write::png(self.picture, width, channels, bits, pixel_um)?;
         Ok(self.png.get_or_init(|| png))
     }
 }
 
-/// Files of a shard as they are written.
 #[derive(Debug)]
 pub(crate) struct Files<'a> {
     pub(crate) folder: &'a Folder,
     pub(crate) layout: &'a Layout,
+    #[cfg_attr(not(feature = "parquet"), expect(dead_code, reason = "Parquet alone has a file for each split"))]
+    pub(crate) seed: u64,
     pub(crate) shard: u64,
     pub(crate) written: Vec<FileRecord>,
 }
 
 impl<'a> Files<'a> {
-    pub(crate) fn new(folder: &'a Folder, layout: &'a Layout, shard: u64) -> Self {
-        Self { folder, layout, shard, written: Vec::new() }
+    pub(crate) fn new(folder: &'a Folder, layout: &'a Layout, seed: u64, shard: u64) -> Self {
+        Self { folder, layout, seed, shard, written: Vec::new() }
     }
 
     pub(crate) fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
@@ -105,13 +98,11 @@ impl<'a> Files<'a> {
         Ok(())
     }
 
-    /// Encodes and writes a file.
     pub(crate) fn encode(&mut self, name: &str, encoded: io::Result<Vec<u8>>) -> Result<(), Error> {
         let bytes = encoded.map_err(Error::io("encode", &self.folder.path(name)))?;
         self.write(name, &bytes)
     }
 
-    /// Writes the picture of a frame as PNG.
     pub(crate) fn png(&mut self, name: &str, field: &Field) -> Result<(), Error> {
         let bytes = field.png().map_err(Error::io("encode", &self.folder.path(name)))?;
         self.write(name, bytes)

@@ -13,14 +13,14 @@ use serde_json::Value;
 
 use super::flat;
 use super::names::numbered;
-use super::ome::{Levels, description, page};
+use super::ome::{Levels, description, label_tiff, page};
 use super::sink::{Field, Files, Sink};
-use super::written::{LIMITS, Written, differs, is_described};
+use super::written::{LIMITS, Written, is_described};
 use crate::bytes::json;
 use crate::error::{Error, Problem};
 use crate::files::{Folder, Handle, Pending};
-use crate::truth::{Form, Geometry, Split};
-use crate::write::{PageWriter, fits_16_bits, label_png, label_tiff};
+use crate::truth::{FrameSummary, Split};
+use crate::write::{PageWriter, fits_16_bits, label_png};
 
 pub(super) struct Shard {
     tar: tar::Builder<BufWriter<Handle>>,
@@ -70,25 +70,22 @@ pub(crate) fn tar(shard: u64) -> String {
     format!("webdataset/{shard:06}.tar")
 }
 
-pub(super) fn image(shard: u64, index: u64, form: Form) -> String {
-    let ending = if form == Form::Stack { "ome.tif" } else { "png" };
-    format!("{}/{index:06}.{ending}", tar(shard))
+pub(super) fn image(shard: u64, frame: &FrameSummary) -> String {
+    format!("{}/{:06}.{}", tar(shard), frame.index, if frame.is_stack() { "ome.tif" } else { "png" })
 }
 
 pub(super) fn all_in_focus(shard: u64, index: u64) -> String {
     format!("{}/{index:06}.all-in-focus.png", tar(shard))
 }
 
-/// What is known of a frame.
 fn head(field: &Field) -> Value {
     let split = serde_json::json!({
-        "field": Split::of_field(field.geometry.key.seed, field.index()).name(),
+        "field": Split::of_field(field.seed, field.frame.index).name(),
         "slide": field.split().name(),
     });
-    serde_json::json!({ "frame": field.summary, "split": split, "truth": field.document })
+    serde_json::json!({ "frame": field.frame, "split": split, "truth": field.document })
 }
 
-/// A tar file of a data set.
 pub(crate) struct TarFile {
     path: PathBuf,
     archive: tar::Archive<BufReader<File>>,
@@ -98,19 +95,17 @@ impl TarFile {
     pub(crate) fn open(folder: &Folder, name: &str) -> Result<Self, Error> {
         let path = folder.inside(name)?;
         let file = File::open(&path).map_err(|e| match e.kind() {
-            ErrorKind::NotFound => Error::input(&path)(Problem::Missing { wanted: "file" }),
+            ErrorKind::NotFound => Error::input(&path)(Problem::Missing("file")),
             _ => Error::io("read", &path)(e),
         })?;
         Ok(Self { path, archive: tar::Archive::new(BufReader::new(file)) })
     }
 
-    /// Its files, one after the other.
     pub(crate) fn files(&mut self) -> Result<Tar<'_>, Error> {
         let entries = self.archive.entries().map_err(cannot_be_read(&self.path))?;
         Ok(Tar { path: &self.path, entries })
     }
 
-    /// The content of the file of this name.
     pub(crate) fn content(&mut self, name: &str) -> Result<Vec<u8>, Error> {
         let mut files = self.files()?;
         while let Some(entry) = files.entry()? {
@@ -122,13 +117,11 @@ impl TarFile {
     }
 }
 
-/// The files of a tar file, one after the other.
 pub(crate) struct Tar<'a> {
     path: &'a Path,
     entries: tar::Entries<'a, BufReader<File>>,
 }
 
-/// A file in a tar file.
 type Entry<'a> = tar::Entry<'a, BufReader<File>>;
 
 impl<'a> Tar<'a> {
@@ -142,19 +135,19 @@ impl<'a> Tar<'a> {
         Ok(bytes)
     }
 
-    /// Name and content of the next file.
     fn next(&mut self) -> Result<Option<(String, Vec<u8>)>, Error> {
         let Some(entry) = self.entry()? else { return Ok(None) };
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
         Ok(Some((name, self.bytes(entry)?)))
     }
 
-    /// No further file follows.
     pub(crate) fn end(&mut self) -> Result<(), Error> {
         match self.next()? {
             None => Ok(()),
-            Some((name, _)) => differs(&format!("it has a file `{}` of no frame", name.escape_default()))
-                .map_err(Error::input(self.path)),
+            Some((name, _)) => {
+                let what = format!("it has a file `{}` of no frame", name.escape_default());
+                Err(Error::input(self.path)(Problem::unfit(what)))
+            }
         }
     }
 }
@@ -170,9 +163,8 @@ fn cannot_be_read(path: &Path) -> impl Fn(io::Error) -> Error {
 }
 
 pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
-    let (field, key) = (written.field, numbered(written.field.index()));
-    let form = Form::of(field.geometry.planes_um.len());
-    let images: &[&str] = if form == Form::Stack { &["ome.tif", "all-in-focus.png"] } else { &["png"] };
+    let (field, key) = (written.field, numbered(written.field.frame.index));
+    let images: &[&str] = if field.frame.is_stack() { &["ome.tif", "all-in-focus.png"] } else { &["png"] };
     for part in ["json"].iter().chain(images).copied().chain(flat::GROUPS.map(Group::name)) {
         let (name, bytes) = tar.next()?.unwrap_or_default();
         let path = tar.path.join(&name);
@@ -182,18 +174,18 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
             (_, Some(group)) if [".png", ".tif"].iter().any(|end| ending == format!("{part}{end}")) => {
                 written.labels(&bytes, &written.flat(group))
             }
-            ("json", _) if ending == part => match serde_json::from_slice::<Value>(&bytes) {
-                Ok(found) if found == head(field) => Ok(()),
-                Ok(_) => differs("it does not say what the record and coco.json say"),
-                Err(error) => Err(error.into()),
-            },
+            ("json", _) if ending == part => {
+                let found = serde_json::from_slice::<Value>(&bytes).map_err(Problem::from);
+                let same = found.map(|found| found == head(field));
+                same.and_then(|same| Problem::unless(same, "it does not say what the record and coco.json say"))
+            }
             ("ome.tif", _) if ending == part => {
-                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.geometry)))
+                written.planes(&bytes).and_then(|()| is_described(&bytes, &description(field.frame)))
             }
             (_, None) if ending == part => written.picture(&bytes),
             _ => {
                 let what = format!("it has `{}` where {key}.{part} is due", name.escape_default());
-                return differs(&what).map_err(Error::input(tar.path));
+                return Err(Error::input(tar.path)(Problem::unfit(what)));
             }
         };
         looked.map_err(Error::input(&path))?;
@@ -202,28 +194,25 @@ pub(super) fn check(written: &Written, tar: &mut Tar) -> Result<(), Error> {
 }
 
 impl Sink for Shard {
-    fn begin(&mut self, geometry: &Geometry, _: &Files) -> Result<(), Error> {
-        let bytes = geometry.values() as u64 * geometry.planes_um.len() as u64 * 2;
-        self.stack = match Form::of(geometry.planes_um.len()) {
-            Form::Single => None,
-            Form::Stack => {
-                let memory = Memory::default();
-                let writer = PageWriter::new(memory.clone(), bytes);
-                Some((writer.map_err(Error::io("encode", self.pending.path()))?, memory))
-            }
-        };
+    fn begin(&mut self, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
+        self.stack = None;
+        if frame.is_stack() {
+            let (memory, bytes) = (Memory::default(), frame.values() as u64 * frame.planes_um.len() as u64 * 2);
+            let writer = PageWriter::new(memory.clone(), bytes).map_err(Error::io("encode", self.pending.path()))?;
+            self.stack = Some((writer, memory));
+        }
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, _: &Files) -> Result<(), Error> {
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, _: &Files) -> Result<(), Error> {
         let Some((writer, _)) = &mut self.stack else { return Ok(()) };
-        let text = (plane.index == 0).then(|| description(geometry));
-        let written = writer.write(Levels::new(&plane.grey, geometry).pixels(), &page(geometry, text.as_deref()));
+        let text = (plane.index == 0).then(|| description(frame));
+        let written = writer.write(Levels::new(&plane.grey, frame).pixels(), &page(frame, text.as_deref()));
         written.map_err(Error::io("encode", self.pending.path()))
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (key, view) = (numbered(field.index()), field.geometry.view);
+        let key = numbered(field.frame.index);
         let failed = |path| Error::io("encode", path);
         let path = self.pending.path().to_owned();
         self.add(&format!("{key}.json"), &json(&head(field)))?;
@@ -237,8 +226,8 @@ impl Sink for Shard {
         for group in flat::GROUPS {
             let ids = files.layout.flatten.labels(field.truth, group);
             let (ending, bytes) = match fits_16_bits(&ids) {
-                true => ("png", label_png(&ids, view.width, view.pixel_um)),
-                false => ("tif", label_tiff(&ids, view.width, view.pixel_um)),
+                true => ("png", label_png(&ids, field.frame.width, field.frame.pixel_um)),
+                false => ("tif", label_tiff(&ids, field.frame)),
             };
             self.add(&format!("{key}.{}.{ending}", group.name()), &bytes.map_err(failed(&path))?)?;
         }

@@ -4,13 +4,12 @@ use std::cell::OnceCell;
 
 use papsynth::truth::Group;
 
-use super::layout::Layout;
+use super::format::Layout;
 use super::sink::Field;
 use crate::bytes::sha256;
 use crate::error::{Error, Problem};
 use crate::files::Folder;
 use crate::read::{self, LevelImage, Limits};
-use crate::truth::Form;
 
 /// What was written for one frame is read whole.
 pub(crate) const LIMITS: Limits =
@@ -24,10 +23,8 @@ pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     }
 }
 
-/// Takes images one after the other.
 pub(crate) type Take<'a> = dyn FnMut(LevelImage) -> Result<(), Problem> + 'a;
 
-/// Hands over the planes of a file.
 type Read<'a> = dyn FnMut(&mut Take) -> Result<(), Problem> + 'a;
 
 /// A frame of which every file is read again.
@@ -46,7 +43,6 @@ impl<'a> Written<'a> {
         Self { folder, layout, field, planes: OnceCell::new(), picture: OnceCell::new() }
     }
 
-    /// Reads a file and looks at it.
     pub(super) fn file(&self, name: &str, look: impl FnOnce(&[u8]) -> Result<(), Problem>) -> Result<(), Error> {
         let path = self.folder.inside(name)?;
         look(&read::bytes(&path, LIMITS.max_file_bytes)?).map_err(Error::input(&path))
@@ -54,8 +50,7 @@ impl<'a> Written<'a> {
 
     /// All planes are there and of the size that the record says, and the same in every format.
     pub(super) fn planes(&self, bytes: &[u8]) -> Result<(), Problem> {
-        let planes = self.field.geometry.planes_um.len();
-        self.shown(planes, &mut |take| LevelImage::pages(bytes, &LIMITS, take))
+        self.shown(&mut |take| LevelImage::pages(bytes, &LIMITS, take))
     }
 
     /// The one picture of a frame, the same in every format.
@@ -64,44 +59,35 @@ impl<'a> Written<'a> {
     }
 
     /// All planes, handed over by `read`, are there and of the size that the record says, and the same in every format.
-    pub(super) fn shown(&self, planes: usize, read: &mut Read) -> Result<(), Problem> {
-        let seen = if Form::of(planes) == Form::Single { &self.picture } else { &self.planes };
-        self.compare(planes, seen, read)
+    pub(super) fn shown(&self, read: &mut Read) -> Result<(), Problem> {
+        let frame = self.field.frame;
+        self.compare(frame.planes_um.len(), if frame.is_stack() { &self.planes } else { &self.picture }, read)
     }
 
     fn compare(&self, planes: usize, seen: &OnceCell<Vec<String>>, read: &mut Read) -> Result<(), Problem> {
-        let geometry = self.field.geometry;
+        let frame = self.field.frame;
         let mut found = Vec::new();
         read(&mut |page| {
-            if [page.width, page.height()] != [geometry.view.width, geometry.view.height] {
-                return differs("it has not the size that the record says");
-            }
-            let levels = levels(page, geometry.channels);
-            if levels.len() != geometry.values() {
-                return differs("it has not the channels that the record says");
-            }
-            if found.len() >= planes {
-                return differs(&format!("it has more planes than the {planes} that the record says"));
-            }
+            let same_size = [page.width, page.height()] == [frame.width, frame.height];
+            Problem::unless(same_size, "it has not the size that the record says")?;
+            let levels = levels(page, frame.channels);
+            Problem::unless(levels.len() == frame.values(), "it has not the channels that the record says")?;
+            let more = format!("it has more planes than the {planes} that the record says");
+            Problem::unless(found.len() < planes, more)?;
             found.push(sha256(&levels.iter().flat_map(|level| level.to_le_bytes()).collect::<Vec<_>>()));
             Ok(())
         })?;
-        if found.len() != planes {
-            return differs(&format!("it has {} planes, the record says {planes}", found.len()));
-        }
-        match *seen.get_or_init(|| found.clone()) == found {
-            true => Ok(()),
-            false => differs("it shows other pixels than the image in another format"),
-        }
+        let count = found.len();
+        Problem::unless(count == planes, format!("it has {count} planes, the record says {planes}"))?;
+        let same = *seen.get_or_init(|| found.clone()) == found;
+        Problem::unless(same, "it shows other pixels than the image in another format")
     }
 
-    /// A label image is what the masks give.
     pub(super) fn labels(&self, bytes: &[u8], ids: &[u32]) -> Result<(), Problem> {
         let found = read::label_map(bytes, &LIMITS)?;
-        is_of_masks(found.width == self.field.geometry.view.width && found.ids == ids)
+        is_of_masks(found.width == self.field.frame.width && found.ids == ids)
     }
 
-    /// Layers of labels are what the masks give.
     pub(super) fn layers(&self, bytes: &[u8], layers: &[Vec<u32>]) -> Result<(), Problem> {
         let found = read::label_pages(bytes, &LIMITS, layers.len().max(1))?;
         is_of_masks(found.iter().map(|page| &page.ids).eq(layers))
@@ -121,7 +107,7 @@ pub(super) fn is_described(bytes: &[u8], expected: &str) -> Result<(), Problem> 
             .into_iter()
             .find(|name| values(&found, name).ne(values(expected, name)))
             .or_else(|| values(&found, "PositionZ").ne(values(expected, "PositionZ")).then_some("PositionZ"));
-    wrong.map_or(Ok(()), |name| differs(&format!("its OME-XML says another {name} than the record")))
+    wrong.map_or(Ok(()), |name| Err(Problem::unfit(format!("its OME-XML says another {name} than the record"))))
 }
 
 /// All values of an attribute.
@@ -133,10 +119,6 @@ fn values<'x>(xml: &'x str, attribute: &str) -> impl Iterator<Item = &'x str> {
         .into_iter()
 }
 
-fn is_of_masks(holds: bool) -> Result<(), Problem> {
-    if holds { Ok(()) } else { differs("it is not what the masks of coco.json give") }
-}
-
-pub(super) fn differs<T>(what: &str) -> Result<T, Problem> {
-    Err(Problem::differs(what))
+pub(super) fn is_of_masks(holds: bool) -> Result<(), Problem> {
+    Problem::unless(holds, "it is not what the masks of coco.json give")
 }

@@ -5,8 +5,8 @@
 use std::fmt::Write;
 
 use super::sink::{Field, Files};
-use super::written::{Written, differs};
-use crate::error::Error;
+use super::written::Written;
+use crate::error::{Error, Problem};
 use crate::truth::{Split, outlines};
 
 pub(super) fn image(split: Split, index: u64) -> String {
@@ -19,7 +19,7 @@ fn labels(split: Split, index: u64) -> String {
 
 /// The lines of a frame. What no pixel shows has no outline, and no line.
 fn text(field: &Field) -> String {
-    let view = field.geometry.view;
+    let [width, height] = [field.frame.width, field.frame.height].map(|side| side as f64);
     let mut text = String::new();
     for (object, annotation) in field.truth.objects.iter().zip(&field.document.annotations) {
         let mut corners = Vec::new();
@@ -37,7 +37,7 @@ fn text(field: &Field) -> String {
         // Writing to a string cannot fail.
         let _ = write!(text, "{}", annotation.category_id - 1);
         for [x, y] in corners {
-            let [x, y] = [f64::from(x) / view.width as f64, f64::from(y) / view.height as f64];
+            let [x, y] = [f64::from(x) / width, f64::from(y) / height];
             let _ = write!(text, " {x:.6} {y:.6}");
         }
         text.push('\n');
@@ -48,17 +48,16 @@ fn text(field: &Field) -> String {
 pub(super) fn check(written: &Written) -> Result<(), Error> {
     let field = written.field;
     let split = field.split();
-    written.file(&image(split, field.index()), |bytes| written.picture(bytes))?;
-    written.file(&labels(split, field.index()), |bytes| match bytes == text(field).as_bytes() {
-        true => Ok(()),
-        false => differs("its outlines are not those of the masks of coco.json"),
+    written.file(&image(split, field.frame.index), |bytes| written.picture(bytes))?;
+    written.file(&labels(split, field.frame.index), |bytes| {
+        Problem::unless(bytes == text(field).as_bytes(), "its outlines are not those of the masks of coco.json")
     })
 }
 
 pub(super) fn write(field: &Field, files: &mut Files) -> Result<(), Error> {
     let split = field.split();
-    files.png(&image(split, field.index()), field)?;
-    files.write(&labels(split, field.index()), text(field).as_bytes())
+    files.png(&image(split, field.frame.index), field)?;
+    files.write(&labels(split, field.frame.index), text(field).as_bytes())
 }
 
 /// What tells a trainer where the splits lie and what the classes are called. Without a `path`, Ultralytics starts from the folder of the

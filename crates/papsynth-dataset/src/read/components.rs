@@ -63,11 +63,14 @@ pub fn components(labels: &LabelMap, limits: &Limits) -> Result<Vec<Component>, 
         above = first..runs.len();
         // What does not reach the newest row cannot join any more.
         if forest.trees > limits.max_regions.saturating_add(above.len()) {
-            return Err(Problem::Regions { limit: limits.max_regions });
+            break;
         }
     }
     if forest.trees > limits.max_regions {
-        return Err(Problem::Regions { limit: limits.max_regions });
+        let limit = limits.max_regions;
+        return Err(Problem::unfit(format!(
+            "has more than {limit} separate regions; is it a grey image rather than a mask or label image?"
+        )));
     }
     Ok(collect(&runs, &mut forest, width, labels.ids.len() / width))
 }
@@ -106,7 +109,6 @@ fn collect(runs: &[(u32, Run)], forest: &mut Forest, width: usize, height: usize
         .collect()
 }
 
-/// Disjoint sets of runs.
 #[derive(Debug, Default)]
 struct Forest {
     parents: Vec<usize>,

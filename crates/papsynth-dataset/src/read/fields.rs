@@ -8,17 +8,15 @@ use papsynth::truth::LabelMap;
 use super::components::components;
 use super::file::{Limits, bytes, parse};
 use super::image::{LevelImage, read_label_map};
-use super::nucleus::image_files;
+use super::nucleus::{image_files, same_size};
 use crate::error::{Error, Problem};
 use papsynth::white_level as white;
 
 /// The table that says which group each image of a folder belongs to.
 const GROUPS: &str = "frames.csv";
 
-/// Its columns.
 const GROUP_COLUMNS: [&str; 2] = ["frame", "grade"];
 
-/// Largest table that is read.
 const TABLE_BYTES: u64 = 1 << 26;
 
 /// Bits that cameras fill 16-bit files with.
@@ -115,11 +113,7 @@ impl FieldFile {
             }
             NucleiFile::Labels(path) => {
                 let labels = read_label_map(path, limits)?;
-                let size = |width: usize, len: usize| [width, len / width.max(1)];
-                let (mask, own) = (size(labels.width, labels.ids.len()), size(image.width, grey.len()));
-                if mask != own {
-                    return Err(Error::input(path)(Problem::MaskSize { mask, image: own }));
-                }
+                same_size(&labels, [image.width, grey.len()]).map_err(Error::input(path))?;
                 FieldNuclei::Labels(separate(labels, limits).map_err(Error::input(path))?)
             }
         };
@@ -202,13 +196,13 @@ fn points(bytes: &[u8]) -> Result<Vec<[f64; 2]>, Problem> {
 fn within(points: &[[f64; 2]], image: [usize; 2]) -> Result<(), Problem> {
     let inside = |p: &[f64; 2]| (0..2).all(|axis| (-0.5..image[axis] as f64 - 0.5).contains(&p[axis]));
     let outside = points.iter().filter(|p| !inside(p)).count();
-    if 2 * outside > points.len() {
-        return Err(Problem::PointsOutside { outside, count: points.len(), image });
-    }
-    Ok(())
+    let (count, [width, height]) = (points.len(), image);
+    let what = format!(
+        "{outside} of {count} points lie outside the image of {width} x {height} pixels; the columns wanted are y,x in pixels"
+    );
+    Problem::unless(2 * outside <= count, what)
 }
 
-/// The group of each image, by its name.
 fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     let mut rows = rows(bytes)?.into_iter();
     match rows.next() {
@@ -217,7 +211,6 @@ fn groups(bytes: &[u8]) -> Result<BTreeMap<String, String>, Problem> {
     }
 }
 
-/// Lines of two values.
 fn rows(bytes: &[u8]) -> Result<Vec<(u64, [String; 2])>, Problem> {
     let mut reader =
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
@@ -254,10 +247,8 @@ mod tests {
         let image = [100, 50];
         assert_eq!(within(&[], image), Ok(()));
         assert_eq!(within(&[[99.4, 49.0], [-3.0, 2.0]], image), Ok(()));
-        assert!(matches!(
-            within(&[[10.0, 90.0], [-3.0, 2.0], [1.0, 1.0]], image),
-            Err(Problem::PointsOutside { outside: 2, count: 3, .. })
-        ));
+        let refused = within(&[[10.0, 90.0], [-3.0, 2.0], [1.0, 1.0]], image).unwrap_err().to_string();
+        assert!(refused.starts_with("2 of 3 points"), "{refused}");
     }
 
     #[test]

@@ -41,7 +41,6 @@ impl Limits {
     }
 }
 
-/// Reads a file and parses it.
 pub(super) fn parse<T>(
     path: &Path,
     limits: &Limits,
@@ -53,9 +52,7 @@ pub(super) fn parse<T>(
 /// The bytes of a file of at most `limit` bytes.
 pub(crate) fn bytes(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::input(path)(Problem::Missing { wanted: "file" })
-        }
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(path)(Problem::Missing("file")),
         io::ErrorKind::IsADirectory => Error::input(path)(Problem::Folder),
         _ => Error::io("read", path)(e),
     };

@@ -5,8 +5,7 @@ use std::path::Path;
 use papsynth::truth::LabelMap;
 
 use super::file::{Limits, parse};
-use super::png::{self, Meaning};
-use super::raster::{Channels, Raster, Samples};
+use super::raster::{Channels, Meaning, Raster, Samples, decode_png};
 use super::tiff;
 use crate::error::{Error, Problem};
 
@@ -131,9 +130,7 @@ fn levels(samples: Samples) -> Result<(Vec<u16>, u16), Problem> {
     match samples {
         Samples::U8(samples) => Ok((samples.into_iter().map(u16::from).collect(), u8::MAX.into())),
         Samples::U16(samples) => Ok((samples, u16::MAX)),
-        Samples::U32(_) | Samples::F32(_) => {
-            Err(Problem::Samples { found: "32 bit samples".to_owned(), accepted: "8 or 16 bit grey images" })
-        }
+        Samples::U32(_) | Samples::F32(_) => Err(Problem::samples("32 bit samples", "8 or 16 bit grey images")),
     }
 }
 
@@ -165,10 +162,7 @@ fn labels(raster: Raster) -> Result<LabelMap, Problem> {
         Samples::U16(samples) => samples.into_iter().map(u32::from).collect(),
         Samples::U32(samples) => samples,
         Samples::F32(_) => {
-            return Err(Problem::Samples {
-                found: "floating-point samples".to_owned(),
-                accepted: "8, 16 or 32 bit labels",
-            });
+            return Err(Problem::samples("floating-point samples", "8, 16 or 32 bit labels"));
         }
     };
     Ok(LabelMap { width, ids })
@@ -182,20 +176,18 @@ pub fn read_label_map(path: &Path, limits: &Limits) -> Result<LabelMap, Error> {
     parse(path, limits, |bytes| label_map(bytes, limits))
 }
 
-/// The one image of a file.
 pub(super) fn decode(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
     if bytes.starts_with(PNG_SIGNATURE) {
-        png::decode(bytes, limits, meaning)
+        decode_png(bytes, limits, meaning)
     } else if is_tiff(bytes) {
         tiff::decode(bytes, limits)
     } else if bytes.len() < PNG_SIGNATURE.len() && PNG_SIGNATURE.starts_with(bytes) && !bytes.is_empty() {
-        Err(Problem::Truncated { format: "PNG" })
+        Err(Problem::Truncated("PNG"))
     } else {
         Err(Problem::Format)
     }
 }
 
-/// Whether a file begins as a TIFF does.
 pub(super) fn is_tiff(bytes: &[u8]) -> bool {
     TIFF_SIGNATURES.iter().any(|s| bytes.starts_with(s))
 }

@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use papsynth::truth::LabelMap;
+use papsynth::truth::{Bounds, LabelMap};
 
 use super::components::components;
 use super::file::Limits;
@@ -32,26 +32,34 @@ impl NucleusSample {
     /// # Errors
     /// If the mask is of another size, is empty, is a single pixel, or falls into several components.
     pub fn new(name: &str, image: GreyImage, mask: &LabelMap) -> Result<Self, Problem> {
-        let size = |width: usize, len: usize| [width, len / width.max(1)];
-        let (image_size, mask_size) = (size(image.width, image.grey.len()), size(mask.width, mask.ids.len()));
-        if image_size != mask_size {
-            return Err(Problem::MaskSize { mask: mask_size, image: image_size });
-        }
+        same_size(mask, [image.width, image.grey.len()])?;
         let inside = LabelMap { width: mask.width, ids: mask.ids.iter().map(|&id| id.min(1)).collect() };
         let limits = Limits { max_regions: usize::MAX, ..Limits::default() };
         let parts = components(&inside, &limits)?;
         match parts.as_slice() {
-            [] => Err(Problem::EmptyMask),
+            [] => Err(Problem::unfit("the mask is empty: no pixel of it is above 0")),
             [one] => match (one.mask.area(), one.mask.bounds()) {
-                (1, Some(bounds)) => Err(Problem::SinglePixel { x: bounds.x, y: bounds.y }),
+                (1, Some(Bounds { x, y, .. })) => {
+                    Err(Problem::unfit(format!("the mask is a single pixel, at ({x}, {y}); a nucleus must have more")))
+                }
                 _ => {
                     let mask = inside.ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect();
                     Ok(Self { name: name.to_owned(), image, mask })
                 }
             },
-            many => Err(Problem::Components { count: many.len() }),
+            many => {
+                let count = many.len();
+                Err(Problem::unfit(format!("the mask falls into {count} separate components; a nucleus must be one")))
+            }
         }
     }
+}
+
+/// A mask is as large as its image, whose width and number of pixels these are.
+pub(super) fn same_size(mask: &LabelMap, [width, pixels]: [usize; 2]) -> Result<(), Problem> {
+    let (rows, due) = (mask.ids.len() / mask.width.max(1), pixels / width.max(1));
+    let sizes = format!("the mask is {} x {rows}, its image {width} x {due}; both must be the same", mask.width);
+    Problem::unless([mask.width, rows] == [width, due], sizes)
 }
 
 /// Reads every nucleus of a folder that has the folders `images` and `masks`; see [`read_pairs`].
@@ -73,7 +81,8 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
         [(&images, &masks, "mask", masks_folder), (&masks, &images, "image", images_folder)]
     {
         if let Some((_, path)) = files.iter().find(|(name, _)| !others.contains_key(*name)) {
-            return Err(Error::input(path)(Problem::Unpaired { wanted, folder: elsewhere.display().to_string() }));
+            let problem = format!("has no {wanted} of the same name in {}", elsewhere.display());
+            return Err(Error::input(path)(Problem::unfit(problem)));
         }
     }
     let pairs = images.iter().zip(masks.values());
@@ -93,9 +102,7 @@ pub fn read_pairs(images_folder: &Path, masks_folder: &Path, limits: &Limits) ->
 /// If there is none, or two differ only in their endings.
 pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
     let failed = |e: io::Error| match e.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-            Error::input(folder)(Problem::Missing { wanted: "folder" })
-        }
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Error::input(folder)(Problem::Missing("folder")),
         _ => Error::io("read", folder)(e),
     };
     let mut found = BTreeMap::new();
@@ -108,7 +115,8 @@ pub fn image_files(folder: &Path) -> Result<BTreeMap<String, PathBuf>, Error> {
             continue;
         }
         if let Some(other) = found.insert(name, path.clone()) {
-            return Err(Error::input(&path)(Problem::Ambiguous { other: other.display().to_string() }));
+            let problem = format!("has the same name as {}, apart from its ending", other.display());
+            return Err(Error::input(&path)(Problem::unfit(problem)));
         }
     }
     if found.is_empty() {

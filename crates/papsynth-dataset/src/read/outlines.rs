@@ -5,7 +5,6 @@ use std::path::Path;
 use super::file::{Limits, parse};
 use crate::error::{Error, Problem};
 
-/// The columns of a table of outlines.
 const COLUMNS: [&str; 4] = ["outline", "k", "x_px", "y_px"];
 
 /// A closed outline of fewer points has no area.

@@ -1,5 +1,10 @@
-//! What both image formats decode to, before it is known what it is for.
+//! What both image formats decode to, before it is known what it is for; and PNG.
 
+use std::io::{Cursor, ErrorKind};
+
+use png::{BitDepth, ColorType, Decoder, DecodingError, Transformations};
+
+use super::file::Limits;
 use crate::error::Problem;
 
 /// Samples as they stand in the file, row by row, channels interleaved.
@@ -72,4 +77,62 @@ fn grey<T: Copy + PartialEq>(samples: Vec<T>, channels: Channels, opaque: T, wid
             Err(Problem::NotGrey { what, x: i % width, y: i / width })
         })
         .collect()
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meaning {
+    /// Brightness: fewer than 8 bits are widened to the full range, a palette is looked up.
+    Brightness,
+    /// Labels: kept as they are; of a palette, the indices.
+    Labels,
+}
+
+/// What the decoder may allocate for chunks other than the image: none of them is used.
+const CHUNK_BYTES: usize = 1 << 20;
+
+pub(super) fn decode_png(bytes: &[u8], limits: &Limits, meaning: Meaning) -> Result<Raster, Problem> {
+    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: CHUNK_BYTES });
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let header = decoder.read_header_info().map_err(problem)?;
+    limits.check(header.width, header.height)?;
+    decoder.set_transformations(match meaning {
+        Meaning::Brightness => Transformations::EXPAND,
+        Meaning::Labels => Transformations::IDENTITY,
+    });
+    let mut reader = decoder.read_info().map_err(problem)?;
+    let size = reader.output_buffer_size().ok_or_else(|| problem(DecodingError::LimitsExceeded))?;
+    let mut buffer = vec![0; size];
+    let frame = reader.next_frame(&mut buffer).map_err(problem)?;
+    // To the end: a file that lacks only its last chunk was cut, too.
+    reader.finish().map_err(problem)?;
+    let width = frame.width as usize;
+    let channels = match frame.color_type {
+        ColorType::Grayscale | ColorType::Indexed => Channels::Grey,
+        ColorType::GrayscaleAlpha => Channels::GreyAlpha,
+        ColorType::Rgb => Channels::Rgb,
+        ColorType::Rgba => Channels::Rgba,
+    };
+    let samples = match frame.bit_depth {
+        BitDepth::Sixteen => Samples::U16(buffer.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()),
+        BitDepth::Eight => Samples::U8(buffer),
+        narrow => Samples::U8(unpack(&buffer, narrow as usize, width, frame.line_size)),
+    };
+    Ok(Raster { width, channels, samples })
+}
+
+/// Samples of 1, 2 or 4 bits, of which the first stands in the highest bits of a byte; rows begin at a byte.
+fn unpack(rows: &[u8], bits: usize, width: usize, line_size: usize) -> Vec<u8> {
+    let mask = u8::MAX >> (8 - bits);
+    let row = |line: &[u8]| -> Vec<u8> {
+        (0..width).map(|x| (line[x * bits / 8] >> (8 - bits - x * bits % 8)) & mask).collect()
+    };
+    rows.chunks_exact(line_size).flat_map(row).collect()
+}
+
+fn problem(error: DecodingError) -> Problem {
+    match error {
+        DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated("PNG"),
+        other => Problem::broken("PNG", other),
+    }
 }

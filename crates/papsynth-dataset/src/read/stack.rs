@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use super::file::{Limits, bytes};
 use super::image::{decode, is_tiff};
 use super::nucleus::image_files;
-use super::png::Meaning;
-use super::raster::{Raster, Samples};
+use super::raster::{Meaning, Raster, Samples};
 use super::tiff;
 use crate::error::{Error, Problem};
 
@@ -62,7 +61,6 @@ impl Stack {
         self.planes.first().map_or(0, |plane| plane.len() / self.width.max(1))
     }
 
-    /// Adds the planes of a file.
     fn add(&mut self, bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
         if is_tiff(bytes) {
             tiff::pages(bytes, limits, &mut |raster| self.push(raster))
@@ -81,15 +79,23 @@ impl Stack {
             Samples::F32(samples) => samples,
         };
         if plane.iter().any(|v| !v.is_finite()) {
-            let found = "samples that are infinite or no numbers".to_owned();
-            return Err(Problem::Samples { found, accepted: "finite grey samples" });
+            return Err(Problem::samples("samples that are infinite or no numbers", "finite grey samples"));
         }
         let (found, first) = ([width, plane.len() / width.max(1)], [self.width, self.height()]);
         if !self.planes.is_empty() && found != first {
-            return Err(Problem::PlaneSize { plane: self.planes.len(), found, first });
+            return Err(Problem::unfit(format!(
+                "plane {} is {} x {}, the first {} x {}; all must be the same",
+                self.planes.len(),
+                found[0],
+                found[1],
+                first[0],
+                first[1]
+            )));
         }
         if (self.planes.len() as u64 + 1) * plane.len() as u64 > MOST_PIXELS {
-            return Err(Problem::StackSize { limit: MOST_PIXELS });
+            return Err(Problem::unfit(format!(
+                "the stack has more than {MOST_PIXELS} pixels up to this file; crop it, or take fewer planes"
+            )));
         }
         self.width = width;
         self.planes.push(plane);

@@ -19,18 +19,15 @@ const CHUNKY: u16 = 1;
 /// At one of the images of a file.
 type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
 
-/// The one image of a file.
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(problem)?;
     if decoder.more_images() {
         // What is wrong with the first is told before.
         shape(&mut decoder, limits, ACCEPTED)?;
-        return Err(Problem::Pages);
+        return Err(Problem::unfit("holds several images; accepted is one image a file"));
     }
     match page(decoder, limits, ACCEPTED)?.0 {
-        Raster { samples: Samples::F32(_), .. } => {
-            Err(Problem::Samples { found: "floating-point samples".to_owned(), accepted: ACCEPTED })
-        }
+        Raster { samples: Samples::F32(_), .. } => Err(Problem::samples("floating-point samples", ACCEPTED)),
         raster => Ok(raster),
     }
 }
@@ -66,7 +63,7 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
         tiff_limits.decoding_buffer_size = (width as usize * height as usize).saturating_mul(12);
         decoder = decoder.with_limits(tiff_limits);
         let DecodingResult::F32(samples) = decoder.read_image().map_err(problem)? else {
-            return Err(Problem::Samples { found: "whole numbers".to_owned(), accepted: "floating-point samples" });
+            return Err(Problem::samples("whole numbers", "floating-point samples"));
         };
         pages.push(samples);
         if !decoder.more_images() {
@@ -80,7 +77,7 @@ pub(crate) fn float_pages(bytes: &[u8], limits: &Limits, most: usize) -> Result<
 }
 
 pub(super) fn too_many(most: usize) -> Problem {
-    Problem::differs(format!("it has more than {most} pages"))
+    Problem::unfit(format!("it has more than {most} pages"))
 }
 
 /// What the first page of a file says that it shows, if it says anything.
@@ -100,16 +97,15 @@ fn shape(decoder: &mut Reader, limits: &Limits, accepted: &'static str) -> Resul
         ColorType::GrayA(8 | 16) => Channels::GreyAlpha,
         ColorType::RGB(8 | 16) => Channels::Rgb,
         ColorType::RGBA(8 | 16) => Channels::Rgba,
-        other => return Err(Problem::Samples { found: format!("{other:?} samples"), accepted }),
+        other => return Err(Problem::samples(format!("{other:?} samples"), accepted)),
     };
     let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).map_err(problem)?;
     if channels.count() > 1 && planar.is_some_and(|p| p != CHUNKY) {
-        return Err(Problem::Samples { found: "channels in separate planes".to_owned(), accepted });
+        return Err(Problem::samples("channels in separate planes", accepted));
     }
     Ok((width as usize, width as usize * height as usize, channels))
 }
 
-/// The image that the decoder is at.
 fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) -> Result<(Raster, Reader<'a>), Problem> {
     let (width, pixels, channels) = shape(&mut decoder, limits, accepted)?;
     let mut tiff_limits = tiff::decoder::Limits::default();
@@ -117,21 +113,15 @@ fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) ->
     tiff_limits.decoding_buffer_size = pixels.saturating_mul(8);
     tiff_limits.intermediate_buffer_size = pixels.saturating_mul(8).max(1 << 20);
     let mut decoder = decoder.with_limits(tiff_limits);
-    let samples = match decoder.read_image().map_err(problem)? {
-        DecodingResult::U8(samples) => Samples::U8(samples),
-        DecodingResult::U16(samples) => Samples::U16(samples),
-        DecodingResult::U32(samples) => Samples::U32(samples),
-        DecodingResult::F32(samples) => Samples::F32(samples),
+    let (found, samples) = match decoder.read_image().map_err(problem)? {
+        DecodingResult::U8(samples) => (samples.len(), Samples::U8(samples)),
+        DecodingResult::U16(samples) => (samples.len(), Samples::U16(samples)),
+        DecodingResult::U32(samples) => (samples.len(), Samples::U32(samples)),
+        DecodingResult::F32(samples) => (samples.len(), Samples::F32(samples)),
         DecodingResult::F16(_) | DecodingResult::F64(_) => {
-            return Err(Problem::Samples { found: "floating-point samples".to_owned(), accepted });
+            return Err(Problem::samples("floating-point samples", accepted));
         }
-        _ => return Err(Problem::Samples { found: "signed or 64 bit samples".to_owned(), accepted }),
-    };
-    let found = match &samples {
-        Samples::U8(s) => s.len(),
-        Samples::U16(s) => s.len(),
-        Samples::U32(s) => s.len(),
-        Samples::F32(s) => s.len(),
+        _ => return Err(Problem::samples("signed or 64 bit samples", accepted)),
     };
     if found != pixels * channels.count() {
         return Err(Problem::broken("TIFF", format!("{found} samples for {pixels} pixels")));
@@ -141,7 +131,7 @@ fn page<'a>(mut decoder: Reader<'a>, limits: &Limits, accepted: &'static str) ->
 
 fn problem(error: TiffError) -> Problem {
     match error {
-        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated { format: "TIFF" },
+        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => Problem::Truncated("TIFF"),
         other => Problem::broken("TIFF", other),
     }
 }

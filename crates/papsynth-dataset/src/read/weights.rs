@@ -12,29 +12,6 @@ use super::image::{GreyImage, PNG_SIGNATURE, label_map};
 use crate::bytes::sha256;
 use crate::error::{Error, Problem};
 
-/// Brightness as weight: 0 where black, 1 at the file's largest grey level.
-///
-/// # Errors
-/// If every pixel is black.
-pub fn weights(image: &GreyImage) -> Result<WeightMap, Problem> {
-    possible(WeightMap { width: image.width, weights: image.fractions() })
-}
-
-/// Weight 1 where a label lies, else 0.
-///
-/// # Errors
-/// If there is no label.
-pub fn label_weights(labels: &LabelMap) -> Result<WeightMap, Problem> {
-    possible(WeightMap {
-        width: labels.width,
-        weights: labels.ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect(),
-    })
-}
-
-fn possible(map: WeightMap) -> Result<WeightMap, Problem> {
-    if map.weights.iter().any(|&w| w > 0.0) { Ok(map) } else { Err(Problem::NoWeight) }
-}
-
 /// A file that a recipe names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
@@ -56,14 +33,23 @@ pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Resul
     };
     let found = folder.join(&path);
     let bytes = bytes(&found, limits.max_file_bytes)?;
-    let map = match is_grey {
-        true => GreyImage::decode(&bytes, limits).and_then(|image| weights(&image)),
-        false => label_map(&bytes, limits).and_then(|labels| label_weights(&labels)),
-    };
-    let map = map.map_err(Error::input(&found))?;
+    let map = weights(&bytes, is_grey, limits).map_err(Error::input(&found))?;
     *path = content_name(&bytes);
     let file = InputFile { name: path.clone(), bytes };
     Ok((Inputs { weight_map: Some(map), ..Inputs::default() }, Some(file)))
+}
+
+/// Of an image brightness as weight, 0 where black and 1 at the file's largest grey level; of labels 1 where one lies.
+fn weights(bytes: &[u8], is_grey: bool, limits: &Limits) -> Result<WeightMap, Problem> {
+    let map = if is_grey {
+        let image = GreyImage::decode(bytes, limits)?;
+        WeightMap { width: image.width, weights: image.fractions() }
+    } else {
+        let LabelMap { width, ids } = label_map(bytes, limits)?;
+        WeightMap { width, weights: ids.iter().map(|&id| if id > 0 { 1.0 } else { 0.0 }).collect() }
+    };
+    let has_place = map.weights.iter().any(|&w| w > 0.0);
+    Problem::unless(has_place, "every pixel is 0, so that no place is allowed; some must be above 0").map(|()| map)
 }
 
 /// The name of a map in a data set: by the beginning of its SHA-256.

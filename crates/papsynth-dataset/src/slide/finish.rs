@@ -6,8 +6,8 @@ use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid, Sample, halved, halved_labels};
 use sha2::{Digest, Sha256};
 
-use super::document::{LAYERS, folder};
 use super::read::parts;
+use super::record::{LAYERS, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place};
 use crate::bytes::hex;
 use crate::error::Error;
@@ -196,7 +196,6 @@ impl SlideSet {
 
 #[cfg(test)]
 mod tests {
-    use std::io;
     use std::path::Path;
     use std::sync::atomic::AtomicBool;
 
@@ -208,7 +207,6 @@ mod tests {
     use super::*;
     use crate::dataset::Share;
     use crate::files::fault;
-    use crate::support::{Scratch, contents};
 
     #[test]
     fn wherever_the_disk_fails_no_file_is_partial_and_the_next_run_completes_the_slide() {
@@ -232,25 +230,7 @@ mod tests {
             set.make(&slide, &run, &|_| ())?;
             set.finish(Check::Sizes)
         };
-        let good = Scratch::new("slide-faults-none");
-        make(good.path()).unwrap();
-        let expected = contents(good.path());
-        let mut failures = 0;
-        for passed in (0..60).chain((60..).step_by(7)) {
-            let scratch = Scratch::new("slide-faults");
-            let kinds = [io::ErrorKind::StorageFull, io::ErrorKind::PermissionDenied, io::ErrorKind::Other];
-            fault::KIND.set(kinds[failures % 3]);
-            fault::LEFT.set(Some(passed));
-            let result = make(scratch.path());
-            fault::LEFT.set(None);
-            let Err(error) = result else { break };
-            failures += 1;
-            assert!(error.is_io() && error.to_string().contains(&*scratch.path().to_string_lossy()), "{error}");
-            let there = contents(scratch.path());
-            assert!(there.iter().all(|file| expected.contains(file)), "after {passed} calls");
-            make(scratch.path()).unwrap();
-            assert_eq!(contents(scratch.path()), expected, "after {passed} calls");
-        }
+        let failures = fault::everywhere("slide-faults", 60, "", make);
         assert!(failures > 60, "{failures}");
     }
 }

@@ -9,7 +9,6 @@
 //! | `shards/ROW-COLUMN.json` | files of a shard with sizes and hashes, written last: the shard is whole |
 //! | `upper.json` | the same of what [`SlideSet::finish`] adds: the upper levels, `thumbnail.png`, `README.md` |
 
-mod document;
 mod finish;
 mod read;
 mod record;

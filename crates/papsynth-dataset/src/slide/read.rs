@@ -6,7 +6,7 @@ use std::ops::Range;
 use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid, Sample, ShardReader};
 
-use super::document::folder;
+use super::record::folder;
 use super::set::{SlideSet, UPPER, place};
 use crate::error::Error;
 

@@ -1,22 +1,25 @@
-//! What a slide is, and what of it is whole.
+//! What a slide is, what of it is whole, and how it is an OME-Zarr image.
 
 use papsynth::Slide;
 use papsynth::model::Model;
 use papsynth::recipe::Recipe;
+use papsynth::truth::Group;
+use papsynth_zarr::{Form, Image, Kind, Labels, Pyramid, Space, Tiling, levels_until};
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, json};
 
-use crate::bytes::{json, json_lines, sha256};
-use crate::dataset::{Identity, WRITER, lies_inside, nested};
+use crate::bytes::{self, json_lines, sha256};
+use crate::dataset::{Identity, SLIDE, WRITER, lies_inside};
 use crate::error::{Error, Problem};
 use crate::files::{FileRecord, Folder};
+use crate::formats::channels;
 
 /// Name of the file that says what a slide is made from.
-pub(super) const HEAD: &str = nested::SLIDE[0];
+pub(super) const HEAD: &str = SLIDE[0];
 
-const FORMAT: &str = nested::SLIDE[1];
+const FORMAT: &str = SLIDE[1];
 const VERSION: u32 = 1;
 
-/// Largest record that is read back.
 pub(super) const RECORD_BYTES: u64 = 1 << 26;
 
 /// What a slide is made from.
@@ -134,7 +137,6 @@ impl SlideHead {
         sha256(&self.to_json())
     }
 
-    /// In what it differs from another.
     pub(super) fn differs(&self, other: &Self) -> Option<&'static str> {
         let (a, b) = (&self.identity, &other.identity);
         let pairs = [
@@ -173,7 +175,7 @@ impl SlideRecord {
 
     fn sealed(self) -> Self {
         let open = Self { sha256: String::new(), ..self };
-        Self { sha256: sha256(&json(&open)), ..open }
+        Self { sha256: sha256(&bytes::json(&open)), ..open }
     }
 
     pub(super) fn to_json(&self) -> Vec<u8> {
@@ -197,5 +199,86 @@ impl SlideRecord {
             return said("is not as it was written: it says the same in other bytes");
         }
         Ok(record)
+    }
+}
+
+const CHUNK: usize = 512;
+
+pub(super) const IMAGE: &str = "slide.ome.zarr";
+
+/// Name of the label image that counts cytoplasms.
+pub(super) const LAYERS: &str = "layers";
+
+#[derive(Debug)]
+pub(super) struct Forms {
+    pub(super) image: Pyramid,
+    pub(super) labels: Pyramid,
+    pub(super) layers: Pyramid,
+}
+
+impl Forms {
+    pub(super) fn new(head: &SlideHead) -> Result<Self, papsynth_zarr::Error> {
+        let (width, height) = (head.width_px as usize, head.height_px as usize);
+        let form = |kind, channels, planes| {
+            let form = Form {
+                kind,
+                channels,
+                planes,
+                height,
+                width,
+                tiling: Tiling { chunk: CHUNK, shard: head.shard_px as usize, planes: 1 },
+                levels: levels_until(CHUNK, width, height),
+            };
+            Pyramid::new(&form)
+        };
+        let kind = if head.bits <= 8 { Kind::U8 } else { Kind::U16 };
+        let planes = (head.planes_um.len() > 1).then_some(head.planes_um.len());
+        let channels = (head.channels > 1).then_some(head.channels);
+        Ok(Self {
+            image: form(kind, channels, planes)?,
+            labels: form(Kind::U32, None, None)?,
+            layers: form(Kind::U16, None, None)?,
+        })
+    }
+
+    /// The documents of the image, by their paths in the slide's folder.
+    pub(super) fn documents(&self, head: &SlideHead) -> Result<Vec<(String, Vec<u8>)>, papsynth_zarr::Error> {
+        let labels = |name: &str, pyramid: &Pyramid| Labels {
+            name: name.to_owned(),
+            pyramid: pyramid.clone(),
+            colors: Vec::new(),
+            properties: Vec::new(),
+        };
+        let planes = &head.planes_um;
+        let image = Image {
+            name: format!("papsynth slide {} of seed {}", head.slide, head.identity.seed),
+            pyramid: self.image.clone(),
+            space: Space {
+                pixel_um: head.pixel_um,
+                step_um: planes.get(1).map_or(1.0, |second| second - planes[0]),
+                first_um: planes[0],
+            },
+            channels: channels(head.channels, head.bits),
+            plane: planes.len() / 2,
+            labels: Group::ALL
+                .iter()
+                .map(|group| labels(group.name(), &self.labels))
+                .chain([labels(LAYERS, &self.layers)])
+                .collect(),
+            attributes: Map::from_iter([(
+                "papsynth".to_owned(),
+                json!({ "seed": head.identity.seed, "slide": head.slide, "recipe_sha256": head.identity.recipe_sha256 }),
+            )]),
+        };
+        let documents = image.documents()?.into_iter();
+        Ok(documents.map(|(path, bytes)| (format!("{IMAGE}/{path}"), bytes)).collect())
+    }
+}
+
+/// The folder of a level of the image, or of the labels of a name.
+pub(super) fn folder(labels: Option<&str>, level: usize) -> String {
+    match labels {
+        None => format!("{IMAGE}/{level}"),
+        Some(name) => format!("{IMAGE}/labels/{name}/{level}"),
     }
 }

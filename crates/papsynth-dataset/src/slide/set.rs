@@ -1,15 +1,13 @@
 //! The folder of a slide: begun, resumed, looked at.
 
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 
 use papsynth::Slide;
 use papsynth_zarr::Shard;
 
-use super::document::{Forms, IMAGE};
-use super::record::{HEAD, RECORD_BYTES, SlideHead, SlideInfo, SlideRecord};
-use crate::dataset::{Identity, difference, nested, stranger};
+use super::record::{Forms, HEAD, IMAGE, RECORD_BYTES, SlideHead, SlideInfo, SlideRecord};
+use crate::dataset::{Identity, recipe_difference, refuse_nested, stranger};
 use crate::error::Error;
 use crate::files::{Check, FileRecord, Folder};
 use crate::formats::{HAS_PARQUET, names};
@@ -17,7 +15,6 @@ use crate::formats::{HAS_PARQUET, names};
 /// Name of the record of what was added at the end.
 pub(super) const UPPER: &str = "upper.json";
 
-/// Names of the small picture and of the card.
 pub(super) const THUMBNAIL: &str = "thumbnail.png";
 pub(super) const CARD: &str = "README.md";
 
@@ -48,7 +45,7 @@ impl SlideSet {
         match stranger(&set.folder)? {
             // Of several that begin at once one is the first.
             None => {
-                nested::refuse(&set.folder)?;
+                refuse_nested(&set.folder)?;
                 look_at_the_middle(slide)?;
                 if !set.folder.write_unless_there(HEAD, |out| out.bytes(&text))? {
                     set.compare_or_restore(&recipe)?;
@@ -86,7 +83,7 @@ impl SlideSet {
         };
         let Some(what) = found.differs(&self.head) else { return Ok(()) };
         let same_recipe = found.identity.recipe_sha256 == self.head.identity.recipe_sha256;
-        let field = if same_recipe { String::new() } else { difference::of_recipe(&self.folder, recipe) };
+        let field = if same_recipe { String::new() } else { recipe_difference(&self.folder, recipe) };
         let message =
             format!("holds a slide of another {what}{field}; choose another folder, or give what it was begun with");
         Err(Error::folder(self.path(), message))
@@ -162,12 +159,7 @@ impl SlideSet {
 
     pub(super) fn recorded(&self, name: &str, check: Check) -> Result<Option<SlideRecord>, Error> {
         let Some(record) = self.record(name)? else { return Ok(None) };
-        for file in &record.files {
-            if self.folder.flaw(file, check)?.is_some() {
-                return Ok(None);
-            }
-        }
-        Ok(Some(record))
+        Ok(self.folder.first_flaw(&record.files, check)?.is_none().then_some(record))
     }
 
     /// A record, if it is there and of this slide.
@@ -206,19 +198,6 @@ impl SlideSet {
         let record = SlideRecord::new(self.head.sha256(), files, objects);
         let written = self.folder.write(name, &record.to_json())?;
         self.folder.sync_names([&written])
-    }
-
-    /// Writes a file whose bytes come piece by piece.
-    pub(super) fn write_pieces(
-        &self,
-        name: &str,
-        fill: impl FnOnce(&mut dyn Write) -> Result<(), Error>,
-    ) -> Result<FileRecord, Error> {
-        let pending = self.folder.pending(name)?;
-        let mut handle = pending.handle()?;
-        fill(&mut handle)?;
-        drop(handle);
-        pending.commit()
     }
 }
 

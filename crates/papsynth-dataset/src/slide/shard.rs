@@ -7,14 +7,14 @@ use papsynth::{Slide, Threads};
 use papsynth_zarr::{Array, Pyramid, Sample, ShardEncoder, halved, halved_labels};
 use serde_json::{Value, json};
 
-use super::document::{LAYERS, folder};
+use super::record::{LAYERS, folder};
 use super::set::{SlideSet, name_of, place, record_name};
 use crate::bytes;
 use crate::dataset::Share;
 use crate::error::Error;
-use crate::files::{Check, FileRecord};
+use crate::files::{Check, FileRecord, Output};
 use crate::formats::parquet::Table;
-use crate::truth::{collection, slide_cells, slide_columns, slide_table};
+use crate::truth::{Row, collection, slide_columns, slide_table};
 
 /// Which shards to make, and how.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,7 @@ impl SlideSet {
         if self.head.objects_parquet {
             let pending = self.folder.pending(&format!("objects/{name}.parquet"))?;
             let mut table = Table::begin(pending.handle()?, pending.path(), slide_columns())?;
-            objects.iter().try_for_each(|object| table.row(slide_cells(object)))?;
+            Row::of_slide(objects).try_for_each(|row| table.row(&row))?;
             table.end()?;
             files.push(pending.commit()?);
         }
@@ -143,7 +143,6 @@ impl SlideSet {
         Ok(files)
     }
 
-    /// Writes one shard of one array.
     pub(super) fn write_array<T: Sample>(
         &self,
         array: &Array,
@@ -156,13 +155,11 @@ impl SlideSet {
         let name = format!("{folder}/{}", array.file(shard));
         let bad = |e: papsynth_zarr::Error| Error::folder(&self.folder.path(&name), e.to_string());
         let mut encoder = ShardEncoder::new(array, shard).map_err(bad)?;
-        self.write_pieces(&name, |out| {
-            let path = self.folder.path(&name);
-            for (channel, values) in channels.iter().enumerate() {
-                let bytes = encoder.plane(channel, plane, values).map_err(bad)?;
-                out.write_all(&bytes).map_err(Error::io("write", &path))?;
-            }
-            out.write_all(&encoder.end().map_err(bad)?).map_err(Error::io("write", &path))
-        })
+        let mut output = Output::new(self.folder.pending(&name)?)?;
+        for (channel, values) in channels.iter().enumerate() {
+            output.bytes(&encoder.plane(channel, plane, values).map_err(bad)?)?;
+        }
+        output.bytes(&encoder.end().map_err(bad)?)?;
+        output.into_pending()?.commit()
     }
 }

@@ -5,13 +5,12 @@ use std::collections::BTreeSet;
 use papsynth::truth::Group;
 use papsynth_zarr::{Array, Pyramid};
 
-use super::document::{LAYERS, folder};
-use super::record::HEAD;
+use super::record::{HEAD, LAYERS, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
 use crate::bytes::sha256;
-use crate::dataset::{Finding, Mend};
+use crate::dataset::Finding;
 use crate::error::Error;
-use crate::files::{Check, FileRecord, is_temporary};
+use crate::files::{Check, FileRecord};
 use crate::formats::names;
 
 impl SlideSet {
@@ -21,28 +20,21 @@ impl SlideSet {
     /// If the system refuses to read.
     pub fn verify(&self) -> Result<Vec<Finding>, Error> {
         let mut findings = Vec::new();
-        let mut find = |path: &str, message: &str, mend| {
-            findings.push(Finding { path: path.to_owned(), message: message.to_owned(), mend });
-        };
         let (files, unrecorded) = self.listed()?;
         for name in &unrecorded {
             let there = self.folder.path(name).exists();
             let message = if there { "is no record of this slide, or was changed" } else { "is missing" };
-            find(name, message, Mend::Generate);
+            findings.push(Finding::made_wrong(name, message));
         }
         for file in &files {
-            if let Some(flaw) = self.folder.flaw(file, Check::Hashes)? {
-                find(&file.path, &flaw, Mend::Generate);
-            }
+            let flaw = self.folder.flaw(file, Check::Hashes)?;
+            findings.extend(flaw.map(|message| Finding::made_wrong(&file.path, message)));
         }
         let mut known = self.names_of(&files);
         // What a lost record vouched for is no stray.
         known.extend(unrecorded.iter().flat_map(|name| self.vouched_for(name)));
-        for path in self.folder.names()?.iter().filter(|path| !known.contains(path.as_str())) {
-            let is_left = is_temporary(path.rsplit('/').next().unwrap_or(path));
-            let message = if is_left { "was left behind by a run that was killed" } else { "is no file of the slide" };
-            find(path, message, Mend::Clean);
-        }
+        let there = self.folder.names()?;
+        findings.extend(there.iter().filter(|path| !known.contains(*path)).map(|path| Finding::stray(path, "slide")));
         findings.sort();
         Ok(findings)
     }
@@ -112,7 +104,6 @@ impl SlideSet {
         self.all().map(record_name).chain([UPPER.to_owned()])
     }
 
-    /// The names of these files and of all records.
     fn names_of(&self, files: &[FileRecord]) -> BTreeSet<String> {
         files.iter().map(|file| file.path.clone()).chain(self.record_names()).collect()
     }

@@ -4,8 +4,7 @@ use papsynth::scene::{Kind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
 use serde::{Deserialize, Serialize};
 
-use super::category::{Category, category_name, group};
-use super::frame::FrameSummary;
+use super::frame::{Category, FrameSummary, category_name, group};
 use super::rle;
 use crate::error::Problem;
 
@@ -29,12 +28,12 @@ impl Rle {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Image {
-    id: u64,
+    pub(crate) id: u64,
     width: usize,
     height: usize,
-    pub(crate) file_name: String,
+    file_name: String,
     #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub(crate) all_in_focus: Option<String>,
+    all_in_focus: Option<String>,
     pixel_um: f64,
     /// The pixels of each plane that are saturated, if some are.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
@@ -59,23 +58,12 @@ impl Image {
     }
 }
 
-impl Image {
-    pub(crate) fn index(&self) -> u64 {
-        self.id
-    }
-
-    /// The pixels of each plane that are saturated; none if none is in any.
-    pub(crate) fn saturated(&self) -> Result<Vec<Mask>, Problem> {
-        self.saturated.iter().map(Rle::mask).collect()
-    }
-}
-
 /// One object or part of a cell: COCO's fields, and everything else that is known of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Annotation {
     /// From 1; within the shard in its own document, over all frames in the joint one.
     pub(crate) id: u64,
-    image_id: u64,
+    pub(crate) image_id: u64,
     pub(crate) category_id: u32,
     bbox: [u32; 4],
     area: u64,
@@ -88,7 +76,7 @@ pub(crate) struct Annotation {
     /// The id of the object in label images and tables; nucleus and cytoplasm of a cell share it.
     object_id: u32,
     /// Of a nucleus: the annotation of its cytoplasm, if that is in the image.
-    parent_id: Option<u64>,
+    pub(crate) parent_id: Option<u64>,
     part: Part,
     kind: String,
     class: String,
@@ -147,17 +135,6 @@ impl Annotation {
         Self { id: self.id.saturating_add(ids), parent_id, ..self }
     }
 
-    /// Whether it is part of another object that is in the image.
-    #[cfg(feature = "zarr")]
-    pub(crate) fn has_parent(&self) -> bool {
-        self.parent_id.is_some()
-    }
-
-    /// The frame that it is in.
-    pub(crate) fn image(&self) -> u64 {
-        self.image_id
-    }
-
     /// The complete mask and the group it belongs to.
     pub(crate) fn amodal(&self) -> Result<(Group, Mask), Problem> {
         Ok((group(self.part), self.segmentation.mask()?))
@@ -209,6 +186,12 @@ impl Annotation {
     }
 }
 
+/// Whether a mask of an object leaves an image of this size.
+pub(crate) fn leaves(object: &ObjectTruth, width: usize, height: usize) -> bool {
+    let bounds = [&object.amodal, &object.front].into_iter().filter_map(Mask::bounds);
+    bounds.into_iter().any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
+}
+
 fn box_of(mask: &Mask) -> [u32; 4] {
     mask.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height])
 }
@@ -225,14 +208,6 @@ impl Default for Info {
     }
 }
 
-/// An object is of a category that the data set does not have.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no category `{name}`")]
-pub(crate) struct UnknownCategory {
-    pub(crate) name: String,
-}
-
-/// A whole document.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Document {
     pub(crate) info: Info,
@@ -247,30 +222,39 @@ impl Document {
     /// The document of one frame.
     ///
     /// # Errors
-    /// If an object is of a category that is not among these.
+    /// The name of the category of an object, if it is not among these.
     pub(crate) fn of_frame(
         truth: &Truth,
         frame: &FrameSummary,
         saturated: &[Mask],
         categories: &[Category],
         files: (String, Option<String>),
-    ) -> Result<Self, UnknownCategory> {
+    ) -> Result<Self, String> {
         let parent = |object: &ObjectTruth| {
             let is_cell = |other: &ObjectTruth| other.part == Part::Cytoplasm && other.id == object.id;
             (object.part == Part::Nucleus).then(|| (1..).zip(&truth.objects).find(|(_, o)| is_cell(o))).flatten()
         };
         let annotation = |(id, object): (u64, &ObjectTruth)| {
             let name = category_name(&object.class, object.part);
-            let category = categories.iter().find(|c| c.name == name).ok_or(UnknownCategory { name })?;
+            let category = categories.iter().find(|c| c.name == name).ok_or(name)?;
             Ok(Annotation::new(id, parent(object).map(|(id, _)| id), object, frame, category.id))
         };
         Ok(Self {
             info: Info::default(),
             licenses: Vec::new(),
             categories: categories.to_vec(),
-            annotations: (1..).zip(&truth.objects).map(annotation).collect::<Result<_, UnknownCategory>>()?,
+            annotations: (1..).zip(&truth.objects).map(annotation).collect::<Result<_, String>>()?,
             images: vec![Image::new(frame, saturated, files)],
         })
+    }
+
+    pub(crate) fn image(&self, index: u64) -> Option<&Image> {
+        self.images.iter().find(|image| image.id == index)
+    }
+
+    /// The pixels of each plane of an image that are saturated; none if none is in any.
+    pub(crate) fn saturated(&self, index: u64) -> Result<Vec<Mask>, Problem> {
+        self.image(index).map_or(&[][..], |image| &image.saturated).iter().map(Rle::mask).collect()
     }
 
     /// The truth of a frame among those of the document.
@@ -278,15 +262,10 @@ impl Document {
     /// # Errors
     /// If it has no such frame, or what it says of it does not fit together.
     pub(crate) fn truth(&self, index: u64) -> Result<Truth, Problem> {
-        let image = self.images.iter().find(|image| image.id == index);
-        let image = image.ok_or_else(|| Problem::broken("COCO", format!("it has no image {index}")))?;
+        let image = self.image(index).ok_or_else(|| Problem::broken("COCO", format!("it has no image {index}")))?;
         let of_frame = self.annotations.iter().filter(|annotation| annotation.image_id == index);
         let objects: Vec<ObjectTruth> = of_frame.map(Annotation::object).collect::<Result<_, _>>()?;
-        let outside = |mask: &Mask| {
-            mask.bounds()
-                .is_some_and(|b| (b.x + b.width) as usize > image.width || (b.y + b.height) as usize > image.height)
-        };
-        match objects.iter().find(|object| outside(&object.amodal) || outside(&object.front)) {
+        match objects.iter().find(|object| leaves(object, image.width, image.height)) {
             Some(object) => {
                 let message = format!("the mask of object {} of image {index} leaves the image", object.id);
                 Err(Problem::broken("COCO", message))

@@ -1,29 +1,15 @@
-//! A frame: its size and place, and what it holds in a few numbers.
+//! A frame: its size and place, what it holds in a few numbers, and the categories of what it may hold.
 
 use std::collections::BTreeMap;
 
-use papsynth::key::Key;
-use papsynth::scene::{Scene, View};
-use papsynth::truth::{Group, Mask, Truth};
+use papsynth::recipe::Recipe;
+use papsynth::scene::{Kind, Scene};
+use papsynth::truth::{Group, Mask, Part, Truth};
 use papsynth::white_level;
 use serde::{Deserialize, Serialize};
 
-use super::category::category_name;
-use super::flatten::Flatten;
+use super::labels::Flatten;
 use crate::error::Error;
-
-/// Whether a frame is a single image or a focus stack.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
-    Single,
-    Stack,
-}
-
-impl Form {
-    pub(crate) fn of(planes: usize) -> Self {
-        if planes > 1 { Self::Stack } else { Self::Single }
-    }
-}
 
 /// A frame in a few numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,56 +47,6 @@ pub struct FrameSummary {
     pub lost_px: BTreeMap<String, u64>,
 }
 
-/// What must be known of a frame before its first plane is written.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Geometry {
-    pub(crate) key: Key,
-    pub(crate) view: View,
-    pub(crate) planes_um: Vec<f64>,
-    pub(crate) bits: u32,
-    pub(crate) channels: usize,
-    pub(crate) slide: u64,
-}
-
-impl Geometry {
-    pub(crate) fn of(scene: &Scene) -> Self {
-        Self {
-            key: scene.key,
-            view: scene.view,
-            planes_um: scene.planes_um.clone(),
-            bits: scene.camera.bits,
-            channels: scene.channels(),
-            slide: scene.slide,
-        }
-    }
-
-    /// That of a frame of a data set of this seed.
-    pub(crate) fn of_summary(frame: &FrameSummary, seed: u64) -> Self {
-        Self {
-            key: Key { seed, index: frame.index },
-            view: View { width: frame.width, height: frame.height, pixel_um: frame.pixel_um },
-            planes_um: frame.planes_um.clone(),
-            bits: frame.bits,
-            channels: frame.channels,
-            slide: frame.slide,
-        }
-    }
-
-    pub(crate) fn pixels(&self) -> usize {
-        self.view.width * self.view.height
-    }
-
-    /// What does not fit of what was handed over.
-    pub(crate) fn wrong(&self, message: String) -> Error {
-        Error::Frame { index: self.key.index, message }
-    }
-
-    /// Numbers of a plane: channels of pixels.
-    pub(crate) fn values(&self) -> usize {
-        self.pixels() * self.channels
-    }
-}
-
 impl FrameSummary {
     /// The largest level that the camera gives.
     #[must_use]
@@ -118,33 +54,106 @@ impl FrameSummary {
         white_level(self.bits)
     }
 
-    /// That of a frame of these planes and objects.
-    pub(crate) fn of(
-        geometry: &Geometry,
-        truth: &Truth,
-        saturated: &[Mask],
-        floored: Vec<usize>,
-        flatten: Flatten,
-    ) -> Self {
+    /// What is known of the frame of a scene before its first plane: nothing is counted yet.
+    pub(crate) fn of_scene(scene: &Scene) -> Self {
+        Self {
+            index: scene.key.index,
+            width: scene.view.width,
+            height: scene.view.height,
+            pixel_um: scene.view.pixel_um,
+            bits: scene.camera.bits,
+            channels: scene.channels(),
+            slide: scene.slide,
+            planes_um: scene.planes_um.clone(),
+            saturated: Vec::new(),
+            floored: Vec::new(),
+            objects: BTreeMap::new(),
+            truncated: 0,
+            most_layers: 0,
+            lost_px: BTreeMap::new(),
+        }
+    }
+
+    /// The same with the counts of these planes and objects.
+    pub(crate) fn counted(self, truth: &Truth, saturated: &[Mask], floored: Vec<usize>, flatten: Flatten) -> Self {
         let mut objects = BTreeMap::new();
         for object in &truth.objects {
             *objects.entry(category_name(&object.class, object.part)).or_insert(0) += 1;
         }
         Self {
-            index: geometry.key.index,
-            width: geometry.view.width,
-            height: geometry.view.height,
-            pixel_um: geometry.view.pixel_um,
-            bits: geometry.bits,
-            channels: geometry.channels,
-            slide: geometry.slide,
-            planes_um: geometry.planes_um.clone(),
             saturated: saturated.iter().map(|mask| usize::try_from(mask.area()).unwrap_or(usize::MAX)).collect(),
             floored,
             objects,
             truncated: truth.objects.iter().filter(|o| o.truncated).count() as u64,
             most_layers: truth.layers().into_iter().max().unwrap_or(0),
             lost_px: Group::ALL.map(|group| (group.name().to_owned(), flatten.lost(truth, group))).into(),
+            ..self
         }
+    }
+
+    /// Whether it is the frame of a scene, whatever is counted in it.
+    pub(crate) fn is_of(&self, scene: &Scene) -> bool {
+        let view =
+            |f: &Self| (f.index, f.width, f.height, f.pixel_um, f.bits, f.channels, f.slide, f.planes_um.clone());
+        view(self) == view(&Self::of_scene(scene))
+    }
+
+    pub(crate) fn is_stack(&self) -> bool {
+        self.planes_um.len() > 1
+    }
+
+    /// Numbers of a plane: channels of pixels.
+    pub(crate) fn values(&self) -> usize {
+        self.width * self.height * self.channels
+    }
+
+    /// What was handed over must fit.
+    pub(crate) fn due(&self, fits: bool, message: String) -> Result<(), Error> {
+        if fits { Ok(()) } else { Err(self.wrong(message)) }
+    }
+
+    /// What does not fit of what was handed over.
+    pub(crate) fn wrong(&self, message: impl Into<String>) -> Error {
+        Error::Frame { index: self.index, message: message.into() }
+    }
+}
+
+/// A kind of annotation: of cells one for each class and part, of everything else one for each kind.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Category {
+    /// From 1.
+    pub id: u32,
+    /// Such as "superficial nucleus" or "bacillus".
+    pub name: String,
+    /// "cytoplasm", "nucleus" or "debris".
+    pub supercategory: String,
+}
+
+/// The categories of a recipe, the same whatever frames are made of it.
+pub(crate) fn categories(recipe: &Recipe) -> Vec<Category> {
+    let cells = recipe.cells.keys().flat_map(|class| [(class.as_str(), Part::Cytoplasm), (class, Part::Nucleus)]);
+    let others = Kind::ALL.into_iter().filter(|&kind| kind != Kind::Cell).map(|kind| (kind.name(), Part::Whole));
+    (1..)
+        .zip(cells.chain(others))
+        .map(|(id, (class, part))| Category {
+            id,
+            name: category_name(class, part),
+            supercategory: group(part).name().to_owned(),
+        })
+        .collect()
+}
+
+pub(crate) fn category_name(class: &str, part: Part) -> String {
+    match part {
+        Part::Whole => class.to_owned(),
+        Part::Cytoplasm | Part::Nucleus => format!("{class} {}", group(part).name()),
+    }
+}
+
+pub(super) fn group(part: Part) -> Group {
+    match part {
+        Part::Cytoplasm => Group::Cytoplasm,
+        Part::Nucleus => Group::Nucleus,
+        Part::Whole => Group::Debris,
     }
 }

@@ -132,7 +132,6 @@ pub fn decode(counts: &str, width: usize, height: usize) -> Result<Mask, Problem
     Ok(Mask::from_runs(runs.collect()))
 }
 
-/// The next number, if there is one.
 fn pull(bytes: &mut std::str::Bytes) -> Result<Option<i64>, &'static str> {
     /// A count has at most 2³² pixels, in seven groups of five bits.
     const MAX_SHIFT: u32 = 35;

@@ -2,7 +2,6 @@
 
 use sha2::{Digest, Sha256};
 
-/// A part of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Split {
     Train,

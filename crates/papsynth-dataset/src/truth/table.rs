@@ -4,27 +4,65 @@ use papsynth::truth::{Bounds, ObjectTruth, Part, Truth};
 
 use super::rle;
 
-/// An object, or a part of a cell, of an image.
-struct Entry<'a> {
+/// A row: an object, or a part of a cell, of an image.
+pub(crate) struct Row<'a> {
     image: u64,
+    /// Columns and rows of the image.
+    size: [usize; 2],
     object: &'a ObjectTruth,
+}
+
+impl<'a> Row<'a> {
+    pub(crate) fn all(truth: &'a Truth, image: u64) -> impl Iterator<Item = Self> {
+        truth.objects.iter().map(move |object| Self { image, size: [truth.width, truth.height], object })
+    }
+
+    /// The rows of a part of a slide, whose columns ask for no image.
+    #[cfg(feature = "zarr")]
+    pub(crate) fn of_slide(objects: &'a [ObjectTruth]) -> impl Iterator<Item = Self> {
+        objects.iter().map(|object| Self { image: 0, size: [0; 2], object })
+    }
 }
 
 /// What stands in a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sort {
+pub(crate) enum Kind {
     Id,
     Whole,
-    WholeOrNone,
     Number,
-    NumberOrNone,
     Text,
     Flag,
-    /// One a plane.
-    Numbers,
+    /// Bytes, which are not compressed again.
+    #[cfg(feature = "parquet")]
+    Bytes,
+    /// Any number of values of one kind, any of which may be missing.
+    List(&'static Kind),
+    /// Fields, at least one.
+    #[cfg(feature = "parquet")]
+    Struct(&'static [Head]),
 }
 
-/// What stands in one place.
+/// The head of a column, or a field of a struct.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Head {
+    pub(crate) name: &'static str,
+    pub(crate) kind: Kind,
+    /// Whether there may be nothing in it.
+    pub(crate) nullable: bool,
+}
+
+impl Head {
+    /// Of a column in which something stands in every row.
+    pub(crate) const fn new(name: &'static str, kind: Kind) -> Self {
+        Self { name, kind, nullable: false }
+    }
+
+    /// The same in which there may be nothing.
+    pub(crate) const fn or_null(self) -> Self {
+        Self { nullable: true, ..self }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Cell {
     Nothing,
@@ -33,11 +71,22 @@ pub(crate) enum Cell {
     Number(f64),
     Text(String),
     Flag(bool),
-    Numbers(Vec<f64>),
+    #[cfg(feature = "parquet")]
+    Bytes(Vec<u8>),
+    List(Vec<Cell>),
+    #[cfg(feature = "parquet")]
+    Struct(Vec<Cell>),
 }
 
 impl Cell {
-    /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
+    pub(crate) fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    pub(crate) fn numbers(numbers: &[f64]) -> Self {
+        Self::List(numbers.iter().copied().map(Self::Number).collect())
+    }
+
     fn whole(&self) -> Option<u64> {
         match *self {
             Self::Id(id) => Some(id.into()),
@@ -54,139 +103,108 @@ impl Cell {
         }
     }
 
+    fn list(&self) -> &[Self] {
+        if let Self::List(cells) = self { cells } else { &[] }
+    }
+
+    /// A number is printed with as few digits as read back to it; lists have one value a plane, separated by semicolons.
     fn print(&self) -> String {
         match self {
-            Self::Nothing => String::new(),
             Self::Id(id) => id.to_string(),
             Self::Whole(whole) => whole.to_string(),
             Self::Number(number) => number.to_string(),
             Self::Text(text) => text.clone(),
             Self::Flag(flag) => flag.to_string(),
-            Self::Numbers(numbers) => numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(";"),
+            other => other.list().iter().map(Self::print).collect::<Vec<_>>().join(";"),
         }
     }
 }
 
-/// What a column is called, and what stands in it.
-type Named = (&'static str, Sort, fn(&Entry) -> Cell);
+/// A column: its head, and what stands in it.
+pub(crate) type Named = (Head, fn(&Row) -> Cell);
 
-/// The columns: what each is called and what stands in it.
+/// The columns of a frame's table.
 const COLUMNS: [Named; 28] = [
-    ("image", Sort::Whole, |e| Cell::Whole(e.image)),
-    ("id", Sort::Id, |e| Cell::Id(e.object.id)),
-    ("part", Sort::Text, |e| text(part(e.object.part))),
-    ("kind", Sort::Text, |e| text(e.object.kind.name())),
-    ("class", Sort::Text, |e| text(&e.object.class)),
-    ("bethesda", Sort::Text, |e| text(&e.object.bethesda)),
-    ("traits", Sort::Text, |e| text(&e.object.traits.to_string())),
-    ("cluster", Sort::Id, |e| Cell::Id(e.object.cluster)),
-    ("centre_x_um", Sort::Number, |e| Cell::Number(e.object.centre_um[0])),
-    ("centre_y_um", Sort::Number, |e| Cell::Number(e.object.centre_um[1])),
-    ("depth_um", Sort::Number, |e| Cell::Number(e.object.depth_um)),
-    ("rotation_deg", Sort::Number, |e| Cell::Number(e.object.rotation_deg)),
-    ("stain", Sort::Number, |e| Cell::Number(e.object.stain)),
-    ("tint", Sort::Text, |e| text(e.object.tint_name())),
-    ("area_um2", Sort::Number, |e| Cell::Number(e.object.area_um2)),
-    ("area_px", Sort::Whole, |e| Cell::Whole(e.object.amodal.area())),
-    ("front_area_px", Sort::Whole, |e| Cell::Whole(e.object.front.area())),
-    ("bbox_x_px", Sort::WholeOrNone, |e| bounds(e, |b| b.x)),
-    ("bbox_y_px", Sort::WholeOrNone, |e| bounds(e, |b| b.y)),
-    ("bbox_width_px", Sort::WholeOrNone, |e| bounds(e, |b| b.width)),
-    ("bbox_height_px", Sort::WholeOrNone, |e| bounds(e, |b| b.height)),
-    ("centroid_x_px", Sort::NumberOrNone, |e| centroid(e, 0)),
-    ("centroid_y_px", Sort::NumberOrNone, |e| centroid(e, 1)),
-    ("truncated", Sort::Flag, |e| Cell::Flag(e.object.truncated)),
-    ("best_plane", Sort::WholeOrNone, |e| best(e).map_or(Cell::Nothing, |plane| Cell::Whole(plane as u64))),
-    ("best_detectability", Sort::NumberOrNone, |e| {
-        best(e).map_or(Cell::Nothing, |plane| Cell::Number(e.object.detectability[plane]))
+    (Head::new("image", Kind::Whole), |row| Cell::Whole(row.image)),
+    (Head::new("id", Kind::Id), |row| Cell::Id(row.object.id)),
+    (Head::new("part", Kind::Text), |row| Cell::text(part(row.object.part))),
+    (Head::new("kind", Kind::Text), |row| Cell::text(row.object.kind.name())),
+    (Head::new("class", Kind::Text), |row| Cell::text(&row.object.class)),
+    (Head::new("bethesda", Kind::Text), |row| Cell::text(&row.object.bethesda)),
+    (Head::new("traits", Kind::Text), |row| Cell::text(row.object.traits.to_string())),
+    (Head::new("cluster", Kind::Id), |row| Cell::Id(row.object.cluster)),
+    (Head::new("centre_x_um", Kind::Number), |row| Cell::Number(row.object.centre_um[0])),
+    (Head::new("centre_y_um", Kind::Number), |row| Cell::Number(row.object.centre_um[1])),
+    (Head::new("depth_um", Kind::Number), |row| Cell::Number(row.object.depth_um)),
+    (Head::new("rotation_deg", Kind::Number), |row| Cell::Number(row.object.rotation_deg)),
+    (Head::new("stain", Kind::Number), |row| Cell::Number(row.object.stain)),
+    (Head::new("tint", Kind::Text), |row| Cell::text(row.object.tint_name())),
+    (Head::new("area_um2", Kind::Number), |row| Cell::Number(row.object.area_um2)),
+    (Head::new("area_px", Kind::Whole), |row| Cell::Whole(row.object.amodal.area())),
+    (Head::new("front_area_px", Kind::Whole), |row| Cell::Whole(row.object.front.area())),
+    (Head::new("bbox_x_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.x)),
+    (Head::new("bbox_y_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.y)),
+    (Head::new("bbox_width_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.width)),
+    (Head::new("bbox_height_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.height)),
+    (Head::new("centroid_x_px", Kind::Number).or_null(), |row| centroid(row, 0)),
+    (Head::new("centroid_y_px", Kind::Number).or_null(), |row| centroid(row, 1)),
+    (Head::new("truncated", Kind::Flag), |row| Cell::Flag(row.object.truncated)),
+    (Head::new("best_plane", Kind::Whole).or_null(), |row| {
+        best(row).map_or(Cell::Nothing, |plane| Cell::Whole(plane as u64))
     }),
-    ("defocus_um", Sort::Numbers, |e| Cell::Numbers(e.object.defocus_um.clone())),
-    ("detectability", Sort::Numbers, |e| Cell::Numbers(e.object.detectability.clone())),
+    (Head::new("best_detectability", Kind::Number).or_null(), |row| {
+        best(row).map_or(Cell::Nothing, |plane| Cell::Number(row.object.detectability[plane]))
+    }),
+    (Head::new("defocus_um", Kind::List(&Kind::Number)), |row| Cell::numbers(&row.object.defocus_um)),
+    (Head::new("detectability", Kind::List(&Kind::Number)), |row| Cell::numbers(&row.object.detectability)),
 ];
+
+/// What the table with types has besides: the size of the image, and the complete and the visible mask as COCO's run lengths.
+const MORE: [Named; 4] = [
+    (Head::new("image_width_px", Kind::Whole), |row| Cell::Whole(row.size[0] as u64)),
+    (Head::new("image_height_px", Kind::Whole), |row| Cell::Whole(row.size[1] as u64)),
+    (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.amodal, row.size[0], row.size[1]))),
+    (Head::new("front_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.front, row.size[0], row.size[1]))),
+];
+
+pub(crate) fn typed_columns() -> Vec<Named> {
+    [&COLUMNS[..], &MORE].concat()
+}
 
 /// The rows of one frame as CSV, if wanted below a header, which stands even if there is no object.
 pub(crate) fn table(truth: &Truth, image: u64, header: bool) -> Vec<u8> {
-    let cells = |object| COLUMNS.into_iter().map(move |(_, _, cell)| cell(&Entry { image, object }));
-    csv(header.then_some(COLUMNS.map(|(name, _, _)| name)).into_iter().flatten(), truth.objects.iter().map(cells))
+    csv(header, &COLUMNS, Row::all(truth, image))
 }
 
-/// Rows of cells as CSV below the names of their columns, if there are any.
-fn csv<'n, R: Iterator<Item = Cell>>(names: impl Iterator<Item = &'n str>, rows: impl Iterator<Item = R>) -> Vec<u8> {
+/// Rows as CSV, if wanted below the names of the columns.
+fn csv<'a>(header: bool, columns: &[Named], rows: impl Iterator<Item = Row<'a>>) -> Vec<u8> {
     const FITS: &str = "rows of one length can be written to memory";
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let names: Vec<&str> = names.collect();
-    if !names.is_empty() {
-        writer.write_record(names).expect(FITS);
+    if header {
+        writer.write_record(columns.iter().map(|(head, _)| head.name)).expect(FITS);
     }
     for row in rows {
-        writer.write_record(row.map(|cell| cell.print())).expect(FITS);
+        writer.write_record(columns.iter().map(|(_, cell)| cell(&row).print())).expect(FITS);
     }
     writer.into_inner().expect(FITS)
 }
 
-/// The columns of the table with types: those of the CSV, the size of the image, and the complete and the visible mask as COCO's run lengths.
-pub(crate) fn typed_columns() -> impl Iterator<Item = (&'static str, Sort)> {
-    let sizes = ["image_width_px", "image_height_px"].map(|name| (name, Sort::Whole));
-    let masks = ["rle", "front_rle"].map(|name| (name, Sort::Text));
-    COLUMNS.into_iter().map(|(name, sort, _)| (name, sort)).chain(sizes).chain(masks)
-}
-
-/// What stands in these columns of an object's row.
-pub(crate) fn typed_cells(truth: &Truth, object: &ObjectTruth, image: u64) -> impl Iterator<Item = Cell> {
-    let sizes = [truth.width, truth.height].map(|side| Cell::Whole(side as u64));
-    let masks = [&object.amodal, &object.front].map(|mask| Cell::Text(rle::encode(mask, truth.width, truth.height)));
-    COLUMNS.into_iter().map(move |(_, _, cell)| cell(&Entry { image, object })).chain(sizes).chain(masks)
-}
-
 /// The columns of the table of a slide that are those of a frame's table, in their order; another, `rle`, follows.
 #[cfg(feature = "zarr")]
-const OF_SLIDE: [&str; 21] = [
-    "id",
-    "part",
-    "kind",
-    "class",
-    "bethesda",
-    "traits",
-    "cluster",
-    "centre_x_um",
-    "centre_y_um",
-    "depth_um",
-    "rotation_deg",
-    "stain",
-    "tint",
-    "area_um2",
-    "area_px",
-    "truncated",
-    "bbox_x_px",
-    "bbox_y_px",
-    "bbox_width_px",
-    "bbox_height_px",
-    "defocus_um",
-];
-
-/// These columns.
-#[cfg(feature = "zarr")]
-fn of_slide() -> impl Iterator<Item = Named> {
-    OF_SLIDE.into_iter().filter_map(|wanted| COLUMNS.into_iter().find(|(name, ..)| *name == wanted))
-}
+const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,centre_y_um,depth_um,rotation_deg,stain,\
+    tint,area_um2,area_px,truncated,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um";
 
 /// The columns of the table of a part of a slide. A mask stands in its box alone: the run lengths are those of an image of the box's size.
 #[cfg(feature = "zarr")]
-pub(crate) fn slide_columns() -> impl Iterator<Item = (&'static str, Sort)> {
-    of_slide().map(|(name, sort, _)| (name, sort)).chain([("rle", Sort::Text)])
+pub(crate) fn slide_columns() -> Vec<Named> {
+    let mask: Named = (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode_in_box(&row.object.amodal)));
+    let known = OF_SLIDE.split(',').filter_map(|wanted| COLUMNS.into_iter().find(|(head, _)| head.name == wanted));
+    known.chain([mask]).collect()
 }
 
-/// What stands in these columns of an object's row.
-#[cfg(feature = "zarr")]
-pub(crate) fn slide_cells(object: &ObjectTruth) -> impl Iterator<Item = Cell> {
-    let entry = Entry { image: 0, object };
-    of_slide().map(move |(_, _, cell)| cell(&entry)).chain([Cell::Text(rle::encode_in_box(&object.amodal))])
-}
-
-/// The table of a part of a slide as CSV.
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_table(objects: &[ObjectTruth]) -> Vec<u8> {
-    csv(slide_columns().map(|(name, _)| name), objects.iter().map(slide_cells))
+    csv(true, &slide_columns(), Row::of_slide(objects))
 }
 
 /// What stands in a column of the table of objects.
@@ -207,27 +225,20 @@ pub enum Column {
 /// The table of the objects of an image, column by column: those of `objects.csv`.
 #[must_use]
 pub fn columns(truth: &Truth, image: u64) -> Vec<(&'static str, Column)> {
-    let cells = |(name, sort, cell): Named| {
-        let cells = truth.objects.iter().map(move |object| cell(&Entry { image, object }));
-        (name, Column::of(sort, cells))
-    };
-    COLUMNS.into_iter().map(cells).collect()
+    let column = |(head, cell): Named| (head.name, Column::of(head, Row::all(truth, image).map(|row| cell(&row))));
+    COLUMNS.into_iter().map(column).collect()
 }
 
 impl Column {
-    fn of(sort: Sort, cells: impl Iterator<Item = Cell>) -> Self {
-        match sort {
-            Sort::Id | Sort::Whole => {
+    fn of(head: Head, cells: impl Iterator<Item = Cell>) -> Self {
+        match head.kind {
+            Kind::Id | Kind::Whole if !head.nullable => {
                 Self::Whole(cells.map(|cell| cell.whole().expect("a whole number in every row")).collect())
             }
-            Sort::WholeOrNone | Sort::Number | Sort::NumberOrNone => {
-                Self::Number(cells.map(|cell| cell.number()).collect())
-            }
-            Sort::Text => Self::Text(cells.map(|cell| cell.print()).collect()),
-            Sort::Flag => Self::Flag(cells.map(|cell| cell == Cell::Flag(true)).collect()),
-            Sort::Numbers => {
-                Self::Numbers(cells.map(|cell| if let Cell::Numbers(all) = cell { all } else { Vec::new() }).collect())
-            }
+            Kind::Id | Kind::Whole | Kind::Number => Self::Number(cells.map(|cell| cell.number()).collect()),
+            Kind::Flag => Self::Flag(cells.map(|cell| cell == Cell::Flag(true)).collect()),
+            Kind::List(_) => Self::Numbers(cells.map(|c| c.list().iter().map(Cell::number).collect()).collect()),
+            _ => Self::Text(cells.map(|cell| cell.print()).collect()),
         }
     }
 }
@@ -240,20 +251,16 @@ pub(crate) fn part(part: Part) -> &'static str {
     }
 }
 
-fn text(text: &str) -> Cell {
-    Cell::Text(text.to_owned())
+fn bounds(row: &Row, side: fn(Bounds) -> u32) -> Cell {
+    row.object.amodal.bounds().map_or(Cell::Nothing, |b| Cell::Whole(side(b).into()))
 }
 
-fn bounds(entry: &Entry, side: fn(Bounds) -> u32) -> Cell {
-    entry.object.amodal.bounds().map_or(Cell::Nothing, |b| Cell::Whole(side(b).into()))
-}
-
-fn centroid(entry: &Entry, axis: usize) -> Cell {
-    entry.object.amodal.centroid().map_or(Cell::Nothing, |c| Cell::Number(c[axis]))
+fn centroid(row: &Row, axis: usize) -> Cell {
+    row.object.amodal.centroid().map_or(Cell::Nothing, |c| Cell::Number(c[axis]))
 }
 
 /// The plane in which an object is easiest to detect; of equal ones the first.
-fn best(entry: &Entry) -> Option<usize> {
-    let detectability = &entry.object.detectability;
+fn best(row: &Row) -> Option<usize> {
+    let detectability = &row.object.detectability;
     (0..detectability.len()).reduce(|best, i| if detectability[i] > detectability[best] { i } else { best })
 }

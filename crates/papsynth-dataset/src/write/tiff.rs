@@ -1,14 +1,89 @@
-//! TIFF: pages written one after the other, and compressed images.
+//! TIFF: pages written one after the other, compressed images, and large pages in tiles, each with the same at half the size, and again:
+//! viewers of large images read what they show.
 
-use std::io::{self, Cursor};
+use std::borrow::Cow;
+use std::io::{self, Cursor, Seek, Write};
+use std::ops::Range;
 
 use miniz_oxide::deflate::compress_to_vec_zlib;
-use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard};
-use tiff::tags::{CompressionMethod, Predictor, Tag};
+use tiff::encoder::{DirectoryEncoder, Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
+use tiff::tags::{CompressionMethod, PhotometricInterpretation, Predictor, ResolutionUnit, SampleFormat, Tag};
 use tiff::{TiffError, TiffResult};
 
-use super::page::{Out, Page, Pixels, photometric, resolution};
-use super::pyramid;
+use crate::error::Error;
+use crate::files::{FileRecord, Pending};
+
+pub(crate) trait Out: Write + Seek {}
+
+impl<T: Write + Seek> Out for T {}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Page<'a> {
+    /// Columns.
+    pub(crate) width: usize,
+    /// Channels of a pixel: 1, or 3 for red, green and blue.
+    pub(crate) channels: usize,
+    /// Side of a pixel, µm.
+    pub(crate) pixel_um: f64,
+    /// Its description, ASCII.
+    pub(crate) text: Option<&'a str>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Pixels<'a> {
+    U8(&'a [u8]),
+    U16(&'a [u16]),
+    U32(&'a [u32]),
+    F32(&'a [f32]),
+}
+
+impl<'a> Pixels<'a> {
+    fn len(self) -> usize {
+        match self {
+            Self::U8(data) => data.len(),
+            Self::U16(data) => data.len(),
+            Self::U32(data) => data.len(),
+            Self::F32(data) => data.len(),
+        }
+    }
+
+    /// Bits of a value, and what they stand for.
+    fn sample(self) -> (u16, SampleFormat) {
+        match self {
+            Self::U8(_) => (8, SampleFormat::Uint),
+            Self::U16(_) => (16, SampleFormat::Uint),
+            Self::U32(_) => (32, SampleFormat::Uint),
+            Self::F32(_) => (32, SampleFormat::IEEEFP),
+        }
+    }
+
+    /// The bytes of some values, in the order of this machine.
+    fn bytes(self, range: Range<usize>) -> Cow<'a, [u8]> {
+        match self {
+            Self::U8(data) => data[range].data(),
+            Self::U16(data) => data[range].data(),
+            Self::U32(data) => data[range].data(),
+            Self::F32(data) => data[range].data(),
+        }
+    }
+}
+
+/// What the channels of a pixel are.
+fn photometric(channels: usize) -> u16 {
+    match channels {
+        3 => PhotometricInterpretation::RGB.to_u16(),
+        _ => PhotometricInterpretation::BlackIsZero.to_u16(),
+    }
+}
+
+/// The size of a pixel: pixels per centimetre, to a thousandth.
+fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel_um: f64) -> TiffResult<()> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let n = (1e7 / pixel_um + 0.5) as u32;
+    directory.write_tag(Tag::ResolutionUnit, ResolutionUnit::Centimeter.to_u16())?;
+    directory.write_tag(Tag::XResolution, Rational { n, d: 1000 })?;
+    directory.write_tag(Tag::YResolution, Rational { n, d: 1000 })
+}
 
 /// Pages of a file larger than this go into a BigTIFF. Offsets of a classic file end at 2³² bytes; the rest is for its directories.
 const CLASSIC_BYTES: u64 = 0xFF00_0000;
@@ -30,7 +105,6 @@ impl<'a> PageWriter<'a> {
         }
     }
 
-    /// Writes a page of one channel or of three.
     pub(crate) fn write(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
         let written = match self {
             Self::Classic(encoder) => plain_page(encoder, pixels, page),
@@ -41,23 +115,45 @@ impl<'a> PageWriter<'a> {
 
     /// A page in tiles with smaller versions, if it is large, else as it is. For formats whose readers expect that.
     pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> io::Result<()> {
-        if !pyramid::is_large(page.width, pixels.len() / (page.width * page.channels).max(1)) {
+        if !is_large(page.width, pixels.len() / (page.width * page.channels).max(1)) {
             return self.write(pixels, page);
         }
         let written = match (&mut *self, pixels) {
-            (Self::Classic(encoder), Pixels::U8(data)) => pyramid::page(encoder, data, page),
-            (Self::Classic(encoder), Pixels::U16(data)) => pyramid::page(encoder, data, page),
-            (Self::Big(encoder), Pixels::U8(data)) => pyramid::page(encoder, data, page),
-            (Self::Big(encoder), Pixels::U16(data)) => pyramid::page(encoder, data, page),
+            (Self::Classic(encoder), Pixels::U8(data)) => pyramid_page(encoder, data, page),
+            (Self::Classic(encoder), Pixels::U16(data)) => pyramid_page(encoder, data, page),
+            (Self::Big(encoder), Pixels::U8(data)) => pyramid_page(encoder, data, page),
+            (Self::Big(encoder), Pixels::U16(data)) => pyramid_page(encoder, data, page),
             _ => return self.write(pixels, page),
         };
         written.map_err(as_io)
     }
 }
 
-/// A label image of 16 bits, or of 32 if a label needs them.
-pub(crate) fn label_tiff(ids: &[u32], width: usize, pixel_um: f64) -> io::Result<Vec<u8>> {
-    label_pages(&[ids], &Page { width, channels: 1, pixel_um, text: None })
+/// A TIFF file that gets its name when all its pages are there.
+pub(crate) struct Pages {
+    pending: Pending,
+    writer: PageWriter<'static>,
+}
+
+impl Pages {
+    /// A file that will hold about `bytes` bytes of pixels.
+    pub(crate) fn new(pending: Pending, bytes: u64) -> Result<Self, Error> {
+        let writer = PageWriter::new(pending.handle()?, bytes).map_err(Error::io("write", pending.path()))?;
+        Ok(Self { pending, writer })
+    }
+
+    pub(crate) fn write(&mut self, pixels: Pixels, page: &Page) -> Result<(), Error> {
+        self.writer.write(pixels, page).map_err(Error::io("write", self.pending.path()))
+    }
+
+    /// The same as a pyramid, if it is large.
+    pub(crate) fn write_pyramid(&mut self, pixels: Pixels, page: &Page) -> Result<(), Error> {
+        self.writer.write_pyramid(pixels, page).map_err(Error::io("write", self.pending.path()))
+    }
+
+    pub(crate) fn commit(self) -> Result<FileRecord, Error> {
+        self.pending.commit()
+    }
 }
 
 /// Label images as pages, all of 16 bits, or all of 32 if a label needs them.
@@ -72,7 +168,6 @@ pub(crate) fn label_pages<I: AsRef<[u32]>>(pages: &[I], page: &Page) -> io::Resu
     compressed(&pages, page)
 }
 
-/// Whether no label needs more than 16 bits.
 pub(crate) fn fits_16_bits(ids: &[u32]) -> bool {
     ids.iter().all(|&id| id <= u16::MAX.into())
 }
@@ -177,10 +272,185 @@ fn head<K: TiffKind>(
     directory.write_tag(Tag::RowsPerStrip, u32::try_from(rows)?)
 }
 
+/// Side of a tile.
+const TILE: usize = 512;
+
+/// From this side on an image is written as a pyramid.
+const LARGE: usize = 2048;
+
+pub(crate) fn is_large(width: usize, height: usize) -> bool {
+    width.max(height) >= LARGE
+}
+
+/// Grey levels of 8 or of 16 bits.
+trait Level: Copy + Default + Into<u32> + TryFrom<u32> {}
+
+impl Level for u8 {}
+
+impl Level for u16 {}
+
+/// An image whose channels lie side by side.
+struct Image<'a, T> {
+    levels: &'a [T],
+    width: usize,
+    channels: usize,
+}
+
+impl<T: Level> Image<'_, T> {
+    fn height(&self) -> usize {
+        self.levels.len() / (self.width * self.channels).max(1)
+    }
+
+    /// The means of two by two pixels, rounded; an odd last row or column is left out.
+    fn halved(&self) -> Vec<T> {
+        let (row, channels) = (self.width * self.channels, self.channels);
+        let [width, height] = [self.width / 2, self.height() / 2];
+        let mut half = Vec::with_capacity(width * height * channels);
+        for y in 0..height {
+            let rows = [&self.levels[2 * y * row..][..row], &self.levels[(2 * y + 1) * row..][..row]];
+            for x in 0..width {
+                for channel in 0..channels {
+                    let at = 2 * x * channels + channel;
+                    let sum: u32 = rows.iter().map(|row| row[at].into() + row[at + channels].into()).sum();
+                    let mean = T::try_from((sum + 2) / 4).ok();
+                    half.push(mean.expect("a mean of levels has no more bits than they have"));
+                }
+            }
+        }
+        half
+    }
+
+    /// The levels of a tile; where it reaches beyond the image, 0.
+    fn tile(&self, column: usize, row: usize) -> Vec<T> {
+        let mut tile = vec![T::default(); TILE * TILE * self.channels];
+        let from = column * TILE * self.channels;
+        let to = ((column + 1) * TILE).min(self.width) * self.channels;
+        let rows = self.levels.chunks_exact(self.width * self.channels).skip(row * TILE).take(TILE);
+        for (out, levels) in tile.chunks_exact_mut(TILE * self.channels).zip(rows) {
+            out[..to - from].copy_from_slice(&levels[from..to]);
+        }
+        tile
+    }
+}
+
+/// Adds a page and its smaller versions, down to one tile, as sub-images.
+fn pyramid_page<W: Out, K: TiffKind, T: Level>(
+    encoder: &mut TiffEncoder<W, K>,
+    levels: &[T],
+    &Page { width, channels, pixel_um, text }: &Page,
+) -> TiffResult<()>
+where
+    [T]: TiffValue,
+{
+    let whole = Image { levels, width, channels };
+    let mut smaller = Vec::new();
+    let (mut half, mut um) = (whole.halved(), pixel_um);
+    let mut side = width / 2;
+    while side.max(half.len() / (side * channels).max(1)) >= TILE {
+        let image = Image { levels: &half, width: side, channels };
+        um *= 2.0;
+        let mut directory = encoder.extra_directory()?;
+        directory.write_tag(Tag::NewSubfileType, 1_u32)?;
+        fill(&mut directory, &image, um)?;
+        smaller.push(directory.finish_with_offsets()?.offset);
+        (half, side) = (image.halved(), side / 2);
+    }
+    let mut directory = encoder.image_directory()?;
+    if let Some(text) = text {
+        directory.write_tag(Tag::ImageDescription, text)?;
+    }
+    fill(&mut directory, &whole, pixel_um)?;
+    if !smaller.is_empty() {
+        directory.write_tag(Tag::SubIfd, K::convert_slice(&smaller))?;
+    }
+    directory.finish()
+}
+
+fn fill<W: Out, K: TiffKind, T: Level>(
+    directory: &mut DirectoryEncoder<W, K>,
+    image: &Image<T>,
+    pixel_um: f64,
+) -> TiffResult<()>
+where
+    [T]: TiffValue,
+{
+    let (width, height, channels) = (image.width, image.height(), image.channels);
+    let (mut offsets, mut sizes) = (Vec::new(), Vec::new());
+    for row in 0..height.div_ceil(TILE) {
+        for column in 0..width.div_ceil(TILE) {
+            let tile = image.tile(column, row);
+            offsets.push(K::convert_offset(directory.write_data(tile.as_slice())?)?);
+            sizes.push(u32::try_from(size_of_val(tile.as_slice()))?);
+        }
+    }
+    directory.write_tag(Tag::ImageWidth, u32::try_from(width)?)?;
+    directory.write_tag(Tag::ImageLength, u32::try_from(height)?)?;
+    directory.write_tag(Tag::BitsPerSample, vec![u16::try_from(8 * size_of::<T>())?; channels].as_slice())?;
+    directory.write_tag(Tag::Compression, 1_u16)?;
+    directory.write_tag(Tag::PhotometricInterpretation, photometric(channels))?;
+    directory.write_tag(Tag::SamplesPerPixel, u16::try_from(channels)?)?;
+    directory.write_tag(Tag::SampleFormat, vec![SampleFormat::Uint.to_u16(); channels].as_slice())?;
+    directory.write_tag(Tag::TileWidth, u32::try_from(TILE)?)?;
+    directory.write_tag(Tag::TileLength, u32::try_from(TILE)?)?;
+    directory.write_tag(Tag::TileOffsets, K::convert_slice(&offsets))?;
+    directory.write_tag(Tag::TileByteCounts, sizes.as_slice())?;
+    resolution(directory, pixel_um)
+}
+
 /// What goes wrong with a TIFF in the making is the making's fault.
 fn as_io(error: TiffError) -> io::Error {
     match error {
         TiffError::IoError(error) => error,
         other => io::Error::other(other),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::cast_possible_truncation, reason = "the numbers are small")]
+mod tests {
+    use tiff::decoder::{Decoder, DecodingResult};
+    use tiff::tags::IfdPointer;
+
+    use super::*;
+
+    #[test]
+    fn tiles_hold_the_image_and_every_level_its_means() {
+        for channels in [1, 3] {
+            let (width, height) = (2111_usize, 1300_usize);
+            let levels: Vec<u16> = (0..width * height * channels).map(|i| (i * 7919 % 60_013) as u16).collect();
+            let mut out = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut out).unwrap();
+            let head = Page { width, channels, pixel_um: 0.25, text: Some("text") };
+            pyramid_page(&mut encoder, &levels, &head).unwrap();
+            let bytes = out.into_inner();
+            let mut decoder = Decoder::new(Cursor::new(&bytes)).unwrap();
+            assert!(matches!(decoder.read_image().unwrap(), DecodingResult::U16(read) if read == levels));
+            assert!(!decoder.more_images(), "smaller ones lie beside the chain");
+            let mut expected = Image { levels: &levels, width, channels }.halved();
+            let mut side = width / 2;
+            let places = decoder.get_tag_u64_vec(Tag::SubIfd).unwrap();
+            assert_eq!(places.len(), 2);
+            for place in places {
+                let directory = decoder.read_directory(IfdPointer(place)).unwrap();
+                let mut tags = decoder.read_directory_tags(&directory);
+                let mut numbers = |tag| tags.get_tag(tag).unwrap().into_u64_vec().unwrap();
+                assert_eq!(numbers(Tag::ImageWidth), [side as u64]);
+                let image = Image { levels: &expected, width: side, channels };
+                let columns = side.div_ceil(TILE);
+                for (number, offset) in numbers(Tag::TileOffsets).into_iter().enumerate() {
+                    let tile: Vec<u8> =
+                        image.tile(number % columns, number / columns).iter().flat_map(|v| v.to_ne_bytes()).collect();
+                    assert_eq!(bytes[offset as usize..][..tile.len()], tile);
+                }
+                let half = image.halved();
+                (expected, side) = (half, side / 2);
+            }
+        }
+    }
+
+    #[test]
+    fn means_are_those_by_hand() {
+        let image = Image { levels: &[0_u8, 1, 9, 1, 1, 9, 5, 5, 5], width: 3, channels: 1 };
+        assert_eq!(image.halved(), [1]);
     }
 }

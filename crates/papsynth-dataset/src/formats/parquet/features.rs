@@ -1,17 +1,16 @@
 //! What Hugging Face wants to be told of a table: which bytes are images, which numbers are classes.
 
-use super::schema::{Column, Kind};
+use crate::truth::{Head, Kind};
 
 /// The column of integers that stand for the classes of the data set, counted from 0.
 pub(super) const CLASS: &str = "category";
 
 /// An image as Hugging Face keeps it: the bytes of its file, and the name that file would have.
-pub(super) fn image() -> Kind {
-    Kind::Struct(vec![Column::new("bytes", Kind::Bytes).or_null(), Column::new("path", Kind::Text).or_null()])
-}
+pub(super) const IMAGE: Kind =
+    Kind::Struct(&[Head::new("bytes", Kind::Bytes).or_null(), Head::new("path", Kind::Text).or_null()]);
 
 /// The text of the key `huggingface` of a file: features by name, in the order of the columns.
-pub(super) fn metadata(columns: &[Column], classes: &[String]) -> String {
+pub(super) fn metadata(columns: &[Head], classes: &[String]) -> String {
     format!("{{\"info\": {{\"features\": {}}}}}", object(columns, classes))
 }
 
@@ -20,19 +19,19 @@ fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-fn object(columns: &[Column], classes: &[String]) -> String {
-    let each = columns.iter().map(|column| format!("{}: {}", quoted(&column.name), feature(column, classes)));
+fn object(columns: &[Head], classes: &[String]) -> String {
+    let each = columns.iter().map(|column| format!("{}: {}", quoted(column.name), feature(column, classes)));
     format!("{{{}}}", each.collect::<Vec<_>>().join(", "))
 }
 
 /// As JSON. Lists are told in a way that old and new releases of `datasets` know.
-fn feature(column: &Column, classes: &[String]) -> String {
-    match &column.kind {
-        kind if *kind == image() => "{\"_type\": \"Image\"}".to_owned(),
+fn feature(column: &Head, classes: &[String]) -> String {
+    match column.kind {
+        IMAGE => "{\"_type\": \"Image\"}".to_owned(),
         Kind::List(kind) => {
-            let element = Column::new(&column.name, (**kind).clone());
-            match &element.kind {
-                Kind::Struct(fields) if element.kind != image() => format!("[{}]", object(fields, classes)),
+            let element = Head::new(column.name, *kind);
+            match element.kind {
+                Kind::Struct(fields) if element.kind != IMAGE => format!("[{}]", object(fields, classes)),
                 _ => format!("{{\"feature\": {}, \"_type\": \"Sequence\"}}", feature(&element, classes)),
             }
         }
@@ -45,12 +44,12 @@ fn feature(column: &Column, classes: &[String]) -> String {
     }
 }
 
-fn dtype(kind: &Kind) -> &'static str {
+fn dtype(kind: Kind) -> &'static str {
     match kind {
-        Kind::Bool => "bool",
-        Kind::U32 => "uint32",
-        Kind::I64 => "int64",
-        Kind::F64 => "float64",
+        Kind::Flag => "bool",
+        Kind::Id => "uint32",
+        Kind::Whole => "int64",
+        Kind::Number => "float64",
         Kind::Text => "string",
         // Lists and structs have no name of one word.
         Kind::Bytes | Kind::List(_) | Kind::Struct(_) => "binary",
@@ -58,19 +57,19 @@ fn dtype(kind: &Kind) -> &'static str {
 }
 
 /// The same as the card wants it: a list of features with their names.
-pub(super) fn yaml(columns: &[Column], classes: &[String]) -> String {
+pub(super) fn yaml(columns: &[Head], classes: &[String]) -> String {
     let each = columns.iter().map(|column| {
-        let (key, what) = entry(&column.name, &column.kind, classes);
-        format!("{{\"name\": {}, \"{key}\": {what}}}", quoted(&column.name))
+        let (key, what) = entry(column.name, column.kind, classes);
+        format!("{{\"name\": {}, \"{key}\": {what}}}", quoted(column.name))
     });
     format!("[{}]", each.collect::<Vec<_>>().join(", "))
 }
 
-fn entry(name: &str, kind: &Kind, classes: &[String]) -> (&'static str, String) {
+fn entry(name: &str, kind: Kind, classes: &[String]) -> (&'static str, String) {
     match kind {
-        kind if *kind == image() => ("dtype", "\"image\"".to_owned()),
-        Kind::List(kind) => match &**kind {
-            Kind::Struct(fields) if **kind != image() => ("list", yaml(fields, classes)),
+        IMAGE => ("dtype", "\"image\"".to_owned()),
+        Kind::List(kind) => match *kind {
+            Kind::Struct(fields) if *kind != IMAGE => ("list", yaml(fields, classes)),
             kind => ("list", entry(name, kind, classes).1),
         },
         Kind::Struct(fields) => ("struct", yaml(fields, classes)),

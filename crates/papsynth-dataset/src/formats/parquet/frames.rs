@@ -3,112 +3,103 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fmt::Write;
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
 
 use papsynth::Plane;
-use papsynth::truth::{ObjectTruth, Truth};
+use papsynth::truth::ObjectTruth;
+use parquet::data_type::ByteArray;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::{List, ListAccessor, Row, RowAccessor};
+use parquet::schema::types::Type;
 
-use super::failed::failed;
-use super::features::{CLASS, image, metadata, yaml};
-use super::schema::{Column, Kind};
-use super::writer::{Value, Writer};
-use crate::error::Error;
+use super::features::{CLASS, IMAGE, metadata, yaml};
+use super::writer::{Writer, failed};
+use crate::error::{Error, Problem};
 use crate::files::Pending;
-use crate::formats::huggingface::{CARD, PICTURE, file, name};
-use crate::formats::names::numbered;
+use crate::formats::names::{HUGGINGFACE_CARD, PICTURE, PLANES, huggingface_file, huggingface_split, numbered};
 use crate::formats::sink::{Field, Files, Sink};
-use crate::truth::{Category, Form, Geometry, Split, part, rle};
+use crate::truth::{Cell, FrameSummary, Head, Kind, Split, part, rle};
 use crate::write;
 
-/// The columns. Nothing is missing anywhere, but `datasets` takes features from a file only where all may be.
-fn columns() -> Vec<Column> {
-    let column = |name, kind| Column::new(name, kind).or_null();
-    vec![
-        column("index", Kind::I64),
-        column("slide", Kind::I64),
-        column("width", Kind::I64),
-        column("height", Kind::I64),
-        column("pixel_um", Kind::F64),
-        column("bits", Kind::I64),
-        column("planes_um", Kind::list(Kind::F64)),
-        column("objects", Kind::list(Kind::Struct(object_columns()))),
-        column("image", image()),
-        column("planes", Kind::list(image())),
-    ]
-}
-
-fn object_columns() -> Vec<Column> {
-    let column = |name, kind| Column::new(name, kind).or_null();
-    vec![
-        column("id", Kind::U32),
-        column("part", Kind::Text),
-        column(CLASS, Kind::I64),
-        column("kind", Kind::Text),
-        column("class", Kind::Text),
-        column("bethesda", Kind::Text),
-        column("traits", Kind::Text),
-        column("cluster", Kind::U32),
-        column("bbox", Kind::list(Kind::I64)),
-        column("area", Kind::I64),
-        column("front_area", Kind::I64),
-        column("area_um2", Kind::F64),
-        column("depth_um", Kind::F64),
-        column("stain", Kind::F64),
-        column("tint", Kind::Text),
-        column("truncated", Kind::Bool),
-        column("rle", Kind::Text),
-        column("front_rle", Kind::Text),
-    ]
+/// Nothing is missing anywhere, but `datasets` takes features from a file only where all may be.
+const fn head(name: &'static str, kind: Kind) -> Head {
+    Head::new(name, kind).or_null()
 }
 
 /// What is known of a frame but its pixels: the first columns.
-fn row(field: &Field) -> Result<Vec<Value>, Error> {
-    let Geometry { view, bits, planes_um, slide, .. } = field.geometry;
-    let category = |id: u32| field.document.categories.iter().position(|category: &Category| category.id == id);
-    let objects = field.truth.objects.iter().zip(&field.document.annotations).map(|(one, annotation)| {
-        let category = category(annotation.category_id);
-        category
-            .map(|category| object(field.truth, one, category as u64))
-            .ok_or_else(|| field.geometry.wrong(format!("there is no category {}", annotation.category_id)))
+const FRAME: [(Head, fn(&Field) -> Cell); 8] = [
+    (head("index", Kind::Whole), |field| Cell::Whole(field.frame.index)),
+    (head("slide", Kind::Whole), |field| Cell::Whole(field.frame.slide)),
+    (head("width", Kind::Whole), |field| Cell::Whole(field.frame.width as u64)),
+    (head("height", Kind::Whole), |field| Cell::Whole(field.frame.height as u64)),
+    (head("pixel_um", Kind::Number), |field| Cell::Number(field.frame.pixel_um)),
+    (head("bits", Kind::Whole), |field| Cell::Whole(field.frame.bits.into())),
+    (head("planes_um", Kind::List(&Kind::Number)), |field| Cell::numbers(&field.frame.planes_um)),
+    (head("objects", Kind::List(&Kind::Struct(&OBJECT_HEADS))), objects),
+];
+
+/// An object of a frame, and the place of its category among those of the data set.
+struct Object<'a> {
+    frame: &'a FrameSummary,
+    truth: &'a ObjectTruth,
+    category: u64,
+}
+
+const OBJECT: [(Head, fn(&Object) -> Cell); 18] = [
+    (head("id", Kind::Id), |o| Cell::Id(o.truth.id)),
+    (head("part", Kind::Text), |o| Cell::text(part(o.truth.part))),
+    (head(CLASS, Kind::Whole), |o| Cell::Whole(o.category)),
+    (head("kind", Kind::Text), |o| Cell::text(o.truth.kind.name())),
+    (head("class", Kind::Text), |o| Cell::text(&o.truth.class)),
+    (head("bethesda", Kind::Text), |o| Cell::text(&o.truth.bethesda)),
+    (head("traits", Kind::Text), |o| Cell::text(o.truth.traits.to_string())),
+    (head("cluster", Kind::Id), |o| Cell::Id(o.truth.cluster)),
+    (head("bbox", Kind::List(&Kind::Whole)), |o| {
+        let bounds = o.truth.amodal.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height]);
+        Cell::List(bounds.map(|side| Cell::Whole(side.into())).to_vec())
+    }),
+    (head("area", Kind::Whole), |o| Cell::Whole(o.truth.amodal.area())),
+    (head("front_area", Kind::Whole), |o| Cell::Whole(o.truth.front.area())),
+    (head("area_um2", Kind::Number), |o| Cell::Number(o.truth.area_um2)),
+    (head("depth_um", Kind::Number), |o| Cell::Number(o.truth.depth_um)),
+    (head("stain", Kind::Number), |o| Cell::Number(o.truth.stain)),
+    (head("tint", Kind::Text), |o| Cell::text(o.truth.tint_name())),
+    (head("truncated", Kind::Flag), |o| Cell::Flag(o.truth.truncated)),
+    (head("rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.amodal, o.frame.width, o.frame.height))),
+    (head("front_rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.front, o.frame.width, o.frame.height))),
+];
+
+const OBJECT_HEADS: [Head; OBJECT.len()] = {
+    let mut heads = [OBJECT[0].0; OBJECT.len()];
+    let mut at = 1;
+    while at < heads.len() {
+        heads[at] = OBJECT[at].0;
+        at += 1;
+    }
+    heads
+};
+
+fn columns() -> Vec<Head> {
+    let images = [head("image", IMAGE), head("planes", Kind::List(&IMAGE))];
+    FRAME.into_iter().map(|(head, _)| head).chain(images).collect()
+}
+
+fn objects(field: &Field) -> Cell {
+    let Field { frame, document, .. } = field;
+    let objects = field.truth.objects.iter().zip(&document.annotations).map(|(truth, annotation)| {
+        let category = document.categories.iter().position(|category| category.id == annotation.category_id);
+        let category = category.expect("annotations are of categories of their document") as u64;
+        let object = Object { frame, truth, category };
+        Cell::Struct(OBJECT.iter().map(|(_, cell)| cell(&object)).collect())
     });
-    Ok(vec![
-        field.index().into(),
-        (*slide).into(),
-        (view.width as u64).into(),
-        (view.height as u64).into(),
-        view.pixel_um.into(),
-        u64::from(*bits).into(),
-        Value::List(planes_um.iter().copied().map(Value::F64).collect()),
-        Value::List(objects.collect::<Result<_, _>>()?),
-    ])
+    Cell::List(objects.collect())
 }
 
-fn object(truth: &Truth, object: &ObjectTruth, category: u64) -> Value {
-    let bounds = object.amodal.bounds().map_or([0; 4], |b| [b.x, b.y, b.width, b.height]);
-    let mask = |mask| rle::encode(mask, truth.width, truth.height).into();
-    Value::Struct(vec![
-        object.id.into(),
-        part(object.part).into(),
-        category.into(),
-        object.kind.name().into(),
-        object.class.as_str().into(),
-        object.bethesda.as_str().into(),
-        object.traits.to_string().as_str().into(),
-        object.cluster.into(),
-        Value::List(bounds.map(|side| u64::from(side).into()).to_vec()),
-        object.amodal.area().into(),
-        object.front.area().into(),
-        object.area_um2.into(),
-        object.depth_um.into(),
-        object.stain.into(),
-        object.tint_name().into(),
-        object.truncated.into(),
-        mask(&object.amodal),
-        mask(&object.front),
-    ])
-}
-
-fn picture(path: String, bytes: Vec<u8>) -> Value {
-    Value::Struct(vec![bytes.into(), path.into()])
+fn picture(path: String, bytes: Vec<u8>) -> Cell {
+    Cell::Struct(vec![Cell::Bytes(bytes), Cell::text(path)])
 }
 
 /// Writes the frames of a shard, a file for each split.
@@ -125,30 +116,29 @@ pub(crate) fn sink(_: &Files) -> Result<Box<dyn Sink>, Error> {
 }
 
 impl Sink for Shard {
-    fn begin(&mut self, _: &Geometry, _: &Files) -> Result<(), Error> {
+    fn begin(&mut self, _: &FrameSummary, _: &Files) -> Result<(), Error> {
         self.planes.clear();
         Ok(())
     }
 
-    fn plane(&mut self, plane: &Plane, geometry: &Geometry, files: &Files) -> Result<(), Error> {
-        if Form::of(geometry.planes_um.len()) == Form::Stack {
-            let Geometry { view, bits, channels, slide, key, .. } = geometry;
-            let png = write::png(&plane.grey, view.width, *channels, *bits, view.pixel_um);
-            let path = files.folder.path(&file(Split::of_slide(key.seed, *slide), files.shard));
+    fn plane(&mut self, plane: &Plane, frame: &FrameSummary, files: &Files) -> Result<(), Error> {
+        if frame.is_stack() {
+            let png = write::png(&plane.grey, frame.width, frame.channels, frame.bits, frame.pixel_um);
+            let path = files.folder.path(&huggingface_file(Split::of_slide(files.seed, frame.slide), files.shard));
             self.planes.push(png.map_err(Error::io("encode", &path))?);
         }
         Ok(())
     }
 
     fn field(&mut self, field: &Field, files: &mut Files) -> Result<(), Error> {
-        let (split, key) = (field.split(), numbered(field.index()));
-        let name = file(split, files.shard);
+        let (split, key) = (field.split(), numbered(field.frame.index));
+        let name = huggingface_file(split, files.shard);
         let path = files.folder.path(&name);
-        let mut row = row(field)?;
+        let mut row: Vec<Cell> = FRAME.iter().map(|(_, cell)| cell(field)).collect();
         row.push(picture(format!("{key}{PICTURE}"), field.png().map_err(Error::io("encode", &path))?.to_vec()));
         let planes = std::mem::take(&mut self.planes).into_iter().enumerate();
         let planes = planes.map(|(number, png)| picture(format!("{key}.{number:03}{PICTURE}"), png));
-        row.push(Value::List(planes.collect()));
+        row.push(Cell::List(planes.collect()));
         let (_, writer) = match self.files.entry(split) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
@@ -180,7 +170,7 @@ pub(crate) fn card(classes: &[String], splits: &[Split]) -> Result<(String, Vec<
         .to_owned();
     for split in splits {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "  - split: {0}\n    path: data/{0}-*.parquet", name(*split));
+        let _ = writeln!(text, "  - split: {0}\n    path: data/{0}-*.parquet", huggingface_split(*split));
     }
     let _ = writeln!(text, "dataset_info:\n  features: {}\n---", yaml(&columns(), classes));
     text.push_str(
@@ -189,7 +179,50 @@ pub(crate) fn card(classes: &[String], splits: &[Split]) -> Result<(String, Vec<
          compressed run lengths. Splits are by slide: fields of a slide share stain and light.\n\n```python\nfrom datasets import \
          load_dataset\n\nfields = load_dataset(\"huggingface\", split=\"train\")    # this folder\n```\n",
     );
-    Ok((CARD.to_owned(), text.into_bytes()))
+    Ok((HUGGINGFACE_CARD.to_owned(), text.into_bytes()))
+}
+
+/// The files of an image, its picture or all its planes, from a file whose SHA-256 is that of its record.
+pub(crate) fn images(path: &Path, image: &str) -> Result<Vec<Vec<u8>>, Error> {
+    let named = image.strip_suffix(PICTURE).map(|index| (index, "image"));
+    let named = named.or(image.strip_suffix(PLANES).map(|index| (index, "planes")));
+    let wanted = named.and_then(|(index, column)| Some((index.parse().ok()?, column)));
+    let found = match wanted {
+        Some((index, column)) => find(path, index, column).map_err(failed("read", path))?,
+        None => None,
+    };
+    found.ok_or_else(|| {
+        Error::input(path)(Problem::broken("Parquet", format!("it has no image `{}`", image.escape_default())))
+    })
+}
+
+/// The images in a column of the row of a frame, if there is that row. Each group of rows is read by itself.
+fn find(path: &Path, index: i64, column: &str) -> Result<Option<Vec<Vec<u8>>>, ParquetError> {
+    let reader = SerializedFileReader::new(File::open(path)?)?;
+    let fields = reader.metadata().file_metadata().schema().get_fields().to_vec();
+    let only = |name: &str| {
+        let fields = fields.iter().filter(|field| field.name() == name).map(Arc::clone).collect();
+        Type::group_type_builder("schema").with_fields(fields).build()
+    };
+    for number in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(number)?;
+        for (place, row) in group.get_row_iter(Some(only("index")?))?.enumerate() {
+            if row?.get_long(0)? == index {
+                let row = group.get_row_iter(Some(only(column)?))?.nth(place).transpose()?;
+                return row.map(|row| files(&row, column)).transpose();
+            }
+        }
+    }
+    Ok(None)
+}
+
+fn files(row: &Row, column: &str) -> Result<Vec<Vec<u8>>, ParquetError> {
+    let bytes = |image: &Row| image.get_bytes(0).map(ByteArray::data).map(<[u8]>::to_vec);
+    if column == "image" {
+        return Ok(vec![bytes(row.get_group(0)?)?]);
+    }
+    let planes = row.get_list(0)?;
+    (0..List::len(planes)).map(|plane| bytes(planes.get_group(plane)?)).collect()
 }
 
 #[cfg(test)]

@@ -1,17 +1,19 @@
 //! Rows in, a Parquet file out: the same bytes for the same rows, and memory for one group of them.
 
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
 use std::sync::Arc;
 
-use parquet::basic::Compression;
+use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int32Type, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterVersion};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
-use parquet::schema::types::SchemaDescriptor;
+use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 
-use super::schema::{Column, Kind, to_parquet};
+use crate::error::{Error, Problem};
+use crate::truth::{Cell, Head, Kind};
 
 /// A group of rows is written when it has so many bytes in memory, about, or so many rows.
 const GROUP_BYTES: usize = 32 << 20;
@@ -23,39 +25,46 @@ const BUFFER_BYTES: usize = 1 << 18;
 /// What the file says that it was written by: the same whatever stands behind it.
 const CREATED_BY: &str = concat!("papsynth-parquet version ", env!("CARGO_PKG_VERSION"));
 
-/// What stands in a cell of a table.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Value {
-    /// Nothing, where a column allows that.
-    Null,
-    Bool(bool),
-    U32(u32),
-    I64(i64),
-    F64(f64),
-    Text(String),
-    Bytes(Vec<u8>),
-    List(Vec<Value>),
-    /// A value for each field.
-    Struct(Vec<Value>),
-}
-
-macro_rules! from {
-    ($($kind:ty => $variant:ident),*) => {$(
-        impl From<$kind> for Value {
-            fn from(value: $kind) -> Self {
-                Self::$variant(value.into())
-            }
-        }
-    )*};
-}
-
-from!(bool => Bool, u32 => U32, f64 => F64, &str => Text, String => Text, Vec<u8> => Bytes);
-
-/// Tables have no unsigned numbers of 64 bits that everybody reads; none of ours is so large.
-impl From<u64> for Value {
-    fn from(whole: u64) -> Self {
-        Self::I64(i64::try_from(whole).unwrap_or(i64::MAX))
+/// The kinds of the columns of the file that hold the values of one of these.
+fn leaves(kind: Kind) -> Vec<Kind> {
+    match kind {
+        Kind::List(kind) => leaves(*kind),
+        Kind::Struct(fields) => leaves_of(fields).collect(),
+        leaf => vec![leaf],
     }
+}
+
+fn leaves_of(columns: &[Head]) -> impl Iterator<Item = Kind> {
+    columns.iter().flat_map(|column| leaves(column.kind))
+}
+
+fn in_file(column: &Head) -> Result<TypePtr, ParquetError> {
+    node(column.name, column.kind, if column.nullable { Repetition::OPTIONAL } else { Repetition::REQUIRED })
+}
+
+fn node(name: &str, kind: Kind, repetition: Repetition) -> Result<TypePtr, ParquetError> {
+    let leaf = |physical, logical: Option<LogicalType>| {
+        let leaf = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+        leaf.with_logical_type(logical).build()
+    };
+    let group = |logical: Option<LogicalType>, fields: Vec<TypePtr>| {
+        let group = Type::group_type_builder(name).with_repetition(repetition);
+        group.with_logical_type(logical).with_fields(fields).build()
+    };
+    Ok(Arc::new(match kind {
+        Kind::Flag => leaf(Physical::BOOLEAN, None)?,
+        Kind::Id => leaf(Physical::INT32, Some(LogicalType::integer(32, false)))?,
+        Kind::Whole => leaf(Physical::INT64, None)?,
+        Kind::Number => leaf(Physical::DOUBLE, None)?,
+        Kind::Text => leaf(Physical::BYTE_ARRAY, Some(LogicalType::String))?,
+        Kind::Bytes => leaf(Physical::BYTE_ARRAY, None)?,
+        Kind::List(kind) => {
+            let element = node("element", *kind, Repetition::OPTIONAL)?;
+            let list = Type::group_type_builder("list").with_repetition(Repetition::REPEATED);
+            group(Some(LogicalType::List), vec![Arc::new(list.with_fields(vec![element]).build()?)])?
+        }
+        Kind::Struct(fields) => group(None, fields.iter().map(in_file).collect::<Result<_, _>>()?)?,
+    }))
 }
 
 /// The values of a column of the file that are there.
@@ -88,33 +97,34 @@ struct Level {
 }
 
 impl Leaf {
-    fn new(kind: &Kind) -> Self {
+    fn new(kind: Kind) -> Self {
         let values = match kind {
-            Kind::Bool => Values::Bool(Vec::new()),
-            Kind::U32 => Values::U32(Vec::new()),
-            Kind::I64 => Values::I64(Vec::new()),
-            Kind::F64 => Values::F64(Vec::new()),
+            Kind::Flag => Values::Bool(Vec::new()),
+            Kind::Id => Values::U32(Vec::new()),
+            Kind::Whole => Values::I64(Vec::new()),
+            Kind::Number => Values::F64(Vec::new()),
             Kind::Text | Kind::Bytes | Kind::List(_) | Kind::Struct(_) => Values::Bytes(Vec::new()),
         };
         Self { values, definitions: Vec::new(), repetitions: Vec::new() }
     }
 
     /// Adds a value, or the lack of one, and says how many bytes it takes, about.
-    fn push(&mut self, value: Value, level: Level) -> usize {
+    fn push(&mut self, value: Cell, level: Level) -> usize {
         let length = match &value {
-            Value::Text(text) => text.len(),
-            Value::Bytes(bytes) => bytes.len(),
+            Cell::Text(text) => text.len(),
+            Cell::Bytes(bytes) => bytes.len(),
             _ => 0,
         };
         match (value, &mut self.values) {
-            (Value::Null, _) => {}
-            (Value::Bool(value), Values::Bool(values)) => values.push(value),
+            (Cell::Nothing, _) => {}
+            (Cell::Flag(value), Values::Bool(values)) => values.push(value),
             // The same bits: the column says that they have no sign.
-            (Value::U32(value), Values::U32(values)) => values.push(value.cast_signed()),
-            (Value::I64(value), Values::I64(values)) => values.push(value),
-            (Value::F64(value), Values::F64(values)) => values.push(value),
-            (Value::Text(value), Values::Bytes(values)) => values.push(value.into_bytes().into()),
-            (Value::Bytes(value), Values::Bytes(values)) => values.push(value.into()),
+            (Cell::Id(value), Values::U32(values)) => values.push(value.cast_signed()),
+            // Tables have no unsigned numbers of 64 bits that everybody reads; none of ours is so large.
+            (Cell::Whole(value), Values::I64(values)) => values.push(i64::try_from(value).unwrap_or(i64::MAX)),
+            (Cell::Number(value), Values::F64(values)) => values.push(value),
+            (Cell::Text(value), Values::Bytes(values)) => values.push(value.into_bytes().into()),
+            (Cell::Bytes(value), Values::Bytes(values)) => values.push(value.into()),
             (value, _) => unreachable!("{value:?} in a column of another kind"),
         }
         self.definitions.push(level.definition);
@@ -142,29 +152,28 @@ impl Leaf {
 }
 
 /// Takes a value apart into its leaves, as Dremel does: Melnik et al., VLDB 3 (2010) 330-339. Says how many bytes it takes in memory, about.
-fn shred(kind: &Kind, nullable: bool, value: Value, at: Level, leaves: &mut [Leaf]) -> usize {
-    let lack = |level, leaves: &mut [Leaf]| leaves.iter_mut().map(|leaf| leaf.push(Value::Null, level)).sum();
+fn shred(kind: Kind, nullable: bool, value: Cell, at: Level, leaves: &mut [Leaf]) -> usize {
+    let lack = |level, leaves: &mut [Leaf]| leaves.iter_mut().map(|leaf| leaf.push(Cell::Nothing, level)).sum();
     let there = Level { definition: at.definition + i16::from(nullable), ..at };
     match (value, kind) {
-        (Value::Null, _) => lack(at, leaves),
-        (Value::List(values), _) if values.is_empty() => lack(there, leaves),
-        (Value::List(values), Kind::List(kind)) => {
+        (Cell::Nothing, _) => lack(at, leaves),
+        (Cell::List(values), _) if values.is_empty() => lack(there, leaves),
+        (Cell::List(values), Kind::List(kind)) => {
             let first = Level { definition: there.definition + 1, depth: at.depth + 1, ..at };
             let next = Level { repetition: first.depth, ..first };
             let levels = std::iter::once(first).chain(std::iter::repeat(next));
-            values.into_iter().zip(levels).map(|(value, level)| shred(kind, true, value, level, leaves)).sum()
+            values.into_iter().zip(levels).map(|(value, level)| shred(*kind, true, value, level, leaves)).sum()
         }
-        (Value::Struct(values), Kind::Struct(fields)) => shred_all(fields, values, there, leaves),
+        (Cell::Struct(values), Kind::Struct(fields)) => shred_all(fields, values, there, leaves),
         (value, _) => leaves[0].push(value, there),
     }
 }
 
-/// The same of a value for each column.
-fn shred_all(columns: &[Column], values: Vec<Value>, at: Level, mut leaves: &mut [Leaf]) -> usize {
+fn shred_all(columns: &[Head], values: Vec<Cell>, at: Level, mut leaves: &mut [Leaf]) -> usize {
     let mut bytes = 0;
     for (column, value) in columns.iter().zip(values) {
-        let (own, others) = leaves.split_at_mut(column.kind.leaves().len());
-        bytes += shred(&column.kind, column.nullable, value, at, own);
+        let (own, others) = leaves.split_at_mut(self::leaves(column.kind).len());
+        bytes += shred(column.kind, column.nullable, value, at, own);
         leaves = others;
     }
     bytes
@@ -173,7 +182,7 @@ fn shred_all(columns: &[Column], values: Vec<Value>, at: Level, mut leaves: &mut
 /// Writes a table row by row. Dropped before it is finished, it leaves no Parquet file.
 pub(super) struct Writer<'a> {
     file: SerializedFileWriter<BufWriter<Box<dyn Write + Send + 'a>>>,
-    columns: Vec<Column>,
+    columns: Vec<Head>,
     leaves: Vec<Leaf>,
     rows: usize,
     bytes: usize,
@@ -183,10 +192,11 @@ impl<'a> Writer<'a> {
     /// Begins a table with these columns and pairs of a name and a text that the footer keeps.
     pub(super) fn new(
         out: Box<dyn Write + Send + 'a>,
-        columns: Vec<Column>,
+        columns: Vec<Head>,
         metadata: &[(&str, &str)],
     ) -> Result<Self, ParquetError> {
-        let root = to_parquet(&columns)?;
+        let fields = columns.iter().map(in_file).collect::<Result<_, _>>()?;
+        let root = Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?);
         let pairs = metadata.iter().map(|&(key, value)| KeyValue::new(key.to_owned(), value.to_owned()));
         let mut properties = WriterProperties::builder()
             .set_writer_version(WriterVersion::PARQUET_1_0)
@@ -197,8 +207,7 @@ impl<'a> Writer<'a> {
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
             .set_max_row_group_row_count(None);
-        let kinds = columns.iter().flat_map(|column| column.kind.leaves());
-        for (column, kind) in SchemaDescriptor::new(Arc::clone(&root)).columns().iter().zip(kinds) {
+        for (column, kind) in SchemaDescriptor::new(Arc::clone(&root)).columns().iter().zip(leaves_of(&columns)) {
             let path = column.path().clone();
             properties = match kind {
                 Kind::Text => properties.set_column_dictionary_enabled(path, true),
@@ -214,14 +223,12 @@ impl<'a> Writer<'a> {
         Ok(Self { file, columns, leaves, rows: 0, bytes: 0 })
     }
 
-    /// Adds a row, of a value for each column.
-    pub(super) fn row(&mut self, row: Vec<Value>) -> Result<(), ParquetError> {
+    pub(super) fn row(&mut self, row: Vec<Cell>) -> Result<(), ParquetError> {
         self.bytes += shred_all(&self.columns, row, Level::default(), &mut self.leaves);
         self.rows += 1;
         if self.rows >= GROUP_ROWS || self.bytes >= GROUP_BYTES { self.flush() } else { Ok(()) }
     }
 
-    /// Writes the rows that are left, and the footer.
     pub(super) fn finish(mut self) -> Result<(), ParquetError> {
         self.flush()?;
         Ok(self.file.into_inner()?.flush()?)
@@ -243,9 +250,18 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// The leaves of a table without rows.
-fn empty(columns: &[Column]) -> Vec<Leaf> {
-    columns.iter().flat_map(|column| column.kind.leaves()).map(Leaf::new).collect()
+fn empty(columns: &[Head]) -> Vec<Leaf> {
+    leaves_of(columns).map(Leaf::new).collect()
+}
+
+pub(super) fn failed(action: &'static str, path: &Path) -> impl Fn(ParquetError) -> Error {
+    move |error| match error {
+        ParquetError::External(inner) => match inner.downcast::<io::Error>() {
+            Ok(error) => Error::io(action, path)(*error),
+            Err(other) => Error::input(path)(Problem::broken("Parquet", other)),
+        },
+        other => Error::input(path)(Problem::broken("Parquet", other)),
+    }
 }
 
 #[cfg(test)]
@@ -257,7 +273,7 @@ mod tests {
     use super::*;
     use crate::support::Scratch;
 
-    fn begin(scratch: &Scratch, columns: Vec<Column>) -> Writer<'static> {
+    fn begin(scratch: &Scratch, columns: Vec<Head>) -> Writer<'static> {
         let file = File::create(scratch.join("table.parquet")).unwrap();
         Writer::new(Box::new(file), columns, &[("a", "1")]).unwrap()
     }
@@ -268,28 +284,23 @@ mod tests {
 
     #[test]
     fn nested_rows_are_read_back_as_they_were_written() {
-        let fields = vec![
-            Column::new("id", Kind::U32).or_null(),
-            Column::new("name", Kind::Text),
-            Column::new("sides", Kind::list(Kind::F64)),
+        const FIELDS: &[Head] = &[
+            Head::new("id", Kind::Id).or_null(),
+            Head::new("name", Kind::Text),
+            Head::new("sides", Kind::List(&Kind::Number)),
         ];
         let columns = vec![
-            Column::new("n", Kind::I64),
-            Column::new("flag", Kind::Bool).or_null(),
-            Column::new("objects", Kind::list(Kind::Struct(fields))).or_null(),
+            Head::new("n", Kind::Whole),
+            Head::new("flag", Kind::Flag).or_null(),
+            Head::new("objects", Kind::List(&Kind::Struct(FIELDS))).or_null(),
         ];
-        let object = |id: Value, sides: &[f64]| {
-            Value::Struct(vec![id, "x".into(), Value::List(sides.iter().copied().map(Value::F64).collect())])
-        };
+        let object = |id: Cell, sides: &[f64]| Cell::Struct(vec![id, Cell::text("x"), Cell::numbers(sides)]);
+        let both = Cell::List(vec![object(Cell::Id(7), &[0.5, 2.0]), object(Cell::Nothing, &[])]);
         let rows = vec![
-            vec![
-                Value::I64(1),
-                true.into(),
-                Value::List(vec![object(7_u32.into(), &[0.5, 2.0]), object(Value::Null, &[])]),
-            ],
-            vec![Value::I64(-2), Value::Null, Value::List(Vec::new())],
-            vec![Value::I64(3), false.into(), Value::Null],
-            vec![Value::I64(4), false.into(), Value::List(vec![object(u32::MAX.into(), &[1.0])])],
+            vec![Cell::Whole(1), Cell::Flag(true), both],
+            vec![Cell::Whole(2), Cell::Nothing, Cell::List(Vec::new())],
+            vec![Cell::Whole(3), Cell::Flag(false), Cell::Nothing],
+            vec![Cell::Whole(4), Cell::Flag(false), Cell::List(vec![object(Cell::Id(u32::MAX), &[1.0])])],
         ];
         let scratch = Scratch::new("nested-rows");
         let mut writer = begin(&scratch, columns);
@@ -299,7 +310,7 @@ mod tests {
             reader(&scratch).get_row_iter(None).unwrap().map(|row| row.unwrap().to_string()).collect::<Vec<_>>();
         let expected = [
             "{n: 1, flag: true, objects: [{id: 7, name: \"x\", sides: [0.5, 2.0]}, {id: null, name: \"x\", sides: []}]}",
-            "{n: -2, flag: null, objects: []}",
+            "{n: 2, flag: null, objects: []}",
             "{n: 3, flag: false, objects: null}",
             "{n: 4, flag: false, objects: [{id: 4294967295, name: \"x\", sides: [1.0]}]}",
         ];
@@ -309,9 +320,9 @@ mod tests {
     #[test]
     fn memory_is_bounded_by_a_group() {
         let scratch = Scratch::new("bounded-rows");
-        let mut writer = begin(&scratch, vec![Column::new("data", Kind::Bytes)]);
+        let mut writer = begin(&scratch, vec![Head::new("data", Kind::Bytes)]);
         for n in 1..=70_u64 {
-            writer.row(vec![vec![7_u8; 1 << 20].into()]).unwrap();
+            writer.row(vec![Cell::Bytes(vec![7_u8; 1 << 20])]).unwrap();
             let written = scratch.join("table.parquet").metadata().unwrap().len();
             assert!(
                 (n << 20) <= written + (GROUP_BYTES + BUFFER_BYTES) as u64,

@@ -1,4 +1,4 @@
-//! One label a pixel, where several objects may lie.
+//! Label images: with one label a pixel where several objects may lie, and in layers that lose nothing.
 
 use papsynth::truth::{Group, Truth};
 use serde::{Deserialize, Serialize};
@@ -74,6 +74,22 @@ impl Flatten {
     }
 }
 
+/// The labels of a group in as few layers as a first fit in the order of ids needs, at least one; each row by row. No two objects of a layer share
+/// a pixel, so that each shows its complete mask.
+pub(crate) fn layers(truth: &Truth, group: Group) -> Vec<Vec<u32>> {
+    let empty = || vec![0_u32; truth.width * truth.height];
+    let mut layers = vec![empty()];
+    for object in truth.objects.iter().filter(|object| object.group() == group) {
+        let is_free = |layer: &Vec<u32>| object.amodal.pixels(truth.width).all(|pixel| layer[pixel] == 0);
+        let free = layers.iter().position(is_free).unwrap_or_else(|| {
+            layers.push(empty());
+            layers.len() - 1
+        });
+        object.amodal.pixels(truth.width).for_each(|pixel| layers[free][pixel] = object.id);
+    }
+    layers
+}
+
 #[cfg(test)]
 mod tests {
     use papsynth::truth::Mask;
@@ -108,5 +124,23 @@ mod tests {
         }
         let overlap = |policy: Flatten| policy.lost(&truth, Group::Cytoplasm);
         assert!(overlap(Flatten::Top) > 50 && overlap(Flatten::Drop) == 2 * overlap(Flatten::Top));
+    }
+
+    #[test]
+    fn every_mask_stands_whole_in_one_layer() {
+        let truth = frame(0, 1, 8, 1).finished.truth;
+        for (group, count) in [(Group::Cytoplasm, 2), (Group::Nucleus, 1), (Group::Debris, 1)] {
+            let layers = layers(&truth, group);
+            assert_eq!(layers.len(), count, "{group:?}");
+            for object in truth.objects.iter().filter(|object| object.group() == group) {
+                let shown: Vec<Vec<usize>> = layers
+                    .iter()
+                    .map(|layer| (0..layer.len()).filter(|&pixel| layer[pixel] == object.id).collect())
+                    .collect();
+                let whole = object.amodal.pixels(WIDTH).collect::<Vec<_>>();
+                assert_eq!(shown.iter().filter(|pixels| **pixels == whole).count(), 1);
+                assert_eq!(shown.iter().filter(|pixels| pixels.is_empty()).count(), layers.len() - 1);
+            }
+        }
     }
 }
