@@ -15,8 +15,7 @@ const NARROWEST_BAND: f64 = 0.008;
 /// Rounds of fitting and choosing; later ones change nothing that is seen.
 const ROUNDS: usize = 6;
 
-/// How strongly the surface is held flat, as a part of the blocks' number: too little to be seen with a tenth of them on empty
-/// slide, enough where only a corner is.
+/// How strongly the surface is held flat, a part of the blocks' number: felt where only a corner of the slide is empty.
 const STIFFNESS: f64 = 1e-4;
 
 /// Least light that counts, as a part of full scale: half a level of 8 bits.

@@ -14,19 +14,7 @@ pub enum Error {
         /// What would be accepted.
         accepted: &'static str,
     },
-    /// A picture's length is no multiple of its width, or it is too small once invalid borders are gone.
-    #[error("picture `{name}` is {width} x {height} pixels; accepted are at least {least} a side")]
-    Size {
-        /// Name of the picture.
-        name: String,
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-        /// Fewest columns and rows.
-        least: usize,
-    },
-    /// A picture holds something that is no grey level, or only one.
+    /// A picture whose size, grey levels or nuclei cannot be right.
     #[error("picture `{name}` {what}")]
     Picture {
         /// Name of the picture.
@@ -50,4 +38,15 @@ pub enum Error {
         /// Name of the field.
         name: String,
     },
+}
+
+impl Error {
+    /// Refuses the first parameter that is outside its range: each with its name, value, least and most, and what would be accepted.
+    ///
+    /// # Errors
+    /// If one is.
+    pub fn check(parameters: &[(&'static str, f64, [f64; 2], &'static str)]) -> Result<(), Self> {
+        let bad = parameters.iter().find(|(_, value, [least, most], _)| !(value >= least && value <= most));
+        bad.map_or(Ok(()), |&(field, value, _, accepted)| Err(Self::Parameter { field, value, accepted }))
+    }
 }

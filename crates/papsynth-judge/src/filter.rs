@@ -9,8 +9,7 @@ const REACH: f64 = 3.5;
 
 /// Convolution with a Gaussian; the image is mirrored at its border.
 pub(crate) fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
-    let taps = taps(sigma);
-    separable(image, width, &taps, &taps)
+    separable(image, width, &taps(sigma), mirrored)
 }
 
 /// The taps of a Gaussian from its centre outwards.
@@ -21,32 +20,22 @@ fn taps(sigma: f64) -> Vec<f32> {
     weights.iter().map(|w| single(w / sum)).collect()
 }
 
-/// Convolution with symmetric taps along rows and along columns, each given from its centre outwards.
-fn separable(image: &[f32], width: usize, across: &[f32], down: &[f32]) -> Vec<f32> {
+/// Convolution with symmetric taps along rows and along columns, given from their centre outwards. `place` says which index in
+/// `0..length` stands for `i - reach`, from `i`, `reach` and `length`.
+pub fn separable(image: &[f32], width: usize, taps: &[f32], place: fn(usize, usize, usize) -> usize) -> Vec<f32> {
     let height = image.len() / width.max(1);
     let mut rows = vec![0.0; image.len()];
-    let reach = across.len() - 1;
+    let reach = taps.len() - 1;
     let mut padded = vec![0.0; width + 2 * reach];
     for (from, to) in image.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
         for (i, value) in padded.iter_mut().enumerate() {
-            *value = from[mirrored(i, reach, width)];
+            *value = from[place(i, reach, width)];
         }
-        along(&padded, across, to);
+        weigh(|i| &padded[i..][..width], taps, to);
     }
     let mut out = vec![0.0; image.len()];
     for (y, to) in out.chunks_exact_mut(width).enumerate() {
-        let row = |offset: usize, sign: bool| {
-            let at = if sign {
-                mirrored(y + down.len() - 1 + offset, down.len() - 1, height)
-            } else {
-                mirrored(y + down.len() - 1 - offset, down.len() - 1, height)
-            };
-            &rows[at * width..(at + 1) * width]
-        };
-        scale(row(0, true), down[0], to);
-        for (i, tap) in down.iter().enumerate().skip(1) {
-            add(row(i, false), row(i, true), *tap, to);
-        }
+        weigh(|i| &rows[place(y + i, reach, height) * width..][..width], taps, to);
     }
     out
 }
@@ -59,18 +48,12 @@ fn mirrored(i: usize, reach: usize, length: usize) -> usize {
     if place < length { place } else { period - 1 - place }
 }
 
-#[multiversion(targets = "simd")]
-fn along(padded: &[f32], taps: &[f32], to: &mut [f32]) {
+/// The sum over taps of values that are shifted, by 0 to twice the reach of the taps.
+fn weigh<'a>(shifted: impl Fn(usize) -> &'a [f32], taps: &[f32], to: &mut [f32]) {
     let reach = taps.len() - 1;
-    let width = to.len();
-    for (value, centre) in to.iter_mut().zip(&padded[reach..]) {
-        *value = centre * taps[0];
-    }
+    scale(shifted(reach), taps[0], to);
     for (i, tap) in taps.iter().enumerate().skip(1) {
-        let (before, after) = (&padded[reach - i..][..width], &padded[reach + i..][..width]);
-        for ((value, a), b) in to.iter_mut().zip(before).zip(after) {
-            *value += (a + b) * tap;
-        }
+        add(shifted(reach - i), shifted(reach + i), *tap, to);
     }
 }
 

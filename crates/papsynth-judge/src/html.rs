@@ -2,12 +2,15 @@
 
 use std::fmt::Write;
 
-use crate::beside::{Beside, Curve, Spread};
-use crate::crops::Crop;
-use crate::judge::{Report, Test, Verdict};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+
+use crate::judge::{Beside, Curve, Report, Spread, Test, Verdict};
+use crate::measure::{Field, PATCH_PX};
 use crate::moments::Moments;
-use crate::number::nearest;
+use crate::number::{nearest, whole};
 use crate::svg::{COLOURS, Plot, escape, short};
+use crate::table::Table;
 use crate::two_sample::TwoSample;
 
 /// Giveaways that are listed.
@@ -30,30 +33,27 @@ macro_rules! put {
 }
 
 impl Report {
-    /// The report as an HTML page: drawings and crops are in it, nothing is loaded from elsewhere. It shows pieces of the pictures
-    /// that were judged.
+    /// The report as an HTML page that loads nothing from elsewhere. It shows pieces of the pictures that were judged.
     #[must_use]
     pub fn to_html(&self) -> String {
         let mut page = String::new();
-        let [real, synthetic] = &self.fields;
+        let [real, synthetic] = self.fields.each_ref().map(Vec::len);
+        let nuclei = match self.gauge.nuclei_from {
+            crate::NucleiFrom::Masks => "from masks",
+            crate::NucleiFrom::Points => "around given points",
+            crate::NucleiFrom::Search => "found",
+        };
         put!(
             page,
             "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>papsynth judge</title><style>{STYLE}</style></head><body>\
-             <h1>{} real fields against {} synthetic ones: {}</h1>",
-            real.len(),
-            synthetic.len(),
+             <h1>{real} real fields against {synthetic} synthetic ones: {}</h1>",
             verdict(self.verdict)
         );
         put!(
             page,
-            "<p>Pixels of {} µm; nuclei {}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
+            "<p>Pixels of {} µm; nuclei {nuclei}; seed {}. <span class=\"real\">Real</span> and <span class=\"synthetic\">synthetic</span> \
              have these colours throughout.</p>",
             self.gauge.pixel_um,
-            match self.gauge.nuclei_from {
-                crate::NucleiFrom::Masks => "from masks",
-                crate::NucleiFrom::Points => "around given points",
-                crate::NucleiFrom::Search => "found",
-            },
             self.judge.seed
         );
         for note in &self.notes {
@@ -77,39 +77,36 @@ fn verdict(verdict: Verdict) -> String {
     format!("<span class=\"{class}\">{verdict}</span>")
 }
 
+/// A row of a table; red if it is not within what is expected.
+fn row(page: &mut String, within: bool, cells: impl IntoIterator<Item = String>) {
+    page.push_str(if within { "<tr>" } else { "<tr class=\"out\">" });
+    cells.into_iter().for_each(|cell| put!(page, "<td>{cell}</td>"));
+    page.push_str("</tr>");
+}
+
 fn summary(page: &mut String, report: &Report) {
     page.push_str("<h2>Tests</h2><table><tr><th>test</th><th>rows</th><th>AUC</th><th>95 % interval</th><th>between real halves</th><th>verdict</th></tr>");
     for test in &report.two_sample {
-        let r = &test.result;
-        let null = Spread::of(r.null.iter().copied());
-        put!(
-            page,
-            "<tr><td>classifier on {}</td><td>{} / {}</td><td>{:.3}</td><td>{:.3} – {:.3}</td><td>{} ({} – {}), {} rows a half</td><td>{}</td></tr>",
-            escape(&test.name),
-            r.rows[0],
-            r.rows[1],
-            r.auc,
-            r.interval[0],
-            r.interval[1],
-            known(null.p50),
-            known(null.p10),
-            known(null.p90),
-            r.null_rows,
-            verdict(test.verdict)
-        );
+        let TwoSample { rows: [real, synthetic], auc, interval: [low, high], null, null_rows, .. } = &test.result;
+        let null = Spread::of(null.iter().copied());
+        let [p10, p50, p90] = [null.p10, null.p50, null.p90].map(known);
+        let cells = [
+            format!("classifier on {}", escape(&test.name)),
+            format!("{real} / {synthetic}"),
+            format!("{auc:.3}"),
+            format!("{low:.3} – {high:.3}"),
+            format!("{p50} ({p10} – {p90}), {null_rows} rows a half"),
+            verdict(test.verdict),
+        ];
+        row(page, true, cells);
     }
     for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
-        let slopes: Vec<String> = test.result.descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
-        put!(
-            page,
-            "<tr><td>Q-Q slopes, {}</td><td>{}</td><td></td><td>{}</td><td>{outside} of {} outside</td><td>{}</td></tr>",
-            escape(&test.name),
-            test.result.n,
-            slopes.join(" "),
-            test.result.descriptors.len(),
-            verdict(test.verdict)
-        );
+        let Moments { n, descriptors } = &test.result;
+        let outside = descriptors.iter().filter(|d| !d.within).count();
+        let slopes: Vec<String> = descriptors.iter().map(|d| format!("{:.2}", d.slope[1])).collect();
+        let name = format!("Q-Q slopes, {}", escape(&test.name));
+        let outside = format!("{outside} of {} outside", descriptors.len());
+        row(page, true, [name, n.to_string(), String::new(), slopes.join(" "), outside, verdict(test.verdict)]);
     }
     page.push_str(
         "</table><p class=\"note\">A classifier tells the sides apart if its area under the ROC curve is larger than 95 of 100 between random \
@@ -123,15 +120,10 @@ fn known(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), short)
 }
 
-fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
+fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Sheet]) {
     let r = &test.result;
-    put!(
-        page,
-        "<h2>What gives {} away</h2><p>AUC {:.3}, {}. With features of one kind alone: ",
-        escape(&test.name),
-        r.auc,
-        verdict(test.verdict)
-    );
+    let (name, auc, verdict) = (escape(&test.name), r.auc, verdict(test.verdict));
+    put!(page, "<h2>What gives {name} away</h2><p>AUC {auc:.3}, {verdict}. With features of one kind alone: ");
     let kinds: Vec<String> =
         r.families.iter().map(|f| format!("{} {:.2}", format!("{:?}", f.family).to_lowercase(), f.auc)).collect();
     put!(page, "{}.</p><div class=\"plots\">{}{}</div>", kinds.join(", "), strip(r), scores(r));
@@ -141,48 +133,29 @@ fn two_sample(page: &mut String, test: &Test<TwoSample>, crops: &[Crop]) {
          <th class=\"real\">sd between fields</th><th class=\"synthetic\">sd between fields</th></tr>",
     );
     for g in r.giveaways.iter().take(LISTED) {
-        put!(page, "<tr><td>{}</td><td>{:.3}</td><td>{:.2}</td>", escape(&g.feature), g.importance, g.alone);
-        for v in g.real.iter().chain(&g.synthetic).chain(&g.between_fields) {
-            put!(page, "<td>{}</td>", short(*v));
-        }
-        page.push_str("</tr>");
+        let first = [escape(&g.feature), format!("{:.3}", g.importance), format!("{:.2}", g.alone)];
+        let numbers = g.real.iter().chain(&g.synthetic).chain(&g.between_fields);
+        row(page, true, first.into_iter().chain(numbers.map(|v| short(*v))));
     }
     page.push_str(
         "</table><p class=\"note\">Importance: how much nearer the mean scores of both sides come, as a part of their distance, when the feature is \
          shuffled among rows that the classifier has not seen. Of features that tell the same, each alone matters little. AUC alone is above ½ if the feature is larger in synthetic fields. Between fields: of their medians.</p>",
     );
-    for (synthetic, looks_real, title) in [
-        (true, true, "Synthetic, most convincing"),
-        (true, false, "Synthetic, least convincing"),
-        (false, true, "Real, most plainly real"),
-        (false, false, "Real, taken for synthetic"),
-    ] {
-        let chosen: Vec<&Crop> = crops
-            .iter()
-            .filter(|c| c.of == test.name && c.synthetic == synthetic && c.looks_real == looks_real)
-            .collect();
-        if chosen.is_empty() {
-            continue;
-        }
-        put!(page, "<h3>{title}</h3><div class=\"crops {}\">", test.name);
-        for crop in chosen {
-            put!(
-                page,
-                "<figure><img alt=\"\" src=\"data:image/png;base64,{}\"><br>{:.2} {}</figure>",
-                base64(&png(&crop.grey, crop.width)),
-                crop.score,
-                escape(&crop.field)
-            );
+    for sheet in crops.iter().filter(|sheet| sheet.of == test.name && !sheet.crops.is_empty()) {
+        put!(page, "<h3>{}</h3><div class=\"crops {}\">", sheet.title, sheet.of);
+        for crop in &sheet.crops {
+            let (png, field) = (BASE64_STANDARD.encode(png(&crop.grey, crop.width)), escape(&crop.field));
+            let score = crop.score;
+            put!(page, "<figure><img alt=\"\" src=\"data:image/png;base64,{png}\"><br>{score:.2} {field}</figure>");
         }
         page.push_str("</div>");
     }
 }
 
-/// The AUC and its interval among those between halves.
 fn strip(r: &TwoSample) -> String {
     let all = r.null.iter().copied().chain(r.interval).chain([0.3, 1.0]);
-    let mut plot =
-        Plot::new("AUC with its 95 % interval", "AUC", "1 real halves, 2 the sides", all, [0.0, 3.0].into_iter());
+    let names = ["AUC with its 95 % interval", "AUC", "1 real halves, 2 the sides"];
+    let mut plot = Plot::new(names, all, [0.0, 3.0].into_iter());
     plot.dashes([0.5, 0.0], [0.5, 3.0]);
     plot.dots(r.null.iter().map(|v| [*v, 1.0]), COLOURS[0]);
     plot.line(r.interval.iter().map(|v| [*v, 2.0]), COLOURS[1]);
@@ -190,23 +163,15 @@ fn strip(r: &TwoSample) -> String {
     plot.finish()
 }
 
-/// Histograms of the scores of both sides.
 fn scores(r: &TwoSample) -> String {
     const BINS: usize = 25;
     let bins = r.scores.each_ref().map(|scores| {
-        let mut bins = vec![0.0; BINS];
-        scores
-            .iter()
-            .for_each(|s| bins[nearest(s * BINS as f64 - 0.5).min(BINS - 1)] += 1.0 / scores.len().max(1) as f64);
+        let (mut bins, part) = (vec![0.0; BINS], 1.0 / scores.len().max(1) as f64);
+        scores.iter().for_each(|s| bins[nearest(s * BINS as f64 - 0.5).min(BINS - 1)] += part);
         bins
     });
-    let mut plot = Plot::new(
-        "Scores of rows not learnt from",
-        "how synthetic it looks",
-        "part",
-        [0.0, 1.0].into_iter(),
-        bins.iter().flatten().copied().chain([0.0]),
-    );
+    let names = ["Scores of rows not learnt from", "how synthetic it looks", "part"];
+    let mut plot = Plot::new(names, [0.0, 1.0].into_iter(), bins.iter().flatten().copied().chain([0.0]));
     for (bins, colour) in bins.iter().zip(COLOURS) {
         plot.line(bins.iter().enumerate().map(|(i, v)| [(i as f64 + 0.5) / BINS as f64, *v]), colour);
     }
@@ -220,23 +185,15 @@ fn moments(page: &mut String, test: &Test<Moments>) {
          <th>between real halves</th></tr>",
     );
     for d in &test.result.descriptors {
-        let three = |v: [f64; 3]| format!("{:.2} ({:.2} – {:.2})", v[1], v[0], v[2]);
-        put!(
-            page,
-            "<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            if d.within { "" } else { " class=\"out\"" },
-            escape(&d.name),
-            three(d.slope),
-            three(d.null_slope),
-            three(d.shift),
-            three(d.null_shift)
-        );
+        let numbers = [d.slope, d.null_slope, d.shift, d.null_shift]
+            .map(|[low, middle, high]| format!("{middle:.2} ({low:.2} – {high:.2})"));
+        row(page, d.within, std::iter::once(escape(&d.name)).chain(numbers));
     }
     page.push_str("</table><div class=\"plots\">");
     for d in &test.result.descriptors {
         let all: Vec<f64> = d.quantiles.iter().flatten().copied().collect();
         let (low, high) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-        let mut plot = Plot::new(&d.name, "synthetic", "real", all.iter().copied(), all.iter().copied());
+        let mut plot = Plot::new([&d.name, "synthetic", "real"], all.iter().copied(), all.iter().copied());
         plot.dashes([low, low], [high, high]);
         plot.dots(d.quantiles.iter().map(|q| [q[1], q[0]]), COLOURS[1]);
         page.push_str(&plot.finish());
@@ -254,11 +211,8 @@ fn beside(page: &mut String, beside: &Beside) {
          <th class=\"synthetic\">synthetic p10</th><th class=\"synthetic\">p50</th><th class=\"synthetic\">p90</th></tr>",
     );
     for s in &beside.scalars {
-        put!(page, "<tr{}><td>{}</td>", if s.within { "" } else { " class=\"out\"" }, escape(&s.name));
-        for v in [s.real.p10, s.real.p50, s.real.p90, s.synthetic.p10, s.synthetic.p50, s.synthetic.p90] {
-            put!(page, "<td>{}</td>", known(v));
-        }
-        page.push_str("</tr>");
+        let numbers = [s.real, s.synthetic].into_iter().flat_map(|side| [side.p10, side.p50, side.p90]).map(known);
+        row(page, s.within, std::iter::once(escape(&s.name)).chain(numbers));
     }
     page.push_str("</table><p class=\"note\">Over fields. Red: the synthetic median lies outside the real 10th to 90th percentile.</p>");
 }
@@ -268,7 +222,7 @@ fn drawn(curve: &Curve) -> String {
         curve.at.iter().zip(spreads).map(|(x, s)| [*x, of(s).unwrap_or(f64::NAN)]).collect()
     };
     let all = curve.real.iter().chain(&curve.synthetic).flat_map(|s| [s.p10, s.p90]).flatten();
-    let mut plot = Plot::new(&curve.name, &curve.along, "", curve.at.iter().copied(), all);
+    let mut plot = Plot::new([&curve.name, &curve.along, ""], curve.at.iter().copied(), all);
     for (spreads, colour) in [&curve.real, &curve.synthetic].into_iter().zip(COLOURS) {
         plot.band(&points(spreads, |s| s.p10), &points(spreads, |s| s.p90), colour);
         plot.line(points(spreads, |s| s.p50).into_iter(), colour);
@@ -276,7 +230,67 @@ fn drawn(curve: &Curve) -> String {
     plot.finish()
 }
 
-/// A picture in grey as a PNG file.
+/// How many are shown of each kind.
+const SHOWN: usize = 20;
+
+/// Side of the picture of a nucleus, pixels.
+const NUCLEUS_PX: usize = 64;
+
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sheet {
+    /// "nuclei" or "patches".
+    pub(crate) of: &'static str,
+    pub(crate) title: &'static str,
+    pub(crate) crops: Vec<Crop>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Crop {
+    pub(crate) field: String,
+    /// How synthetic it looked, 0 to 1.
+    pub(crate) score: f64,
+    pub(crate) grey: Vec<u8>,
+    pub(crate) width: usize,
+}
+
+/// A name, the table of it, and the side of its picture.
+type Kind = (&'static str, fn(&Field) -> &Table, usize);
+
+pub(crate) fn sheets(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample>]) -> Vec<Sheet> {
+    let kinds: [Kind; 2] = [("nuclei", |f| &f.nuclei, NUCLEUS_PX), ("patches", |f| &f.patches, PATCH_PX)];
+    let mut sheets = Vec::new();
+    for (of, table, side) in kinds {
+        let Some(test) = tests.iter().find(|test| test.name == of) else { continue };
+        for (fields, scores, titles) in [
+            (synthetic, &test.result.scores[1], ["Synthetic, most convincing", "Synthetic, least convincing"]),
+            (real, &test.result.scores[0], ["Real, most plainly real", "Real, taken for synthetic"]),
+        ] {
+            let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
+            let mut all: Vec<(f64, (&Field, [f64; 2]))> = scores.iter().copied().zip(places).collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let shown = SHOWN.min(all.len());
+            for (title, part) in titles.into_iter().zip([&all[..shown], &all[all.len() - shown..]]) {
+                let crops = part.iter().filter_map(|(score, (field, place))| cut(field, *place, side, *score));
+                sheets.push(Sheet { of, title, crops: crops.collect() });
+            }
+        }
+    }
+    sheets
+}
+
+/// The square around a place, moved into the field where it would reach beyond.
+fn cut(field: &Field, [x, y]: [f64; 2], side: usize, score: f64) -> Option<Crop> {
+    if field.thumbnail.is_empty() {
+        return None;
+    }
+    let (wide, high) = (side.min(field.width), side.min(field.height));
+    let left = whole(x - wide as f64 / 2.0 + 0.5).min(field.width - wide);
+    let top = whole(y - high as f64 / 2.0 + 0.5).min(field.height - high);
+    let rows = field.thumbnail.chunks_exact(field.width).skip(top).take(high);
+    let grey = rows.flat_map(|row| row[left..left + wide].iter().copied()).collect();
+    Some(Crop { field: field.name.clone(), score, grey, width: wide })
+}
+
 fn png(grey: &[u8], width: usize) -> Vec<u8> {
     let mut out = Vec::new();
     let size = [width, grey.len() / width.max(1)].map(crate::number::id);
@@ -286,37 +300,4 @@ fn png(grey: &[u8], width: usize) -> Vec<u8> {
     // Crops are at least a pixel, and memory takes what is written to it.
     let _ = encoder.write_header().and_then(|mut writer| writer.write_image_data(grey));
     out
-}
-
-/// Bytes in the alphabet of RFC 4648.
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let bits = three.iter().fold(0_usize, |b, v| b << 8 | usize::from(*v)) << (8 * (3 - three.len()));
-        for i in 0..4 {
-            out.push(if i <= three.len() { char::from(LETTERS[bits >> (18 - 6 * i) & 63]) } else { '=' });
-        }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_is_that_of_the_rfc() {
-        for (plain, coded) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foob", "Zm9vYg=="),
-            ("fooba", "Zm9vYmE="),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
-    }
 }

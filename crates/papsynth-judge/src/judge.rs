@@ -1,12 +1,14 @@
 //! The judge: everything that is compared, and what follows from it.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
-use crate::beside::{Beside, beside};
-use crate::crops::{Crop, crops};
 use crate::error::Error;
-use crate::measure::{Field, GaugeParams, Statistics};
+use crate::html::{Sheet, sheets};
+use crate::measure::{Field, GaugeParams, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, PROFILE, Statistics, frequencies};
 use crate::moments::{self, Moments};
+use crate::statistics::{of_sorted, quantile, sorted};
 use crate::table::Table;
 use crate::two_sample::{TwoSample, TwoSampleParams, two_sample};
 
@@ -54,6 +56,12 @@ pub enum Verdict {
     NotToldApart,
 }
 
+impl Verdict {
+    fn of(told_apart: bool) -> Self {
+        if told_apart { Self::ToldApart } else { Self::NotToldApart }
+    }
+}
+
 impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str(match self {
@@ -99,7 +107,7 @@ pub struct Report {
     pub statistics: [Vec<Statistics>; 2],
     /// What the classifier was most and least sure of, for the page.
     #[serde(skip)]
-    pub(crate) crops: Vec<Crop>,
+    pub(crate) crops: Vec<Sheet>,
 }
 
 /// Version of the report's format.
@@ -115,20 +123,15 @@ impl Judge {
     /// If one is outside its range.
     pub fn new(params: &JudgeParams) -> Result<Self, Error> {
         let t = &params.two_sample;
-        let ranges: [(&'static str, usize, usize, usize, &'static str); 7] = [
-            ("two_sample.folds", t.folds, 2, 20, "2 to 20"),
-            ("two_sample.trees", t.trees, 20, 10_000, "20 to 10000"),
-            ("two_sample.halvings", t.halvings, 1, 1000, "1 to 1000"),
-            ("two_sample.bootstrap", t.bootstrap, 10, 100_000, "10 to 100000"),
-            ("two_sample.shuffled", t.shuffled, 0, 1000, "0 to 1000"),
-            ("paper_nuclei", params.paper_nuclei, 8, 100_000, "8 to 100000"),
-            ("draws", params.draws, 20, 100_000, "20 to 100000"),
-        ];
-        for (field, value, least, most, accepted) in ranges {
-            if value < least || value > most {
-                return Err(Error::Parameter { field, value: value as f64, accepted });
-            }
-        }
+        Error::check(&[
+            ("two_sample.folds", t.folds as f64, [2.0, 20.0], "2 to 20"),
+            ("two_sample.trees", t.trees as f64, [20.0, 1e4], "20 to 10000"),
+            ("two_sample.halvings", t.halvings as f64, [1.0, 1e3], "1 to 1000"),
+            ("two_sample.bootstrap", t.bootstrap as f64, [10.0, 1e5], "10 to 100000"),
+            ("two_sample.shuffled", t.shuffled as f64, [0.0, 1e3], "0 to 1000"),
+            ("paper_nuclei", params.paper_nuclei as f64, [8.0, 1e5], "8 to 100000"),
+            ("draws", params.draws as f64, [20.0, 1e5], "20 to 100000"),
+        ])?;
         Ok(Self { params: params.clone() })
     }
 
@@ -149,13 +152,9 @@ impl Judge {
         let mut notes = Vec::new();
         let two_sample = self.classify(real, synthetic, &mut notes);
         let moments = self.moments(real, synthetic, &mut notes);
-        let told = two_sample
-            .iter()
-            .map(|t| t.verdict)
-            .chain(moments.iter().map(|t| t.verdict))
-            .any(|v| v == Verdict::ToldApart);
-        let result = |name: &str| two_sample.iter().find(|test| test.name == name).map(|test| &test.result);
-        let crops = crops(real, synthetic, result);
+        let mut verdicts = two_sample.iter().map(|t| t.verdict).chain(moments.iter().map(|t| t.verdict));
+        let verdict = Verdict::of(verdicts.any(|v| v == Verdict::ToldApart));
+        let crops = sheets(real, synthetic, &two_sample);
         let names = |fields: &[Field]| fields.iter().map(|f| f.name.clone()).collect();
         Ok(Report {
             judge_report: VERSION,
@@ -163,7 +162,7 @@ impl Judge {
             judge: self.params.clone(),
             fields: [names(real), names(synthetic)],
             notes,
-            verdict: if told { Verdict::ToldApart } else { Verdict::NotToldApart },
+            verdict,
             two_sample,
             moments,
             beside: beside(real, synthetic),
@@ -173,11 +172,11 @@ impl Judge {
     }
 
     fn classify(&self, real: &[Field], synthetic: &[Field], notes: &mut Vec<String>) -> Vec<Test<TwoSample>> {
-        let everything = |_: &&Field| true;
         let mut tests = Vec::new();
-        let mut test = |name: String, of: fn(&Field) -> &Table, counts: &dyn Fn(&&Field) -> bool| {
-            let tables =
-                |fields: &'_ [Field]| fields.iter().filter(counts).map(|f| of(f).clone()).collect::<Vec<Table>>();
+        let mut test = |name: String, of: fn(&Field) -> &Table, group: Option<&str>| {
+            let tables = |fields: &[Field]| -> Vec<Table> {
+                fields.iter().filter(|f| group.is_none_or(|g| f.group == g)).map(|f| of(f).clone()).collect()
+            };
             match two_sample(&tables(real), &tables(synthetic), &self.params.two_sample, self.params.seed) {
                 Some(result) => tests.push(Test { name, verdict: of_areas(&result), result }),
                 None => {
@@ -185,11 +184,11 @@ impl Judge {
                 }
             }
         };
-        test("nuclei".to_owned(), |f| &f.nuclei, &everything);
-        test("cells".to_owned(), |f| &f.cells, &everything);
-        test("patches".to_owned(), |f| &f.patches, &everything);
+        test("nuclei".to_owned(), |f| &f.nuclei, None);
+        test("cells".to_owned(), |f| &f.cells, None);
+        test("patches".to_owned(), |f| &f.patches, None);
         for group in shared_groups(real, synthetic) {
-            test(format!("nuclei of group {group}"), |f| &f.nuclei, &|f| f.group == group);
+            test(format!("nuclei of group {group}"), |f| &f.nuclei, Some(group));
         }
         tests
     }
@@ -197,13 +196,11 @@ impl Judge {
     fn moments(&self, real: &[Field], synthetic: &[Field], notes: &mut Vec<String>) -> Vec<Test<Moments>> {
         let tables = |fields: &[Field]| fields.iter().map(|f| f.nuclei.clone()).collect::<Vec<Table>>();
         let (real, synthetic) = (tables(real), tables(synthetic));
-        let sizes = [(self.params.paper_nuclei, "the paper's number"), (0, "as many as there are")];
         let mut tests = Vec::new();
-        for (n, what) in sizes {
+        for (n, what) in [(self.params.paper_nuclei, "the paper's number"), (0, "as many as there are")] {
             match moments::compare(&real, &synthetic, n, self.params.draws, self.params.seed) {
                 Some(result) => {
-                    let within = result.descriptors.iter().all(|d| d.within);
-                    let verdict = if within { Verdict::NotToldApart } else { Verdict::ToldApart };
+                    let verdict = Verdict::of(result.descriptors.iter().any(|d| !d.within));
                     tests.push(Test { name: format!("texture of {} nuclei, {what}", result.n), verdict, result });
                 }
                 None => notes
@@ -215,12 +212,10 @@ impl Judge {
 }
 
 /// Groups that have two fields or more on both sides, in order.
-fn shared_groups(real: &[Field], synthetic: &[Field]) -> Vec<String> {
+fn shared_groups<'a>(real: &'a [Field], synthetic: &[Field]) -> Vec<&'a str> {
     let enough = |fields: &[Field], group: &str| fields.iter().filter(|f| f.group == group).count() >= LEAST_FIELDS;
-    let names: std::collections::BTreeSet<&str> =
-        real.iter().map(|f| f.group.as_str()).filter(|g| !g.is_empty()).collect();
-    let shared: Vec<String> =
-        names.into_iter().filter(|g| enough(real, g) && enough(synthetic, g)).map(str::to_owned).collect();
+    let names: BTreeSet<&str> = real.iter().map(|f| f.group.as_str()).filter(|g| !g.is_empty()).collect();
+    let shared: Vec<&str> = names.into_iter().filter(|g| enough(real, g) && enough(synthetic, g)).collect();
     // One group alone is the whole.
     if shared.len() == 1 && real.iter().chain(synthetic).all(|f| f.group == shared[0]) { Vec::new() } else { shared }
 }
@@ -228,6 +223,99 @@ fn shared_groups(real: &[Field], synthetic: &[Field]) -> Vec<String> {
 /// The sides are told apart if the AUC is larger than 95 of 100 between real halves, and its interval leaves out ½.
 fn of_areas(result: &TwoSample) -> Verdict {
     let mut null = result.null.clone();
-    let beyond_null = null.is_empty() || result.auc > crate::statistics::quantile(&mut null, 0.95);
-    if beyond_null && result.interval[0] > 0.5 { Verdict::ToldApart } else { Verdict::NotToldApart }
+    let beyond_null = null.is_empty() || result.auc > quantile(&mut null, 0.95);
+    Verdict::of(beyond_null && result.interval[0] > 0.5)
+}
+
+/// 10th, 50th and 90th percentile over the fields of a side.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// 10th percentile.
+    pub p10: Option<f64>,
+    /// Median.
+    pub p50: Option<f64>,
+    /// 90th percentile.
+    pub p90: Option<f64>,
+}
+
+impl Spread {
+    /// Of what is known.
+    pub(crate) fn of(values: impl Iterator<Item = f64>) -> Self {
+        let values = sorted(values.filter(|v| v.is_finite()));
+        let at = |q: f64| (!values.is_empty()).then(|| of_sorted(&values, q));
+        Self { p10: at(0.1), p50: at(0.5), p90: at(0.9) }
+    }
+}
+
+/// A number for every field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Scalar {
+    /// Its name, with its unit where it has one.
+    pub name: String,
+    /// Over real fields.
+    pub real: Spread,
+    /// Over synthetic fields.
+    pub synthetic: Spread,
+    /// Whether the synthetic median lies between the real 10th and 90th percentile; false if either is unknown.
+    pub within: bool,
+}
+
+/// A curve for every field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// What it shows.
+    pub name: String,
+    /// What runs along it.
+    pub along: String,
+    /// Where its points are.
+    pub at: Vec<f64>,
+    /// Over real fields, point by point.
+    pub real: Vec<Spread>,
+    /// Over synthetic fields.
+    pub synthetic: Vec<Spread>,
+}
+
+/// Field statistics of both sides beside each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Beside {
+    /// Single numbers.
+    pub scalars: Vec<Scalar>,
+    /// Absorbance's histogram and spectrum, cytoplasm from rim to centre.
+    pub curves: Vec<Curve>,
+}
+
+/// Smaller parts of a field are drawn as this.
+const RAREST: f64 = 1e-5;
+
+fn beside(real: &[Field], synthetic: &[Field]) -> Beside {
+    let names = real[0].statistics.scalars();
+    let scalar = |(i, (name, _)): (usize, &(&str, f64))| {
+        let of = |fields: &[Field]| Spread::of(fields.iter().map(|f| f.statistics.scalars()[i].1));
+        let (real, synthetic) = (of(real), of(synthetic));
+        let within = match (real.p10, real.p90, synthetic.p50) {
+            (Some(low), Some(high), Some(middle)) => middle >= low && middle <= high,
+            _ => false,
+        };
+        Scalar { name: (*name).to_owned(), real, synthetic, within }
+    };
+    let curve = |name: &str, along: &str, at: Vec<f64>, of: &dyn Fn(&Statistics) -> Vec<f64>| {
+        let spreads =
+            |fields: &[Field]| (0..at.len()).map(|i| Spread::of(fields.iter().map(|f| of(&f.statistics)[i]))).collect();
+        Curve { name: name.to_owned(), along: along.to_owned(), real: spreads(real), synthetic: spreads(synthetic), at }
+    };
+    let bins = (0..HISTOGRAM).map(|i| HISTOGRAM_FROM + (i as f64 + 0.5) * HISTOGRAM_STEP).collect();
+    let profile = (0..PROFILE).map(|i| i as f64 + 1.0).collect();
+    let rings = frequencies().iter().map(|f| libm::log10(*f)).collect();
+    Beside {
+        scalars: names.iter().enumerate().map(scalar).collect(),
+        curves: vec![
+            curve("log10 of the part of the field", "absorbance", bins, &|s| {
+                s.histogram.iter().map(|p| libm::log10(p.max(RAREST))).collect()
+            }),
+            curve("log10 of the power of absorbance", "log10 of cycles a pixel", rings, &|s| s.spectrum.to_vec()),
+            curve("absorbance of free cells over their median", "bin from rim to centre", profile, &|s| {
+                s.profile.to_vec()
+            }),
+        ],
+    }
 }

@@ -1,17 +1,16 @@
 #![doc = include_str!("../README.md")]
 
 mod background;
-mod beside;
-mod crops;
 mod error;
-mod filter;
-mod forest;
+#[doc(hidden)]
+pub mod filter;
 mod html;
 mod judge;
 mod measure;
 mod moments;
 mod nuclei;
-mod number;
+#[doc(hidden)]
+pub mod number;
 mod picture;
 mod region;
 mod statistics;
@@ -20,14 +19,13 @@ mod table;
 mod tree;
 mod two_sample;
 
-pub use beside::{Beside, Curve, Scalar, Spread};
 pub use error::Error;
-pub use judge::{Judge, JudgeParams, Report, Test, Verdict};
+pub use judge::{Beside, Curve, Judge, JudgeParams, Report, Scalar, Spread, Test, Verdict};
 pub use measure::{
     Detail, Field, Gauge, GaugeParams, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, NucleiFrom, PROFILE, RADII_UM,
     Statistics, clark_evans, frequencies, ripley,
 };
-pub use moments::{Descriptor, Histogram, Moments, qq_slope};
+pub use moments::{Descriptor, Moments, qq_slope};
 pub use nuclei::NucleiParams;
 pub use picture::{Known, Picture};
 pub use statistics::auc;

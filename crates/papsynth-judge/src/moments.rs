@@ -6,66 +6,37 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
 use crate::number::{nearest, whole};
-use crate::statistics::{deviation, mean, median, of_sorted, quantile};
+use crate::statistics::{deviation, line_slope, median, of_sorted, quantile, sorted};
 use crate::table::Table;
 
-/// Grey levels of a histogram.
-const LEVELS: usize = 256;
+/// Central moments 2 to 6, as logarithms, and entropy: what of a nucleus is compared.
+pub(crate) const DESCRIPTORS: [&str; 6] =
+    ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
 
-/// How often each grey level of 8 bits occurs, as parts of 1.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Histogram {
-    parts: Vec<f64>,
-}
-
-impl Histogram {
-    /// Counts grey levels 0 to 255; what lies between two counts to the nearer.
-    pub fn new(grey: impl Iterator<Item = f32>) -> Self {
-        let mut parts = vec![0.0; LEVELS];
-        let mut count = 0.0;
-        for level in grey {
-            parts[nearest(f64::from(level)).min(LEVELS - 1)] += 1.0;
-            count += 1.0;
-        }
-        if count > 0.0 {
-            parts.iter_mut().for_each(|p| *p /= count);
-        }
-        Self { parts }
+/// The [`DESCRIPTORS`] of how often each grey level 0 to 255 occurs, as parts of 1; what lies between two counts to the nearer.
+pub(crate) fn descriptors(grey: impl Iterator<Item = f32>) -> [f64; DESCRIPTORS.len()] {
+    const LEVELS: usize = 256;
+    let mut parts = [0.0; LEVELS];
+    let mut count = 0.0;
+    for level in grey {
+        parts[nearest(f64::from(level)).min(LEVELS - 1)] += 1.0;
+        count += 1.0;
     }
-
-    /// Eq. 18: m = Σᵢ zᵢ p(zᵢ).
-    #[must_use]
-    pub fn mean(&self) -> f64 {
-        // Eq. 18.
-        self.parts.iter().enumerate().map(|(z, p)| z as f64 * p).sum()
-    }
-
-    /// Eq. 17: μₙ = Σᵢ (zᵢ − m)ⁿ p(zᵢ).
-    #[must_use]
-    pub fn moment(&self, n: i32) -> f64 {
-        let mean = self.mean();
+    parts.iter_mut().for_each(|p| *p /= f64::max(count, 1.0));
+    // Eq. 18: m = Σᵢ zᵢ p(zᵢ).
+    let mean: f64 = parts.iter().enumerate().map(|(z, p)| z as f64 * p).sum();
+    // Eq. 17: μₙ = Σᵢ (zᵢ − m)ⁿ p(zᵢ). The logarithm to base 10 of 1 + |μₙ|, with the sign of μₙ: the odd ones have either.
+    let log_moment = |n: usize| {
         let power = |d: f64| (0..n).fold(1.0, |product, _| product * d);
-        // Eq. 17.
-        self.parts.iter().enumerate().map(|(z, p)| power(z as f64 - mean) * p).sum()
-    }
-
-    /// The logarithm to base 10 of 1 + |μₙ|, with the sign of μₙ: the odd ones have either.
-    #[must_use]
-    pub fn log_moment(&self, n: i32) -> f64 {
-        let moment = self.moment(n);
+        let moment: f64 = parts.iter().enumerate().map(|(z, p)| power(z as f64 - mean) * p).sum();
         libm::log10(1.0 + moment.abs()) * moment.signum()
-    }
-
-    /// Eq. 19: H = −Σᵢ p(zᵢ) log₂ p(zᵢ), bits.
-    #[must_use]
-    pub fn entropy(&self) -> f64 {
-        // Eq. 19.
-        -self.parts.iter().filter(|p| **p > 0.0).map(|p| p * libm::log2(*p)).sum::<f64>()
-    }
+    };
+    // Eq. 19: H = −Σᵢ p(zᵢ) log₂ p(zᵢ), bits.
+    let entropy = -parts.iter().filter(|p| **p > 0.0).map(|p| p * libm::log2(*p)).sum::<f64>();
+    std::array::from_fn(|i| if i < 5 { log_moment(i + 2) } else { entropy })
 }
 
-/// How the paper's descriptors of nuclear texture compare: the slope of the line through the quantiles of one side against those of the
-/// other.
+/// How the paper's descriptors of nuclear texture compare: slopes of the quantiles of one side against those of the other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
     /// Nuclei that each Q-Q plot compares, of either side.
@@ -94,26 +65,16 @@ pub struct Descriptor {
     pub quantiles: Vec<[f64; 2]>,
 }
 
-/// Slope of the least-squares line through the quantiles of `y` against those of `x`; both have the same length, which is that of the
-/// shorter where they differ. NaN if `x` does not vary.
+/// Slope of the least-squares line through quantiles of `y` against as many of `x`, those of the shorter. NaN if `x` does not vary.
 #[must_use]
 pub fn qq_slope(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     let quantiles = |values: &[f64]| {
-        let mut sorted = values.to_vec();
-        sorted.sort_unstable_by(f64::total_cmp);
+        let sorted = sorted(values.iter().copied());
         (0..n).map(|i| of_sorted(&sorted, (i as f64 + 0.5) / n as f64)).collect::<Vec<_>>()
     };
-    let (x, y) = (quantiles(x), quantiles(y));
-    let (mx, my) = (mean(&x), mean(&y));
-    let (xy, xx) =
-        x.iter().zip(&y).fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
-    if xx > 0.0 { xy / xx } else { f64::NAN }
+    line_slope(&quantiles(x), &quantiles(y))
 }
-
-/// Columns of the table of nuclei that are compared.
-const COLUMNS: [&str; 6] =
-    ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
 
 /// Quantiles that are kept to be drawn.
 const DRAWN: usize = 60;
@@ -150,7 +111,7 @@ pub(crate) fn compare(real: &[Table], synthetic: &[Table], n: usize, draws: usiz
         return None;
     }
     let halves: Vec<&[Vec<&Table>; 2]> = halves.iter().filter(|h| nuclei(&h[0]).min(nuclei(&h[1])) >= n).collect();
-    let descriptors = COLUMNS.iter().map(|name| {
+    let descriptors = DESCRIPTORS.iter().map(|name| {
         let values = |tables: &[&Table]| tables.iter().flat_map(|t| t.column(name)).collect::<Vec<f64>>();
         let all = [values(&real), values(&synthetic)];
         let (mut slopes, mut shifts, mut null_slopes, mut null_shifts) =
@@ -173,10 +134,7 @@ pub(crate) fn compare(real: &[Table], synthetic: &[Table], n: usize, draws: usiz
             let [low, middle, high] = at(values, BAND);
             [low, middle, high].map(|v| middle + wider * (v - middle))
         };
-        let sorted = all.map(|mut values| {
-            values.sort_unstable_by(f64::total_cmp);
-            values
-        });
+        let sorted = all.map(sorted);
         let points = (0..DRAWN).map(|i| (i as f64 + 0.5) / DRAWN as f64);
         let [slope, shift] = [&mut slopes, &mut shifts].map(|values| at(values, [0.05, 0.5, 0.95]));
         let [null_slope, null_shift] = [&mut null_slopes, &mut null_shifts].map(|values| band(values));
@@ -219,18 +177,13 @@ mod tests {
 
     #[test]
     fn moments_and_entropy_of_two_levels_are_known() {
-        let histogram = Histogram::new([10.0, 20.0, 20.0, 20.0].into_iter());
-        assert!((histogram.mean() - 17.5).abs() < 1e-12);
         // (−7.5)ⁿ/4 + 2.5ⁿ·3/4.
-        for (n, wanted) in [(2, 18.75), (3, -93.75), (4, 820.3125)] {
-            assert!((histogram.moment(n) - wanted).abs() < 1e-9, "{n}");
-        }
-        assert!((histogram.log_moment(3) + libm::log10(94.75)).abs() < 1e-12);
-        let entropy = 0.25 * 2.0 + 0.75 * libm::log2(4.0 / 3.0);
-        assert!((histogram.entropy() - entropy).abs() < 1e-12);
-        assert!((Histogram::new([1.0, 2.0, 3.0, 4.0].into_iter()).entropy() - 2.0).abs() < 1e-12);
-        let none = Histogram::new(std::iter::empty());
-        assert_eq!((none.entropy(), none.moment(2)), (0.0, 0.0));
+        let moments = [18.75, -93.75_f64, 820.3125].map(|m| libm::log10(1.0 + m.abs()) * m.signum());
+        let found = descriptors([10.0, 20.0, 20.0, 20.0].into_iter());
+        assert!(found.iter().zip(moments).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+        assert!((found[5] - 0.25 * 2.0 - 0.75 * libm::log2(4.0 / 3.0)).abs() < 1e-12);
+        assert!((descriptors([1.0, 2.0, 3.0, 4.0].into_iter())[5] - 2.0).abs() < 1e-12);
+        assert_eq!(descriptors(std::iter::empty()), [0.0; 6]);
     }
 
     #[test]
@@ -250,32 +203,26 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut field = |_| {
             let own = 0.3 * normal(&mut rng);
-            let mut table = Table::default();
-            for _ in 0..30 {
+            let nucleus = |_| {
                 let mut row = crate::table::Row::default();
-                COLUMNS
-                    .iter()
-                    .for_each(|name| row.put(crate::table::Family::Texture, *name, mean + own + sd * normal(&mut rng)));
-                table.push(row, [0.0; 2]);
-            }
-            table
+                for name in DESCRIPTORS {
+                    row.put(crate::table::Family::Texture, name, mean + own + sd * normal(&mut rng));
+                }
+                (row, [0.0; 2])
+            };
+            (0..30).map(nucleus).collect()
         };
         (0..count).map(&mut field).collect()
     }
 
     #[test]
-    fn what_is_alike_lies_within_the_band_and_what_is_not_lies_beyond() {
+    fn what_differs_lies_beyond_the_band() {
         let real = tables(16, 1.0, 4.0, 11);
-        let within = |synthetic: &[Table]| {
-            let result = compare(&real, synthetic, 0, 200, 7).unwrap();
-            assert_eq!(result.n, 240);
-            result.descriptors.iter().filter(|d| d.within).count()
-        };
-        assert_eq!(within(&tables(16, 1.0, 4.0, 2)), 6);
-        assert_eq!(within(&tables(16, 0.5, 4.0, 3)), 0);
-        assert_eq!(within(&tables(16, 1.0, 5.5, 4)), 0);
-        let result = compare(&real, &tables(16, 0.5, 4.0, 3), 0, 200, 7).unwrap();
-        assert!(result.descriptors.iter().all(|d| (1.6..2.2).contains(&d.slope[1])), "{result:?}");
+        let found = |synthetic: &[Table]| compare(&real, synthetic, 0, 200, 7).unwrap();
+        let [narrow, moved] = [(0.5, 4.0, 3), (1.0, 5.5, 4)].map(|(sd, mean, seed)| found(&tables(16, sd, mean, seed)));
+        assert_eq!(narrow.n, 240);
+        assert!(narrow.descriptors.iter().all(|d| !d.within && (1.6..2.2).contains(&d.slope[1])), "{narrow:?}");
+        assert!(moved.descriptors.iter().all(|d| !d.within), "{moved:?}");
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Nuclei: where they are, pixel by pixel.
 
 use crate::filter::blur;
+use crate::measure::GaugeParams;
 use crate::number::whole;
-use crate::region::{Region, flood};
+use crate::picture::Known;
+use crate::region::{Region, components, flood};
 use crate::tree::{Blob, STEP, blobs};
 
 /// What is taken for a nucleus. All defaults are ours.
@@ -47,54 +49,32 @@ const MARK_UM: f64 = 4.0;
 /// What lies around a nucleus begins and ends so far from its rim, µm.
 const AROUND_UM: [f64; 2] = [0.8, 2.5];
 
-/// Where the regions of nuclei come from.
-pub(crate) enum Hints<'a> {
-    Nothing,
-    Points(&'a [[f64; 2]]),
-    Masks(&'a [u32]),
-}
-
 /// The nuclei of a picture, by their centres from top to bottom. No two have a pixel in common.
-pub(crate) fn nuclei(
-    absorbance: &[f32],
-    width: usize,
-    pixel_um: f64,
-    hints: &Hints,
-    params: &NucleiParams,
-) -> Vec<Region> {
-    let mut regions = match hints {
-        Hints::Masks(labels) => masks(labels, width),
-        Hints::Nothing => found(absorbance, width, pixel_um, None, params),
-        Hints::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
+pub(crate) fn nuclei(absorbance: &[f32], width: usize, known: &Known, params: &GaugeParams) -> Vec<Region> {
+    let mut regions = match known {
+        Known::Masks(labels) => masks(labels, width),
+        Known::Nothing => found(absorbance, width, None, params),
+        Known::Points(points) => found(absorbance, width, Some(points), params),
     };
-    regions.retain(|r| r.pixels.len() as f64 * pixel_um * pixel_um >= params.smallest_um2);
+    regions.retain(|r| r.pixels.len() as f64 * params.pixel_um * params.pixel_um >= params.nuclei.smallest_um2);
     regions.sort_by_key(|r| r.pixels.iter().min().copied());
     regions
 }
 
 /// The largest connected part of each label.
 fn masks(labels: &[u32], width: usize) -> Vec<Region> {
-    let mut seen = vec![false; labels.len()];
     let mut largest = std::collections::BTreeMap::<u32, Region>::new();
-    for start in 0..labels.len() {
-        if labels[start] != 0 && !seen[start] {
-            let region = flood(start, width, labels.len(), &mut seen, |p| labels[p] == labels[start]);
-            let kept = largest.entry(labels[start]).or_default();
-            if kept.pixels.len() < region.pixels.len() {
-                *kept = region;
-            }
+    for region in components(labels, width) {
+        let kept = largest.entry(labels[region.pixels[0] as usize]).or_default();
+        if kept.pixels.len() < region.pixels.len() {
+            *kept = region;
         }
     }
     largest.into_values().collect()
 }
 
-fn found(
-    absorbance: &[f32],
-    width: usize,
-    pixel_um: f64,
-    points: Option<&[[f64; 2]]>,
-    params: &NucleiParams,
-) -> Vec<Region> {
+fn found(absorbance: &[f32], width: usize, points: Option<&[[f64; 2]]>, params: &GaugeParams) -> Vec<Region> {
+    let GaugeParams { pixel_um, nuclei: ref params, .. } = *params;
     let smooth = blur(absorbance, width, (SMOOTH_UM / pixel_um).max(0.5));
     let px2 = pixel_um * pixel_um;
     let (smallest, largest) = (params.smallest_um2 / px2, params.largest_um2 / px2);
@@ -123,36 +103,27 @@ fn found(
         if around[i] || taken[blob.pixel as usize] {
             continue;
         }
-        let mark = points.map(|points| nearest_mark(points, &marked, blob, pixel_um));
-        if mark == Some(None) {
+        let mark = points.and_then(|points| nearest_mark(points, &marked, blob, pixel_um));
+        if points.is_some() && mark.is_none() {
             continue;
         }
         let threshold = f32::from(blob.level) * STEP;
-        let region = flood(blob.pixel as usize, width, smooth.len(), &mut seen, |p| smooth[p] >= threshold);
-        for &p in &region.pixels {
-            seen[p as usize] = false;
-        }
-        let region = region.filled(smooth.len() / width);
-        let free = region.pixels.iter().all(|p| !taken[*p as usize]);
-        let shape = region.shape();
-        let good = free
+        let region = flood(blob.pixel as usize, width, &mut seen, |p| smooth[p] >= threshold);
+        region.pixels.iter().for_each(|p| seen[*p as usize] = false);
+        let region = region.filled();
+        let good = region.pixels.iter().all(|p| !taken[*p as usize])
             && region.pixels.len() as f64 <= largest
-            && shape.solidity >= 1.0 - (1.0 - params.least_solidity) / leniency
+            && region.shape().solidity >= 1.0 - (1.0 - params.least_solidity) / leniency
             && contrast(&smooth, &region, pixel_um) >= leniency * params.least_contrast;
         if !good {
             continue;
         }
-        if let Some(Some(mark)) = mark {
+        if let Some(mark) = mark {
             marked[mark] = true;
         }
-        for &p in &region.pixels {
-            taken[p as usize] = true;
-        }
-        let mut outer = blob.parent;
-        while let Some(o) = outer {
-            around[o as usize] = true;
-            outer = all[o as usize].parent;
-        }
+        region.pixels.iter().for_each(|p| taken[*p as usize] = true);
+        let outer = std::iter::successors(blob.parent, |o| all[*o as usize].parent);
+        outer.for_each(|o| around[o as usize] = true);
         regions.push(region);
     }
     regions
@@ -171,22 +142,9 @@ fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
     let inner =
         region.pixels.iter().map(|p| f64::from(absorbance[*p as usize])).sum::<f64>() / region.pixels.len() as f64;
     let [from, to] = AROUND_UM.map(|um| um / pixel_um);
-    let mut outer: Vec<f64> = Vec::new();
-    let margin = whole(to) + 1;
-    let (inside, wide, [left, top]) = region.tile(margin);
-    let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
-    let distances = crate::region::distance_inside(&outside, wide);
-    let height = absorbance.len() / region.width;
-    for (i, d) in distances.iter().enumerate() {
-        let d = f64::from(*d);
-        let (x, y) = ((i % wide) as i64 + left, (i / wide) as i64 + top);
-        if let (true, Ok(x), Ok(y)) = (d > from && d <= to, usize::try_from(x), usize::try_from(y))
-            && x < region.width
-            && y < height
-        {
-            outer.push(f64::from(absorbance[y * region.width + x]));
-        }
-    }
+    let tile = region.tile(whole(to) + 1);
+    let around = tile.heights().into_iter().enumerate().filter(|(_, d)| f64::from(*d) > from && f64::from(*d) <= to);
+    let mut outer: Vec<f64> = around.filter_map(|(i, _)| tile.place(i)).map(|p| f64::from(absorbance[p])).collect();
     if outer.is_empty() { 0.0 } else { inner - crate::statistics::median(&mut outer) }
 }
 
@@ -194,8 +152,6 @@ fn contrast(absorbance: &[f32], region: &Region, pixel_um: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::region::distance;
-
-    const PIXEL_UM: f64 = 0.33;
 
     /// Discs of a radius and absorbance on something pale, with rims of 1.2 pixels.
     fn image(discs: &[([f64; 2], f64, f64)]) -> Vec<f32> {
@@ -209,15 +165,15 @@ mod tests {
         (0..200 * 150).map(at).collect()
     }
 
-    fn areas(image: &[f32], hints: &Hints) -> Vec<usize> {
-        nuclei(image, 200, PIXEL_UM, hints, &NucleiParams::default()).iter().map(|r| r.pixels.len()).collect()
+    fn areas(image: &[f32], known: &Known) -> Vec<usize> {
+        nuclei(image, 200, known, &GaugeParams::default()).iter().map(|r| r.pixels.len()).collect()
     }
 
     #[test]
     fn a_disc_is_found_to_the_middle_of_its_rim() {
         for radius in [8.0, 12.0, 20.0] {
             let image = image(&[([80.2, 70.7], radius, 0.3)]);
-            let found = nuclei(&image, 200, PIXEL_UM, &Hints::Nothing, &NucleiParams::default());
+            let found = nuclei(&image, 200, &Known::Nothing, &GaugeParams::default());
             assert_eq!(found.len(), 1);
             let shape = found[0].shape();
             let wanted = std::f64::consts::PI * radius * radius;
@@ -228,32 +184,32 @@ mod tests {
 
     #[test]
     fn what_is_too_small_too_large_too_faint_or_too_long_is_none() {
-        assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &Hints::Nothing), [0; 0]);
-        assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &Hints::Nothing), [0; 0]);
-        assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &Hints::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 5.0, 0.3)]), &Known::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 40.0, 0.3)]), &Known::Nothing), [0; 0]);
+        assert_eq!(areas(&image(&[([80.0, 70.0], 10.0, 0.06)]), &Known::Nothing), [0; 0]);
         let chain: Vec<([f64; 2], f64, f64)> =
             (0..12).map(|i| ([40.0 + 9.0 * f64::from(i), 60.0 + 20.0 * f64::from(i % 2)], 9.0, 0.1)).collect();
-        assert!(areas(&image(&chain), &Hints::Nothing).is_empty());
+        assert!(areas(&image(&chain), &Known::Nothing).is_empty());
     }
 
     #[test]
     fn points_choose_what_is_taken_and_masks_are_taken_as_they_are() {
         let image = image(&[([50.0, 70.0], 10.0, 0.3), ([120.0, 70.0], 12.0, 0.4), ([170.0, 70.0], 10.0, 0.07)]);
-        assert_eq!(areas(&image, &Hints::Nothing).len(), 2);
-        assert_eq!(areas(&image, &Hints::Points(&[[121.0, 72.0], [10.0, 10.0]])).len(), 1);
+        assert_eq!(areas(&image, &Known::Nothing).len(), 2);
+        assert_eq!(areas(&image, &Known::Points(vec![[121.0, 72.0], [10.0, 10.0]])).len(), 1);
         // Marked nuclei may be fainter.
-        assert_eq!(areas(&image, &Hints::Points(&[[170.0, 70.0]])).len(), 1);
+        assert_eq!(areas(&image, &Known::Points(vec![[170.0, 70.0]])).len(), 1);
         let mut labels = vec![0; image.len()];
         for y in 20..40 {
             labels[y * 200 + 20..y * 200 + 50].fill(7);
             labels[y * 200 + 60..y * 200 + 65].fill(7);
         }
-        assert_eq!(areas(&image, &Hints::Masks(&labels)), [600]);
+        assert_eq!(areas(&image, &Known::Masks(labels)), [600]);
     }
 
     #[test]
     fn neighbours_are_parted() {
         let image = image(&[([60.0, 70.0], 10.0, 0.3), ([84.0, 70.0], 10.0, 0.35)]);
-        assert_eq!(areas(&image, &Hints::Nothing).len(), 2);
+        assert_eq!(areas(&image, &Known::Nothing).len(), 2);
     }
 }

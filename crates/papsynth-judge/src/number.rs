@@ -1,14 +1,16 @@
 //! Conversions between numbers that are known to fit.
 
 /// The nearest `f32`.
+#[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "f32 is what pixels and features are kept in")]
-pub(crate) fn single(value: f64) -> f32 {
+pub fn single(value: f64) -> f32 {
     value as f32
 }
 
 /// The whole part of a number that is not negative; 0 for negative ones and NaN.
+#[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates, which is what is wanted")]
-pub(crate) fn whole(value: f64) -> usize {
+pub fn whole(value: f64) -> usize {
     value as usize
 }
 

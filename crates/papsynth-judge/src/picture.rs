@@ -65,10 +65,10 @@ impl Picture {
     /// Refuses what is no picture.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let (width, height) = (self.width, self.height());
-        if width * height != self.grey.len() || width < LEAST_SIDE || height < LEAST_SIDE {
-            return Err(Error::Size { name: self.name.clone(), width, height, least: LEAST_SIDE });
-        }
         let refuse = |what: String| Err(Error::Picture { name: self.name.clone(), what });
+        if width * height != self.grey.len() || width < LEAST_SIDE || height < LEAST_SIDE {
+            return refuse(format!("is {width} x {height} pixels; accepted are at least {LEAST_SIDE} a side"));
+        }
         if !(self.full_scale.is_finite() && self.full_scale > 0.0) {
             return refuse(format!("has a full scale of {}; accepted is a number above 0", self.full_scale));
         }
@@ -106,23 +106,29 @@ impl Picture {
         if left + right + top + bottom == 0 {
             return self.clone();
         }
-        let (x1, y1) = (width - right, height - bottom);
-        fn cut<T: Copy>(
-            all: &[T],
-            width: usize,
-            rows: std::ops::Range<usize>,
-            columns: std::ops::Range<usize>,
-        ) -> Vec<T> {
-            rows.flat_map(|y| all[y * width..][columns.clone()].iter().copied()).collect()
+        self.cut([left, top], [width - left - right, height - top - bottom])
+    }
+
+    /// The part from a column and row on, of so many columns and rows. Points of nuclei outside it stay, with places outside it.
+    #[must_use]
+    pub fn cut(&self, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Self {
+        fn part<T: Copy>(all: &[T], wide: usize, from: [usize; 2], size: [usize; 2]) -> Vec<T> {
+            let rows = from[1]..from[1] + size[1];
+            rows.flat_map(|y| all[y * wide + from[0]..][..size[0]].iter().copied()).collect()
         }
-        let nuclei = match &self.nuclei {
-            Known::Nothing => Known::Nothing,
-            Known::Points(points) => {
-                Known::Points(points.iter().map(|[x, y]| [x - left as f64, y - top as f64]).collect())
-            }
-            Known::Masks(labels) => Known::Masks(cut(labels, width, top..y1, left..x1)),
-        };
-        Self { grey: cut(&self.grey, width, top..y1, left..x1), width: x1 - left, nuclei, ..self.clone() }
+        let of_points = |points: &[[f64; 2]]| points.iter().map(|[x, y]| [x - left as f64, y - top as f64]).collect();
+        Self {
+            name: self.name.clone(),
+            group: self.group.clone(),
+            grey: part(&self.grey, self.width, [left, top], [width, height]),
+            width,
+            full_scale: self.full_scale,
+            nuclei: match &self.nuclei {
+                Known::Nothing => Known::Nothing,
+                Known::Points(points) => Known::Points(of_points(points)),
+                Known::Masks(labels) => Known::Masks(part(labels, self.width, [left, top], [width, height])),
+            },
+        }
     }
 
     /// The same in pixels that are `factor` times as large: each the mean of the area that it covers, of labels the one at its centre. A

@@ -6,6 +6,13 @@ fn of_at_least(count: usize, values: &[f64], statistic: impl Fn(&[f64]) -> f64) 
     if values.len() < count { 0.0 } else { statistic(values) }
 }
 
+/// The values in order.
+pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
 /// [`statistics::quantile`]; 0 of none. Sorts the values.
 pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
@@ -32,12 +39,19 @@ pub(crate) fn deviation(values: &[f64]) -> f64 {
     of_at_least(2, values, statistics::deviation)
 }
 
-/// The probability that a score of `high` exceeds one of `low`, ties counted half: the area under the ROC curve; ½ if either is
-/// empty.
+/// The area under the ROC curve: the probability that a score of `high` exceeds one of `low`, ties counted half; ½ if one is empty.
 #[must_use]
 pub fn auc(low: &[f64], high: &[f64]) -> f64 {
     let weigh = |scores: &[f64], label: bool| scores.iter().map(|&s| (s, label, 1.0)).collect::<Vec<_>>();
     weighted_auc(&mut [weigh(low, false), weigh(high, true)].concat())
+}
+
+/// Slope of the least-squares line through points; NaN if `x` does not vary.
+pub(crate) fn line_slope(x: &[f64], y: &[f64]) -> f64 {
+    let (mx, my) = (mean(x), mean(y));
+    let (xy, xx) =
+        x.iter().zip(y).fold((0.0, 0.0), |(xy, xx), (x, y)| (xy + (x - mx) * (y - my), xx + (x - mx) * (x - mx)));
+    if xx > 0.0 { xy / xx } else { f64::NAN }
 }
 
 /// As [`auc`], of scores with their side (whether they are of the high one) and weight. Sorts them.
@@ -63,23 +77,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_auc_of_known_scores_is_known() {
-        assert_eq!(auc(&[1.0, 2.0], &[3.0, 4.0]), 1.0);
-        assert_eq!(auc(&[3.0, 4.0], &[1.0, 2.0]), 0.0);
-        assert_eq!(auc(&[1.0, 1.0], &[1.0]), 0.5);
-        assert_eq!(auc(&[0.1, 0.4, 0.35], &[0.35, 0.8]), 5.5 / 6.0 - 1.0 / 6.0);
+    fn the_auc_is_the_part_of_pairs_in_order_and_weights_stand_for_copies() {
         assert_eq!(auc(&[], &[1.0]), 0.5);
-    }
-
-    #[test]
-    fn weights_stand_for_copies() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
         let scores: Vec<(f64, bool, usize)> =
             (0..40).map(|i| (below(12, &mut rng) as f64, i % 3 == 0, below(4, &mut rng))).collect();
         let mut weighted: Vec<(f64, bool, f64)> = scores.iter().map(|(s, side, w)| (*s, *side, *w as f64)).collect();
-        let copies =
-            |side: bool| -> Vec<f64> { scores.iter().filter(|s| s.1 == side).flat_map(|s| vec![s.0; s.2]).collect() };
-        assert!((weighted_auc(&mut weighted) - auc(&copies(false), &copies(true))).abs() < 1e-12);
+        let [low, high] = [false, true]
+            .map(|side| -> Vec<f64> { scores.iter().filter(|s| s.1 == side).flat_map(|s| vec![s.0; s.2]).collect() });
+        let pairs = low.iter().flat_map(|a| high.iter().map(move |b| 0.5 + 0.5 * f64::from(b.total_cmp(a) as i8)));
+        let right = pairs.sum::<f64>() / (low.len() * high.len()) as f64;
+        assert!((auc(&low, &high) - right).abs() < 1e-12);
+        assert!((weighted_auc(&mut weighted) - right).abs() < 1e-12);
     }
 
     #[test]

@@ -22,14 +22,9 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// Axes that hold all of these values, with a little room; what is not finite does not count.
-    pub fn new(
-        title: &str,
-        x_name: &str,
-        y_name: &str,
-        x: impl Iterator<Item = f64>,
-        y: impl Iterator<Item = f64>,
-    ) -> Self {
+    /// Axes that hold all finite ones of these values, with a little room; names of the drawing and of both axes.
+    pub(crate) fn new(names: [&str; 3], x: impl Iterator<Item = f64>, y: impl Iterator<Item = f64>) -> Self {
+        let [title, x_name, y_name] = names;
         Self::sized(SMALL, title, x_name, y_name, range(x), range(y))
     }
 
@@ -72,9 +67,9 @@ impl Plot {
     fn path(&self, points: impl Iterator<Item = [f64; 2]>) -> String {
         let mut path = String::new();
         let mut letter = 'M';
-        for [x, y] in points {
-            if x.is_finite() && y.is_finite() {
-                let _ = write!(path, "{letter}{:.1} {:.1}", self.x(x), self.y(y));
+        for point in points {
+            if known(&point) {
+                let _ = write!(path, "{letter}{:.1} {:.1}", self.x(point[0]), self.y(point[1]));
                 letter = 'L';
             } else {
                 letter = 'M';
@@ -91,24 +86,24 @@ impl Plot {
 
     /// A pale area between two lines.
     pub fn band(&mut self, lower: &[[f64; 2]], upper: &[[f64; 2]], colour: &str) {
-        let known = |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite();
-        let path = self.path(lower.iter().filter(known).chain(upper.iter().rev().filter(known)).copied());
+        let path = self.path(lower.iter().chain(upper.iter().rev()).copied().filter(known));
         self.put(&format!(r#"<path d="{path}Z" fill="{colour}" fill-opacity="0.15" stroke="none"/>"#));
     }
 
     /// A dot at each point.
     pub fn dots(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
-        for [x, y] in points.filter(|p| p[0].is_finite() && p[1].is_finite()) {
-            let (x, y) = (self.x(x), self.y(y));
-            self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="{colour}" fill-opacity="0.7"/>"#));
-        }
+        self.circles(points, &format!(r#"fill="{colour}" fill-opacity="0.7""#));
     }
 
     /// A ring at each point.
     pub fn rings(&mut self, points: impl Iterator<Item = [f64; 2]>, colour: &str) {
-        for [x, y] in points {
+        self.circles(points, &format!(r#"fill="none" stroke="{colour}""#));
+    }
+
+    fn circles(&mut self, points: impl Iterator<Item = [f64; 2]>, style: &str) {
+        for [x, y] in points.filter(known) {
             let (x, y) = (self.x(x), self.y(y));
-            self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="none" stroke="{colour}"/>"#));
+            self.put(&format!(r#"<circle cx="{x:.1}" cy="{y:.1}" r="2.6" {style}/>"#));
         }
     }
 
@@ -141,6 +136,10 @@ impl Plot {
     }
 }
 
+fn known(point: &[f64; 2]) -> bool {
+    point.iter().all(|v| v.is_finite())
+}
+
 fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let [low, high] =
         values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
@@ -163,20 +162,11 @@ fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
 /// A number in as many digits as are read.
 pub(crate) fn short(value: f64) -> String {
     let size = value.abs();
-    if !value.is_finite() {
-        "–".to_owned()
-    } else if size >= 100.0 {
-        format!("{value:.0}")
-    } else if size >= 10.0 {
-        format!("{value:.1}")
-    } else if size >= 1.0 {
-        format!("{value:.2}")
-    } else if size >= 0.001 {
-        format!("{value:.3}")
-    } else if size < 1e-9 {
-        "0".to_owned()
-    } else {
-        format!("{value:.1e}")
+    match [100.0, 10.0, 1.0, 0.001].iter().position(|least| size >= *least) {
+        _ if !value.is_finite() => "–".to_owned(),
+        Some(digits) => format!("{value:.digits$}"),
+        None if size < 1e-9 => "0".to_owned(),
+        None => format!("{value:.1e}"),
     }
 }
 

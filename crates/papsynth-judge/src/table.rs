@@ -73,14 +73,18 @@ impl Table {
         let values = column.map(|c| self.values[c..].iter().step_by(self.features.len()));
         values.into_iter().flatten().map(|v| f64::from(*v)).filter(|v| v.is_finite())
     }
+}
 
-    /// Adds a row.
-    pub(crate) fn push(&mut self, row: Row, place: [f64; 2]) {
-        if self.features.is_empty() {
-            self.features = row.features;
+impl FromIterator<(Row, [f64; 2])> for Table {
+    /// Of rows and their places.
+    fn from_iter<I: IntoIterator<Item = (Row, [f64; 2])>>(rows: I) -> Self {
+        let mut table = Self::default();
+        for (row, place) in rows {
+            table.features = row.features;
+            table.values.extend(row.values);
+            table.places.push(place);
         }
-        self.values.extend(row.values);
-        self.places.push(place);
+        table
     }
 }
 

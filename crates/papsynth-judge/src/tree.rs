@@ -1,6 +1,7 @@
 //! Dark blobs at every threshold at once: the component tree of absorbance.
 
 use crate::number::{id, nearest, whole};
+use crate::region::{Sums, neighbours};
 
 /// Step between thresholds, absorbance: what a level of 8 bits is at 110 of 255.
 pub(crate) const STEP: f32 = 0.01;
@@ -33,48 +34,15 @@ const AROUND: u16 = 3;
 
 const NONE: u32 = u32::MAX;
 
-/// Running sums of a region.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    n: f64,
-    x: f64,
-    y: f64,
-    xx: f64,
-    xy: f64,
-    yy: f64,
-    a: f64,
-}
-
-impl Sums {
-    fn add(&mut self, o: Self) {
-        self.n += o.n;
-        self.x += o.x;
-        self.y += o.y;
-        self.xx += o.xx;
-        self.xy += o.xy;
-        self.yy += o.yy;
-        self.a += o.a;
-    }
-
-    fn centre(&self) -> [f64; 2] {
-        [self.x / self.n, self.y / self.n]
-    }
-
-    fn ellipse(&self) -> f64 {
-        let [x, y] = self.centre();
-        let (xx, yy) = (self.xx / self.n - x * x + 1.0 / 12.0, self.yy / self.n - y * y + 1.0 / 12.0);
-        let xy = self.xy / self.n - x * y;
-        self.n / (4.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(1e-3).sqrt())
-    }
-}
-
 /// A tree with the sums of its region.
-#[derive(Clone, Copy)]
+#[derive(Default)]
 struct Root {
     sums: Sums,
+    /// Of absorbance.
+    sum: f64,
     pixel: u32,
-    /// Blobs that wait for one around them; a list through `Builder::next`.
-    waiting: u32,
+    /// Blobs that wait for one around them.
+    waiting: Vec<u32>,
     touched: u16,
 }
 
@@ -98,85 +66,63 @@ pub(crate) fn blobs(absorbance: &[f32], width: usize, lightest: f32, largest: f6
     let mut roots: Vec<Root> = Vec::new();
     let mut parents: Vec<u32> = Vec::new();
     let mut blobs: Vec<Blob> = Vec::new();
-    let mut next: Vec<u32> = Vec::new();
     let mut touched: Vec<u32> = Vec::new();
     for level in (least..=MOST).rev() {
         touched.clear();
         for &pixel in &by_level[usize::from(level)] {
             let p = pixel as usize;
-            let (x, y) = (p % width, p / width);
-            let mut own = NONE;
-            let around = [
-                (x > 0).then(|| p - 1),
-                (x + 1 < width).then(|| p + 1),
-                p.checked_sub(width),
-                Some(p + width).filter(|q| *q < absorbance.len()),
-            ];
-            for q in around.into_iter().flatten().filter(|q| slot[*q] != NONE) {
+            let mut joined = None;
+            for q in neighbours(p, width, absorbance.len()).filter(|q| slot[*q] != NONE) {
                 let root = find(&mut parents, slot[q]);
-                own = if own == NONE || own == root {
-                    root
-                } else {
-                    join(&mut parents, &mut roots, &mut next, own, root)
+                joined = match joined {
+                    Some(own) if own != root => Some(join(&mut parents, &mut roots, own, root)),
+                    _ => Some(root),
                 };
             }
-            if own == NONE {
-                own = id(roots.len());
-                parents.push(own);
-                roots.push(Root { sums: Sums::default(), pixel, waiting: NONE, touched: 0 });
-            }
-            slot[p] = own;
-            let (fx, fy) = (x as f64, y as f64);
-            let root = &mut roots[own as usize];
-            root.sums.add(Sums {
-                n: 1.0,
-                x: fx,
-                y: fy,
-                xx: fx * fx,
-                xy: fx * fy,
-                yy: fy * fy,
-                a: f64::from(absorbance[p]),
+            let own = joined.unwrap_or_else(|| {
+                roots.push(Root { pixel, ..Root::default() });
+                parents.push(id(parents.len()));
+                id(parents.len() - 1)
             });
+            slot[p] = own;
+            let root = &mut roots[own as usize];
+            root.sums.add(p % width, p / width);
+            root.sum += f64::from(absorbance[p]);
             if root.touched != level {
                 root.touched = level;
                 touched.push(own);
             }
         }
         for &candidate in &touched {
-            let own = find(&mut parents, candidate);
-            let root = roots[own as usize];
+            let root = &mut roots[find(&mut parents, candidate) as usize];
             // The first to come makes the blob of all that were joined.
-            if root.touched == 0 {
+            if std::mem::take(&mut root.touched) == 0 {
                 continue;
             }
-            roots[own as usize].touched = 0;
-            if root.sums.n > largest {
-                roots[own as usize].waiting = NONE;
+            if root.sums.area() > largest {
+                root.waiting.clear();
                 continue;
             }
             let blob = id(blobs.len());
-            let mut part = root.waiting;
             let mut main: Option<u32> = None;
-            while part != NONE {
+            for part in root.waiting.drain(..) {
                 blobs[part as usize].parent = Some(blob);
                 if main.is_none_or(|m| blobs[m as usize].area < blobs[part as usize].area) {
                     main = Some(part);
                 }
-                part = next[part as usize];
             }
+            root.waiting.push(blob);
             blobs.push(Blob {
                 level,
                 pixel: root.pixel,
-                area: root.sums.n,
-                sum: root.sums.a,
+                area: root.sums.area(),
+                sum: root.sum,
                 centre: root.sums.centre(),
-                ellipse: root.sums.ellipse(),
+                ellipse: ellipse(&root.sums),
                 steepness: 0.0,
                 parent: None,
                 largest: main,
             });
-            next.push(NONE);
-            roots[own as usize].waiting = blob;
         }
     }
     for i in 0..blobs.len() {
@@ -193,23 +139,22 @@ fn find(parents: &mut [u32], mut i: u32) -> u32 {
     i
 }
 
-fn join(parents: &mut [u32], roots: &mut [Root], next: &mut [u32], a: u32, b: u32) -> u32 {
-    let (into, from) = if roots[a as usize].sums.n >= roots[b as usize].sums.n { (a, b) } else { (b, a) };
+fn join(parents: &mut [u32], roots: &mut [Root], a: u32, b: u32) -> u32 {
+    let (into, from) = if roots[a as usize].sums.area() >= roots[b as usize].sums.area() { (a, b) } else { (b, a) };
     parents[from as usize] = into;
-    let other = roots[from as usize];
+    let other = std::mem::take(&mut roots[from as usize]);
     let root = &mut roots[into as usize];
-    root.sums.add(other.sums);
+    root.sums.join(&other.sums);
+    root.sum += other.sum;
     root.touched = root.touched.max(other.touched);
-    if root.waiting == NONE {
-        root.waiting = other.waiting;
-    } else {
-        let mut last = root.waiting;
-        while next[last as usize] != NONE {
-            last = next[last as usize];
-        }
-        next[last as usize] = other.waiting;
-    }
+    root.waiting.extend(other.waiting);
     into
+}
+
+/// Area over that of the ellipse of the same second moments.
+fn ellipse(sums: &Sums) -> f64 {
+    let [xx, xy, yy] = sums.second();
+    sums.area() / (4.0 * std::f64::consts::PI * (xx * yy - xy * xy).max(1e-3).sqrt())
 }
 
 /// A rim of slope g around a region of perimeter P moves outwards by dA/g when the threshold falls by dA, and adds P dA/g pixels.
@@ -258,9 +203,7 @@ mod tests {
         assert!(blobs.len() > 100);
         for blob in &blobs {
             let mut seen = vec![false; image.len()];
-            let region = flood(blob.pixel as usize, width, image.len(), &mut seen, |p| {
-                super::level(image[p], 250) >= blob.level
-            });
+            let region = flood(blob.pixel as usize, width, &mut seen, |p| super::level(image[p], 250) >= blob.level);
             let shape = region.shape();
             assert_eq!(shape.area, blob.area);
             assert!((shape.centre[0] - blob.centre[0]).abs() + (shape.centre[1] - blob.centre[1]).abs() < 1e-9);
@@ -269,9 +212,8 @@ mod tests {
             if let Some(parent) = blob.parent.map(|p| &blobs[p as usize]) {
                 assert!(parent.level < blob.level && parent.area > blob.area);
                 let mut seen = vec![false; image.len()];
-                let around = flood(parent.pixel as usize, width, image.len(), &mut seen, |p| {
-                    super::level(image[p], 250) >= parent.level
-                });
+                let around =
+                    flood(parent.pixel as usize, width, &mut seen, |p| super::level(image[p], 250) >= parent.level);
                 assert!(around.pixels.contains(&blob.pixel));
             }
         }
@@ -283,16 +225,12 @@ mod tests {
         let width = 90;
         let ramp = |i: usize| {
             let (x, y) = ((i % width) as f64 - 45.0, (i / width) as f64 - 45.0);
-            single((0.9 - 0.02 * (x * x + y * y).sqrt()).clamp(0.1, 0.6))
+            crate::number::single((0.9 - 0.02 * (x * x + y * y).sqrt()).clamp(0.1, 0.6))
         };
         let image: Vec<f32> = (0..width * width).map(ramp).collect();
         let blobs = blobs(&image, width, 0.12, 5000.0);
         let middle = blobs.iter().find(|b| b.level == 40).unwrap();
         assert!((middle.steepness - 0.02).abs() < 0.001, "{middle:?}");
         assert!((middle.ellipse - 1.0).abs() < 0.01, "{middle:?}");
-    }
-
-    fn single(value: f64) -> f32 {
-        crate::number::single(value)
     }
 }

@@ -4,44 +4,16 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter is outside its range.
-    #[error("{field} is {value}; accepted is {accepted}")]
-    Parameter {
-        /// Name of the field.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// What would be accepted.
-        accepted: &'static str,
-    },
     /// There is no picture.
     #[error("there is no field to match")]
     NoField,
-    /// Pictures of different sizes.
-    #[error(
-        "field `{name}` is {width} x {height} pixels, the first is {of_first}; one microscope takes fields of one size"
-    )]
-    Size {
+    /// A picture of another size than the first, or without light.
+    #[error("field `{name}` {what}")]
+    Field {
         /// Name of the picture.
         name: String,
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-        /// Size of the first.
-        of_first: String,
-    },
-    /// A picture without light.
-    #[error(
-        "field `{name}` is black: its brightest pixels are at {level:.1} of 255, and an empty slide is expected to be brighter than {least:.0}"
-    )]
-    Black {
-        /// Name of the picture.
-        name: String,
-        /// Its brightest level.
-        level: f64,
-        /// What is expected.
-        least: f64,
+        /// What is wrong with it.
+        what: String,
     },
     /// There is nothing to learn stain and sizes from.
     #[error(
@@ -67,7 +39,7 @@ pub enum Error {
         /// Why the last one could not.
         reason: String,
     },
-    /// The judge refuses a picture.
+    /// A parameter is outside its range, or the judge refuses a picture.
     #[error(transparent)]
     Judge(#[from] papsynth_judge::Error),
     /// The engine refuses the recipe to begin with.
@@ -76,4 +48,10 @@ pub enum Error {
     /// Someone asked to stop.
     #[error("stopped")]
     Stopped,
+}
+
+impl From<papsynth::Error> for Error {
+    fn from(error: papsynth::Error) -> Self {
+        Self::Engine(error.to_string())
+    }
 }

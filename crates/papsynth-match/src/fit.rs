@@ -1,6 +1,5 @@
 //! The whole way: measure, simulate, regress, search.
 
-use papsynth::key::Key;
 use papsynth::recipe::{self, Recipe};
 use papsynth_judge::Picture;
 use rayon::prelude::*;
@@ -8,12 +7,12 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::measured::{Measured, measure};
-use crate::parameter::{PARAMETERS, Parameter, Source, Values};
+use crate::parameter::{PARAMETERS, Parameter, Prior, Source, Values};
 use crate::recipe::{Setting, recipe};
 use crate::refine::{Forward, distance, propose};
 use crate::regression::{Estimate, Regression, WIDEST};
 use crate::summary::{Summary, Window};
-use crate::table::{Plan, Step, Table, TableParams, Tell, spread_out};
+use crate::table::{Plan, Step, Table, TableParams, Tell};
 use crate::view::{MakeEngine, View};
 
 /// Whether the size of a pixel is known.
@@ -86,8 +85,16 @@ pub struct Answer {
     pub width: f64,
 }
 
-/// How far simulated windows lie from the real ones, in standard errors: the root of the mean square over all statistics. Two sets of
-/// windows of one recipe are some 1.4 apart.
+impl Answer {
+    /// A value of which nothing more is known than its range.
+    pub(crate) fn new(parameter: Parameter, origin: Origin, value: f64) -> Self {
+        let Prior { path, unit, low, high, .. } = parameter.prior();
+        let range = [low, high];
+        Self { parameter, path, unit, origin, value, interval: range, before: value, range, width: 1.0 }
+    }
+}
+
+/// Root mean square of standard errors between simulated and real windows. Two sets of windows of one recipe are some 1.4 apart.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Distance {
     /// Of the recipe to begin with.
@@ -157,19 +164,15 @@ impl Match {
     /// # Errors
     /// If a parameter is out of its range.
     pub fn new(params: &MatchParams, base: &Recipe) -> Result<Self, Error> {
-        if params.rounds > 1000 {
-            return Err(Error::Parameter { field: "rounds", value: params.rounds as f64, accepted: "0 to 1000" });
-        }
-        let um = params.pixel.um();
-        if !(0.05..=4.0).contains(&um) {
-            return Err(Error::Parameter { field: "pixel_um", value: um, accepted: "0.05 to 4" });
-        }
+        papsynth_judge::Error::check(&[
+            ("rounds", params.rounds as f64, [0.0, 1e3], "0 to 1000"),
+            ("pixel_um", params.pixel.um(), [0.05, 4.0], "0.05 to 4"),
+        ])?;
         Ok(Self { params: params.clone(), base: base.clone() })
     }
 
     /// The setting of fields and what is known beforehand of their values.
-    #[must_use]
-    pub fn setting(&self, measured: &Measured) -> (Setting, Values) {
+    fn setting(&self, measured: &Measured) -> (Setting, Values) {
         // Pictures of extended focus have more than their noise in common.
         let fused = measured.extended && self.base.focus.picture == recipe::Picture::Planes;
         let setting = Setting {
@@ -197,41 +200,28 @@ impl Match {
         let measured = measure(fields, self.params.pixel.um())?;
         let view = View::new(measured.size_px, self.params.pixel.um(), measured.nuclei_from)?;
         let pictures: Vec<Picture> = fields.iter().flat_map(|f| view.windows(f)).collect();
-        let windows: Vec<Result<(Window, Vec<String>), Error>> =
-            pictures.par_iter().map(|p| Window::new(p, &view)).collect();
-        let windows: Vec<(Window, Vec<String>)> = windows.into_iter().collect::<Result<_, _>>()?;
-        let nuclei = windows.iter().map(|w| w.0.nuclei()).sum();
+        let windows = Window::all(&pictures, &view)?;
+        let nuclei = windows.iter().map(Window::nuclei).sum();
         if nuclei < LEAST_NUCLEI {
             let pixel_um = self.params.pixel.um();
             return Err(Error::Nuclei { found: nuclei, fields: fields.len(), least: LEAST_NUCLEI, pixel_um });
         }
-        let names = windows[0].1.clone();
-        let real = Summary::new(&windows.into_iter().map(|w| w.0).collect::<Vec<_>>(), &names);
+        let real = Summary::new(&windows);
 
         let (setting, known) = self.setting(&measured);
         let of_table =
             TableParams { windows: self.params.table.windows.min(fields.len()), ..self.params.table.clone() };
-        let table = Plan::new(&setting, &known, &view, make, &of_table)?.simulate(tell)?;
-        let regression = Regression::new(&table.statistics, &table.places);
-        let estimates = regression.estimate(&real.values);
-        let search = Search {
-            setting: &setting,
-            known: &known,
-            measured: &measured,
-            table: &table,
-            estimates,
-            view: &view,
-            make,
-            windows: of_table.windows,
-        };
-        let (places, distance, statistics) = search.run(&real, self.params.rounds, of_table.seed, tell)?;
+        let plan = Plan::new(&setting, &known, &view, make, &of_table)?;
+        let table = plan.simulate(tell)?;
+        let estimates = Regression::new(&table.statistics, &table.places).estimate(&real.values);
+        let search = Search { plan: &plan, measured: &measured, table: &table, estimates };
+        let (places, distance, statistics) = search.run(&real, self.params.rounds, tell)?;
         let answers = search.answers(&places);
         let fitted = |parameter: Parameter| {
             answers.iter().any(|a| a.parameter == parameter && a.origin != Origin::NotIdentified)
         };
-        let values = spread_out(&known, &table.sought, &places);
         Ok(Fit {
-            recipe: recipe(&setting, &values, fitted),
+            recipe: recipe(&setting, &plan.values(&places), fitted),
             answers,
             distance,
             statistics,
@@ -246,65 +236,44 @@ impl Match {
 
 /// The search about an estimate.
 struct Search<'a> {
-    setting: &'a Setting,
-    known: &'a Values,
+    plan: &'a Plan<'a>,
     measured: &'a Measured,
     table: &'a Table,
     estimates: Vec<Estimate>,
-    view: &'a View,
-    make: &'a MakeEngine<'a>,
-    windows: usize,
 }
+
+/// Places of all sought parameters, how near they come, and every statistic.
+type Found = (Vec<f64>, Distance, Vec<Statistic>);
 
 impl Search<'_> {
     fn identified(&self, parameter: Parameter) -> bool {
         match parameter.prior().source {
             Source::Measured => self.measured.get(parameter).is_some_and(|e| width_of_value(parameter, &e) <= WIDEST),
             Source::Simulated => {
-                let place = self.table.sought.iter().position(|p| *p == parameter);
+                let place = self.plan.sought().iter().position(|p| *p == parameter);
                 place.is_some_and(|i| self.estimates[i].high - self.estimates[i].low <= WIDEST)
             }
         }
     }
 
     fn simulate(&self, places: &[f64], fitted: impl Fn(Parameter) -> bool + Sync, seed: u64) -> Result<Summary, Error> {
-        let values = spread_out(self.known, &self.table.sought, places);
-        // Windows one by one, side by side.
-        let around = Setting { size_px: self.view.simulated_px(), ..self.setting.clone() };
-        let engine = (self.make)(&recipe(&around, &values, fitted)).map_err(|e| Error::Engine(e.to_string()))?;
-        let one = |index: usize| -> Result<(Window, Vec<String>), Error> {
-            let key = Key { seed, index: index as u64 };
-            Window::new(&self.view.simulate(&engine, key).map_err(|e| Error::Engine(e.to_string()))?, self.view)
-        };
-        let made: Vec<Result<(Window, Vec<String>), Error>> =
-            (0..self.windows.max(2)).into_par_iter().map(one).collect();
-        let made: Vec<(Window, Vec<String>)> = made.into_iter().collect::<Result<_, _>>()?;
-        let names = made[0].1.clone();
-        Ok(Summary::new(&made.into_iter().map(|m| m.0).collect::<Vec<_>>(), &names))
+        let engine = self.plan.engine(places, fitted)?;
+        let count = self.plan.params.windows.max(2);
+        let made = (0..count).into_par_iter().map(|index| self.plan.window(&engine, seed, index));
+        Ok(Summary::new(&made.collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?))
     }
 
-    /// Places of all sought parameters, how near they come, and every statistic.
-    fn run(
-        &self,
-        real: &Summary,
-        rounds: usize,
-        seed: u64,
-        tell: &Tell<'_>,
-    ) -> Result<(Vec<f64>, Distance, Vec<Statistic>), Error> {
+    fn run(&self, real: &Summary, rounds: usize, tell: &Tell<'_>) -> Result<Found, Error> {
+        let (sought, seed) = (self.plan.sought(), self.plan.params.seed);
         let forward = Forward::new(self.table);
-        let base = self.setting.base_values();
+        let base = self.plan.setting.base_values();
         let fitted = |parameter: Parameter| self.identified(parameter);
-        let moving: Vec<(usize, Estimate)> = (0..self.table.sought.len())
-            .filter(|i| self.identified(self.table.sought[*i]))
-            .map(|i| (i, self.estimates[i]))
-            .collect();
+        let all = sought.iter().zip(self.estimates.iter().copied());
+        let moving: Vec<(usize, Estimate)> =
+            all.clone().enumerate().filter(|(_, (p, _))| fitted(**p)).map(|(i, (_, e))| (i, e)).collect();
         // What is not identified stays where the recipe to begin with has it.
-        let start: Vec<f64> = self
-            .table
-            .sought
-            .iter()
-            .zip(&self.estimates)
-            .map(|(p, e)| if self.identified(*p) { e.value } else { p.prior().place(base.get(*p)).clamp(0.0, 1.0) })
+        let start: Vec<f64> = all
+            .map(|(p, e)| if fitted(*p) { e.value } else { p.prior().place(base.get(*p)).clamp(0.0, 1.0) })
             .collect();
         let apart = |s: &Summary| forward.apart(&real.values, &s.values);
         let seen = self.simulate(&start, fitted, seed ^ SEARCH)?;
@@ -314,7 +283,7 @@ impl Search<'_> {
             let next = match &towards {
                 // A step that led away is halved.
                 Some(failed) => failed.iter().zip(&best.0).map(|(a, b)| 0.5 * (a + b)).collect(),
-                None => propose(&forward, &real.values, &best.2.values, &best.0, &moving),
+                None => propose(&forward, [&real.values, &best.2.values], &best.0, &moving),
             };
             let seen = self.simulate(&next, fitted, seed ^ SEARCH)?;
             let found = distance(&apart(&seen));
@@ -330,14 +299,10 @@ impl Search<'_> {
         }
         // The last comparison is on windows that the search has not seen.
         let before = self.simulate(&start, |_| false, seed ^ LAST)?;
-        let estimated = self.simulate(&start, fitted, seed ^ LAST)?;
+        let estimated = distance(&apart(&self.simulate(&start, fitted, seed ^ LAST)?));
         let after = self.simulate(&best.0, fitted, seed ^ LAST)?;
         let off = apart(&after);
-        let told = Distance {
-            before: distance(&apart(&before)),
-            estimated: distance(&apart(&estimated)),
-            after: distance(&off),
-        };
+        let told = Distance { before: distance(&apart(&before)), estimated, after: distance(&off) };
         let statistic = |i: usize| Statistic {
             name: real.names[i].clone(),
             real: real.values[i],
@@ -349,11 +314,11 @@ impl Search<'_> {
     }
 
     fn answers(&self, places: &[f64]) -> Vec<Answer> {
-        let base = self.setting.base_values();
-        let sought = PARAMETERS.into_iter().filter(|p| self.setting.seeks(*p));
+        let base = self.plan.setting.base_values();
+        let sought = PARAMETERS.into_iter().filter(|p| self.plan.setting.seeks(*p));
         let one = |parameter: Parameter| {
             let prior = parameter.prior();
-            let place = self.table.sought.iter().position(|p| *p == parameter);
+            let place = self.plan.sought().iter().position(|p| *p == parameter);
             let (value, interval, width) = match (place, self.measured.get(parameter)) {
                 (Some(i), _) => {
                     let e = self.estimates[i];
@@ -369,8 +334,7 @@ impl Search<'_> {
             };
             let before = base.get(parameter);
             let value = if origin == Origin::NotIdentified { before } else { value };
-            let (path, unit) = (prior.path, prior.unit);
-            Answer { parameter, path, unit, origin, value, interval, before, range: [prior.low, prior.high], width }
+            Answer { interval, before, width, ..Answer::new(parameter, origin, value) }
         };
         sought.map(one).collect()
     }

@@ -3,16 +3,12 @@
 
 mod error;
 mod fit;
-mod interval;
 mod measured;
 mod noise;
-mod number;
 mod parameter;
 mod recipe;
 mod refine;
 mod regression;
-mod ridge;
-mod small;
 mod summary;
 mod table;
 mod text;

@@ -4,7 +4,6 @@ use papsynth_judge::{NucleiFrom, Picture};
 use rayon::prelude::*;
 
 use crate::error::Error;
-use crate::interval::{of_deviation, of_mean};
 use crate::noise::{Empty, pattern};
 use crate::parameter::Parameter;
 use crate::recipe::{LEVELS, Spreads};
@@ -30,11 +29,10 @@ const PATTERN_ERROR: f64 = 0.06;
 /// To a correlation.
 const CORRELATION_ERROR: f64 = 0.012;
 
-/// Variance that rounding and what lies on the slide add to noise, squares of levels of 8 bits: faint noise is told by less, and of
-/// what it shares nothing.
+/// Variance that rounding and what lies on the slide add to noise, squares of levels of 8 bits.
 const ADDED: f64 = 0.06;
 
-/// To a correlation, over that of the added part of the variance: rounding shares nothing, and dirt shares all.
+/// To a correlation, over the added part of the variance: rounding shares nothing, and dirt shares all.
 const ADDED_SHARE: f64 = 2.0;
 
 /// To the level, a part of full scale; and where all is covered, and what is taken for empty is not.
@@ -86,15 +84,20 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     let first = fields.first().ok_or(Error::NoField)?;
     let size_px = [first.width, first.height()];
     for field in fields {
-        if [field.width, field.height()] != size_px {
-            let of_first = format!("{} x {}", size_px[0], size_px[1]);
-            return Err(Error::Size { name: field.name.clone(), width: field.width, height: field.height(), of_first });
+        let refuse = |what: String| Err(Error::Field { name: field.name.clone(), what });
+        let (width, height, [of_first, down]) = (field.width, field.height(), size_px);
+        if [width, height] != size_px {
+            return refuse(format!(
+                "is {width} x {height} pixels, the first is {of_first} x {down}; one microscope takes fields of one size"
+            ));
         }
         let mut some: Vec<f64> =
             field.grey.iter().step_by(17).map(|g| LEVELS * f64::from(g / field.full_scale)).collect();
         let level = quantile(&mut some, 0.98);
         if level.is_nan() || level < DARK {
-            return Err(Error::Black { name: field.name.clone(), level, least: DARK });
+            return refuse(format!(
+                "is black: its brightest pixels are at {level:.1} of 255, and an empty slide is expected to be brighter than {DARK:.0}"
+            ));
         }
     }
     // Points are of those nuclei that somebody took an interest in: simulated windows know all of theirs.
@@ -128,9 +131,6 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     let variances = column(&|l| l.empty.deviation * l.empty.deviation);
     let added = ADDED * (scale / LEVELS) * (scale / LEVELS) / mean(&variances);
     // What lies on a slide adds to its noise and changes what is shared: by how much is seen in how fields differ.
-    let reach = |values: &[f64]| {
-        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
-    };
     if extended {
         for (parameter, values) in [(Parameter::Across, &shared[0]), (Parameter::Down, &shared[1])] {
             let [low, high] = reach(values);
@@ -181,6 +181,11 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
     Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, spreads })
 }
 
+/// The least and the largest value.
+pub(crate) fn reach(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
+}
+
 fn light(field: &Picture, view: &View) -> Result<Light, Error> {
     let s = view.gauge.measure(field)?.statistics;
     let (across, down) = (-s.background_x2, -s.background_y2);
@@ -201,23 +206,69 @@ fn bits(fields: &[Picture]) -> u32 {
     (8..16).find(|bits| f64::from(scale) <= libm::exp2(f64::from(*bits))).unwrap_or(16)
 }
 
+/// The deviate that 97.5 % of a standard normal lie below.
+const NORMAL: f64 = 1.959_964;
+
+/// The same of Student's t with 1, 2, … degrees of freedom.
+const STUDENT: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+
+/// Of Student's t: from the table, beyond it by the first terms of Fisher's expansion.
+fn student(freedom: usize) -> f64 {
+    match STUDENT.get(freedom.wrapping_sub(1)) {
+        Some(t) => *t,
+        None if freedom == 0 => f64::INFINITY,
+        None => {
+            let (z, n) = (NORMAL, freedom as f64);
+            let z3 = z * z * z;
+            z + (z3 + z) / (4.0 * n) + (5.0 * z3 * z * z + 16.0 * z3 + 3.0 * z) / (96.0 * n * n)
+        }
+    }
+}
+
+/// Half the width of the 95 % interval of the mean.
+fn of_mean(sd: f64, count: usize) -> f64 {
+    student(count.saturating_sub(1)) * sd / (count.max(1) as f64).sqrt()
+}
+
+/// The 95 % interval of a standard deviation that was estimated as 1, from the quantiles of χ² by Wilson and Hilferty
+/// (doi:10.1073/pnas.17.12.684).
+fn of_deviation(count: usize) -> [f64; 2] {
+    let n = count.saturating_sub(1) as f64;
+    if n < 1.0 {
+        return [0.0, f64::INFINITY];
+    }
+    let chi2 = |z: f64| {
+        let root = 1.0 - 2.0 / (9.0 * n) + z * (2.0 / (9.0 * n)).sqrt();
+        n * (root * root * root).max(1e-3)
+    };
+    [NORMAL, -NORMAL].map(|z| (n / chi2(z)).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use papsynth_judge::Known;
-
-    fn flat(level: f32, name: &str, width: usize) -> Picture {
-        let grey = (0..width * 96).map(|i| level + (i % 3) as f32).collect();
-        Picture { name: name.to_owned(), group: String::new(), grey, width, full_scale: 255.0, nuclei: Known::Nothing }
-    }
 
     #[test]
-    fn what_is_no_set_of_fields_is_refused() {
-        assert_eq!(measure(&[], 0.33), Err(Error::NoField));
-        assert!(matches!(measure(&[flat(2.0, "a", 128)], 0.33), Err(Error::Black { .. })));
-        let two = [flat(200.0, "a", 128), flat(200.0, "b", 96)];
+    fn fields_of_one_size_and_pixels_with_a_size_are_asked_for() {
+        let two = [("a", 128), ("b", 96)].map(|(name, width)| {
+            let grey = (0..width * 96).map(|i| 200.0 + (i % 3) as f32).collect();
+            Picture { name: name.to_owned(), grey, width, ..Picture::default() }
+        });
         let error = measure(&two, 0.33).unwrap_err().to_string();
         assert!(error.contains("field `b` is 96 x 96") && error.contains("128 x 96"), "{error}");
         assert!(measure(&two[..1], f64::NAN).is_err());
+    }
+
+    #[test]
+    fn quantiles_are_those_of_tables() {
+        assert!((student(30) - 2.042).abs() < 0.002, "{}", student(30));
+        assert!((student(11) - 2.201).abs() < 0.003, "{}", student(11));
+        // χ² with 7 degrees of freedom: 1.690 and 16.013.
+        let [low, high] = of_deviation(8);
+        assert!(
+            (low - (7.0_f64 / 16.013).sqrt()).abs() < 0.01 && (high - (7.0_f64 / 1.690).sqrt()).abs() < 0.05,
+            "{low} {high}"
+        );
+        assert_eq!(of_deviation(1)[1], f64::INFINITY);
     }
 }

@@ -1,9 +1,8 @@
-//! Noise beyond that of the empty slide: how it goes with light, what of it is the same in all fields, how uneven light is.
+//! Noise beyond that of the empty slide, how uneven light is, and small things: how many there are of each size and darkness.
 
+use papsynth_judge::filter::separable;
+use papsynth_judge::number::{single, whole};
 use portable_numerics::statistics::{deviation, mean, quantile};
-
-use crate::number::single;
-use crate::small::blur;
 
 /// Side of the blocks that noise is compared in, pixels.
 const BLOCK: usize = 8;
@@ -18,7 +17,7 @@ const EVENEST: f64 = 0.15;
 const LEAST_BLOCKS: usize = 12;
 
 /// Numbers of [`law`].
-pub(crate) const LAW: usize = BINS.len() - 1;
+const LAW: usize = BINS.len() - 1;
 
 /// Logarithm of the noise of ever darker places over that of the empty slide; NaN where there are none.
 pub(crate) fn law(grey: &[f32], width: usize, empty: f64) -> [f64; LAW] {
@@ -68,12 +67,8 @@ pub(crate) fn unevenness(grey: &[f32], width: usize, empty: f64) -> [f64; 2] {
     let light: Vec<f32> = grey.iter().map(|g| g / single(empty)).collect();
     let [fine, coarse] = UNEVEN_PX.map(|sigma| blur(&light, width, sigma));
     // Whatever lies there is darker than the slide: the paler half is the slide.
-    let mut rests: Vec<f64> = fine
-        .iter()
-        .zip(&coarse)
-        .filter(|(_, c)| **c > 1.0 - 2.0 * EVEN)
-        .map(|(f, c)| f64::from((f - c).abs()))
-        .collect();
+    let slide = fine.iter().zip(&coarse).filter(|(_, c)| **c > 1.0 - 2.0 * EVEN);
+    let mut rests: Vec<f64> = slide.map(|(f, c)| f64::from((f - c).abs())).collect();
     let finely = if rests.len() < grey.len() / 50 { f64::NAN } else { quantile(&mut rests, 0.5) };
     [finely, coarsely(&fine, width)].map(|v| if v.is_nan() { v } else { libm::log(v.max(1e-6)) })
 }
@@ -123,6 +118,19 @@ const NEAR: f32 = 0.04;
 /// Fewest pixels of empty slide that noise is measured on.
 const LEAST_EMPTY: usize = 4000;
 
+/// Mean product of pixels that are known in both; NaN of fewer than so many.
+fn mean_product(a: &[f32], b: &[f32], least: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for (a, b) in a.iter().zip(b) {
+        let value = f64::from(a * b);
+        if value.is_finite() {
+            sum += value;
+            count += 1;
+        }
+    }
+    if count < least { f64::NAN } else { sum / count as f64 }
+}
+
 /// Noise of the empty parts of a field.
 pub(crate) struct Empty {
     /// Over the light there; NaN elsewhere.
@@ -147,25 +155,11 @@ impl Empty {
             things.iter().zip(&wide).filter(|(_, w)| **w > slide).map(|(t, _)| f64::from(t.abs())).collect();
         // The median size of a normal is 0.674 of its deviation; what lies there makes it larger, by little.
         let most = single(USUAL * quantile(&mut sizes, 0.4).max(1e-6) / 0.524);
-        let rest: Vec<f32> = grey
-            .iter()
-            .zip(&wide)
-            .zip(&things)
-            .map(|((g, w), t)| if *w > slide && t.abs() < most { g - w } else { f32::NAN })
-            .collect();
+        let known = |(w, t): (&f32, &f32)| *w > slide && t.abs() < most;
+        let parts = grey.iter().zip(wide.iter().zip(&things));
+        let rest: Vec<f32> = parts.map(|(g, at)| if known(at) { g - at.0 } else { f32::NAN }).collect();
         let relative = rest.iter().zip(&wide).map(|(r, w)| r / w).collect();
-        let product = |step: usize| {
-            let (mut sum, mut count) = (0.0, 0_usize);
-            for (a, b) in rest.iter().zip(&rest[step..]) {
-                let value = f64::from(a * b);
-                if value.is_finite() {
-                    sum += value;
-                    count += 1;
-                }
-            }
-            if count < LEAST_EMPTY { f64::NAN } else { sum / count as f64 }
-        };
-        let found = [0, 1, width].map(product);
+        let found = [0, 1, width].map(|step| mean_product(&rest, &rest[step..], LEAST_EMPTY));
         let mut own = found;
         /// Each round leaves a fiftieth of the error of the one before.
         const ROUNDS: usize = 6;
@@ -185,29 +179,104 @@ impl Empty {
 /// Fewest pixels that two fields have empty in common.
 const LEAST_PIXELS: usize = 5000;
 
-/// What the noise of fields has in common: the mean over pairs of its relative variance, and the standard error; none where
-/// fewer than two fields are empty at the same places.
+/// Mean over pairs of fields of the relative variance that they share, with its standard error; none of fields without common slide.
 pub(crate) fn pattern(fields: &[Vec<f32>]) -> Option<[f64; 2]> {
     let mut products = Vec::new();
     for (i, a) in fields.iter().enumerate() {
         for b in &fields[i + 1..] {
-            let (mut sum, mut count) = (0.0, 0);
-            for (x, y) in a.iter().zip(b) {
-                let product = f64::from(x * y);
-                if product.is_finite() {
-                    sum += product;
-                    count += 1;
-                }
-            }
-            if count >= LEAST_PIXELS {
-                products.push(sum / count as f64);
-            }
+            products.extend(Some(mean_product(a, b, LEAST_PIXELS)).filter(|product| product.is_finite()));
         }
     }
     let pairs = products.len();
     // Pairs share fields: as many are independent as there are fields.
     let sd = if pairs > 1 { deviation(&products) } else { mean(&products).abs() };
     (pairs > 0).then(|| [mean(&products), sd / (fields.len().min(pairs) as f64).sqrt()])
+}
+
+/// Scales at which small things are sought, pixels.
+const SCALES: [f64; 3] = [1.0, 2.0, 4.0];
+
+/// Least darkness of small things over their surroundings after a difference of Gaussians, absorbance.
+const DARKNESS: [f32; 3] = [0.006, 0.02, 0.06];
+
+/// What lies around is empty slide if it is paler, absorbance after a wide Gaussian.
+const EMPTY_AROUND: f32 = 0.025;
+
+/// Width of that Gaussian, pixels.
+const AROUND_PX: f64 = 10.0;
+
+/// A thing is long if its curvature across is so many times that along.
+const LONG: f32 = 2.5;
+
+/// Least light, a part of that of the empty slide.
+const LEAST_LIGHT: f32 = 0.004;
+
+/// Logarithms of how many there are a thousand pixels, and the share of long ones; `empty` is the level of the empty slide.
+pub(crate) fn counts(grey: &[f32], width: usize, empty: f32) -> Vec<(String, f64)> {
+    let height = grey.len() / width;
+    let absorbance: Vec<f32> = grey.iter().map(|g| -libm::log10f((g / empty).max(LEAST_LIGHT))).collect();
+    let around = blur(&absorbance, width, AROUND_PX);
+    let mut out = Vec::new();
+    for scale in SCALES {
+        let fine = blur(&absorbance, width, scale);
+        let coarse = blur(&absorbance, width, 1.6 * scale);
+        let band: Vec<f32> = fine.iter().zip(&coarse).map(|(a, b)| a - b).collect();
+        let mut found = [[0_u32; DARKNESS.len()]; 2];
+        let mut long = [0_u32; 2];
+        for y in 1..height.saturating_sub(1) {
+            for x in 1..width - 1 {
+                let p = y * width + x;
+                let own = band[p];
+                if own < DARKNESS[0] {
+                    continue;
+                }
+                let before = [p - width - 1, p - width, p - width + 1, p - 1];
+                let after = [p + 1, p + width - 1, p + width, p + width + 1];
+                if before.iter().any(|q| band[*q] >= own) || after.iter().any(|q| band[*q] > own) {
+                    continue;
+                }
+                let place = usize::from(around[p] > EMPTY_AROUND);
+                for (count, level) in found[place].iter_mut().zip(DARKNESS) {
+                    *count += u32::from(own >= level);
+                }
+                long[place] += u32::from(is_long(&band, p, width));
+            }
+        }
+        let thousands = grey.len() as f64 / 1000.0;
+        for ((found, long), place) in found.into_iter().zip(long).zip(["on empty slide", "on cells"]) {
+            out.extend(found.into_iter().zip(DARKNESS).map(|(count, level)| {
+                let name = format!("things of {scale} px above {level} {place}");
+                (name, libm::log(f64::from(count) / thousands + 0.01))
+            }));
+            let share = if found[0] >= 5 { f64::from(long) / f64::from(found[0]) } else { f64::NAN };
+            out.push((format!("long ones of {scale} px {place}"), share));
+        }
+    }
+    out
+}
+
+/// Whether a maximum is a ridge.
+fn is_long(band: &[f32], p: usize, width: usize) -> bool {
+    let at = |q: usize| band[q];
+    let xx = 2.0 * at(p) - at(p - 1) - at(p + 1);
+    let yy = 2.0 * at(p) - at(p - width) - at(p + width);
+    let xy = 0.25 * (at(p + width - 1) + at(p - width + 1) - at(p + width + 1) - at(p - width - 1));
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let root = (half * half + xy * xy).sqrt();
+    mean + root > LONG * (mean - root).max(0.0)
+}
+
+/// A Gaussian, mirrored at the pixels of the border.
+fn blur(image: &[f32], width: usize, sigma: f64) -> Vec<f32> {
+    let reach = whole(3.0 * sigma) + 1;
+    let mut kernel: Vec<f32> =
+        (0..=reach).map(|i| single(libm::exp(-0.5 * (i * i) as f64 / (sigma * sigma)))).collect();
+    let sum = kernel[0] + 2.0 * kernel[1..].iter().sum::<f32>();
+    kernel.iter_mut().for_each(|k| *k /= sum);
+    separable(image, width, &kernel, |i, reach, count| {
+        let i = i.abs_diff(reach);
+        (if i >= count { (2 * count - 2).saturating_sub(i) } else { i }).min(count - 1)
+    })
 }
 
 #[cfg(test)]
@@ -265,5 +334,36 @@ mod tests {
         };
         let (reading, photons) = (of(&|_| 2.0), of(&|l| (l / 55.0).sqrt()));
         assert!(reading.abs() < 0.1 && (photons - libm::log(150.0 / 220.0)).abs() < 0.1, "{reading} {photons}");
+    }
+
+    #[test]
+    fn a_blur_keeps_light_and_spreads_a_point_as_wide_as_asked() {
+        let width = 41;
+        let mut image = vec![0.0; width * width];
+        image[20 * width + 20] = 1.0;
+        let out = blur(&image, width, 2.0);
+        let sum: f32 = out.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+        let off = |i: usize| (i % width) as f64 - 20.0;
+        let variance: f64 = out.iter().enumerate().map(|(i, v)| f64::from(*v) * off(i) * off(i)).sum();
+        assert!((variance - 4.0).abs() < 0.1, "{variance}");
+        assert!(blur(&vec![3.0; 400], 20, 10.0).iter().all(|v| (v - 3.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn dots_and_rods_are_counted_apart() {
+        let width = 100;
+        let mut grey = vec![200.0; width * width];
+        for k in 0..5 {
+            grey[(10 + 18 * k) * width + 20] = 60.0;
+            for x in 60..70 {
+                grey[(10 + 18 * k) * width + x] = 100.0;
+            }
+        }
+        let found = counts(&grey, width, 200.0);
+        assert_eq!(found.len(), 24);
+        let things = (libm::exp(found[0].1) - 0.01) * 10.0;
+        assert!((9.5..20.5).contains(&things), "{things}");
+        assert!((0.2..0.8).contains(&found[3].1), "{:?}", found[3]);
     }
 }

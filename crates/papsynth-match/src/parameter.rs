@@ -195,12 +195,6 @@ impl Values {
     pub fn set(&mut self, parameter: Parameter, value: f64) {
         self.0[parameter.index()] = value;
     }
-
-    /// Their places in their ranges.
-    #[must_use]
-    pub fn places(&self) -> [f64; PARAMETERS.len()] {
-        std::array::from_fn(|i| PARAMETERS[i].prior().place(self.0[i]))
-    }
 }
 
 #[cfg(test)]

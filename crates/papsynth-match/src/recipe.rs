@@ -52,14 +52,7 @@ const TAKEN: f64 = 0.5;
 const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Setting {
-    /// Area of a field, mm².
-    #[must_use]
-    pub fn area_mm2(&self, pixel_um: f64) -> f64 {
-        self.size_px[0] as f64 * self.size_px[1] as f64 * pixel_um * pixel_um * 1e-6
-    }
-
-    /// Whether a parameter can be sought here: not the density of clusters where there are none, not the noise shared in a
-    /// picture that was not fused.
+    /// Whether a parameter can be sought here: not the density of clusters where there are none, for example.
     #[must_use]
     pub fn seeks(&self, parameter: P) -> bool {
         match parameter {
@@ -67,7 +60,7 @@ impl Setting {
             P::Pixel => self.seek_pixel,
             P::Size => !self.seek_pixel,
             P::Outside | P::ClusterRadius => matches!(self.base.layout, Layout::Clusters(_)),
-            P::Superficial => ["superficial", "intermediate"].iter().all(|class| self.base.cells.contains_key(*class)),
+            P::Superficial => PAIR.iter().all(|class| self.base.cells.contains_key(*class)),
             _ => true,
         }
     }
@@ -76,10 +69,7 @@ impl Setting {
     #[must_use]
     pub fn base_values(&self) -> Values {
         let base = &self.base;
-        let area = {
-            let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
-            w * h * p * p * 1e-6
-        };
+        let area = base_area(base);
         let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
         let (x2, y2) = match &base.background.illumination {
             Illumination::Bowl(Bowl { x2, y2, .. }) => (centre(x2), centre(y2)),
@@ -93,8 +83,7 @@ impl Setting {
         let pattern = centre(&camera.prnu) * signal;
         let noise = photons + read * read + pattern * pattern + ROUNDING;
         let counts: f64 = base.cells.values().map(|mix| centre(&mix.count)).sum();
-        let superficial = base.cells.get("superficial").map_or(0.0, |mix| centre(&mix.count));
-        let intermediate = base.cells.get("intermediate").map_or(0.0, |mix| centre(&mix.count));
+        let [superficial, intermediate] = of_pair(base);
         let both = |a: &Number, b: &Number| (spread(a) * spread(a) + spread(b) * spread(b)).sqrt();
         let first = base.cells.values().next();
         let of_cells = |f: fn(&CellMix) -> &Number| first.map_or(&Number::Fixed(1.0), f).clone();
@@ -102,7 +91,8 @@ impl Setting {
             Layout::Clusters(Clusters { radius_um, outside, .. }) => (centre(radius_um), centre(outside)),
             _ => (30.0, 1.0),
         };
-        let blur = blur(&base.optics);
+        let mut optics = base.optics.clone();
+        let blur = blur(&mut optics);
         let debris = &base.debris;
         let mut values = Values([0.0; PARAMETERS.len()]);
         for (parameter, value) in [
@@ -147,37 +137,29 @@ impl Setting {
         }
         values
     }
-
-    /// The recipe to begin with, for fields of this size.
-    #[must_use]
-    pub fn framed(&self, pixel_um: f64) -> Recipe {
-        let mut recipe = self.base.clone();
-        let field = &mut recipe.field;
-        field.width_px = (self.size_px[0] as f64).into();
-        field.height_px = (self.size_px[1] as f64).into();
-        field.pixel_um = number(pixel_um);
-        field.magnification = 0.0.into();
-        recipe.camera.bits = f64::from(self.bits).into();
-        if self.extended && recipe.focus.picture != Picture::Extended {
-            recipe.focus = Preset::ExtendedFocus.recipe().focus;
-        } else if !self.extended {
-            recipe.focus.picture = Picture::Planes;
-            recipe.focus.planes = 1.0.into();
-        }
-        recipe
-    }
 }
 
-/// The recipe of a setting with the values of those parameters that are `fitted`; the others stay as they are in the recipe to
-/// begin with.
+/// The recipe of a setting with the values of parameters that are `fitted`; the others are those of the recipe to begin with.
 #[must_use]
 pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) -> Recipe {
     let on = |parameter: P| setting.seeks(parameter) && fitted(parameter);
     let get = |parameter: P| values.get(parameter);
     let base = setting.base_values();
     let pixel_um = if on(P::Pixel) { get(P::Pixel) } else { setting.pixel_um };
-    let mut r = setting.framed(pixel_um);
-    let area = setting.area_mm2(pixel_um);
+    let mut r = setting.base.clone();
+    let [width, height] = setting.size_px.map(|side| side as f64);
+    let area = width * height * pixel_um * pixel_um * 1e-6;
+    r.field.width_px = width.into();
+    r.field.height_px = height.into();
+    r.field.pixel_um = number(pixel_um);
+    r.field.magnification = 0.0.into();
+    r.camera.bits = f64::from(setting.bits).into();
+    if setting.extended && r.focus.picture != Picture::Extended {
+        r.focus = Preset::ExtendedFocus.recipe().focus;
+    } else if !setting.extended {
+        r.focus.picture = Picture::Planes;
+        r.focus.planes = 1.0.into();
+    }
     let either = |a: P, b: P| on(a) || on(b);
     let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
 
@@ -200,19 +182,30 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         r.background.scatter = about(get(P::Scatter), &setting.base.background.scatter);
     }
     camera(&mut r, setting, &on, &or_base);
-    if on(P::Across) {
-        r.focus.fused_noise_across = number(get(P::Across));
-    }
-    if on(P::Down) {
-        r.focus.fused_noise_down = number(get(P::Down));
+    for (parameter, field) in [
+        (P::Across, &mut r.focus.fused_noise_across),
+        (P::Down, &mut r.focus.fused_noise_down),
+        (P::Depth, &mut r.slide.depth_um),
+    ] {
+        if on(parameter) {
+            *field = number(get(parameter));
+        }
     }
     if either(P::Blur, P::BlurSpread) {
-        *blur_mut(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
+        *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
     }
-    if on(P::Depth) {
-        r.slide.depth_um = number(get(P::Depth));
+    let stain = &mut r.stain;
+    for (median, log_sd, of_field, of_slide) in [
+        (P::FieldCytoplasm, P::FieldCytoplasmSpread, &mut stain.field_cytoplasm, Some(&mut stain.slide_cytoplasm)),
+        (P::FieldNucleus, P::FieldNucleusSpread, &mut stain.field_nucleus, Some(&mut stain.slide_nucleus)),
+        (P::Texture, P::TextureSpread, &mut stain.field_texture, None),
+    ] {
+        if either(median, log_sd) {
+            *of_field = cut(log_normal(or_base(median), or_base(log_sd)), 0.0, 20.0);
+            // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
+            of_slide.into_iter().for_each(|slide| *slide = 1.0.into());
+        }
     }
-    stain(&mut r, &on, &or_base);
     if on(P::Dome) {
         r.nucleus.dome = within(get(P::Dome), 0.2);
     }
@@ -259,6 +252,14 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     r
 }
 
+/// Classes of cells whose share is sought.
+const PAIR: [&str; 2] = ["superficial", "intermediate"];
+
+/// How many there are of them.
+fn of_pair(recipe: &Recipe) -> [f64; 2] {
+    PAIR.map(|class| recipe.cells.get(class).map_or(0.0, |mix| centre(&mix.count)))
+}
+
 fn base_area(base: &Recipe) -> f64 {
     let [w, h, p] = [&base.field.width_px, &base.field.height_px, &base.field.pixel_um].map(centre);
     w * h * p * p * 1e-6
@@ -295,29 +296,12 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     camera.prnu = number(pattern.sqrt() / signal);
 }
 
-fn stain(r: &mut Recipe, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
-    let stain = &mut r.stain;
-    // Fields of a handful are taken for fields of as many slides: what slides differ by is in what fields differ by.
-    if on(P::FieldCytoplasm) || on(P::FieldCytoplasmSpread) {
-        stain.slide_cytoplasm = 1.0.into();
-        stain.field_cytoplasm =
-            cut(log_normal(or_base(P::FieldCytoplasm), or_base(P::FieldCytoplasmSpread)), 0.0, 20.0);
-    }
-    if on(P::FieldNucleus) || on(P::FieldNucleusSpread) {
-        stain.slide_nucleus = 1.0.into();
-        stain.field_nucleus = cut(log_normal(or_base(P::FieldNucleus), or_base(P::FieldNucleusSpread)), 0.0, 20.0);
-    }
-    if on(P::Texture) || on(P::TextureSpread) {
-        stain.field_texture = cut(log_normal(or_base(P::Texture), or_base(P::TextureSpread)), 0.0, 20.0);
-    }
-}
-
 fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
     let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
     let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
     let scale = total / base_total.max(1e-9);
-    let pair = ["superficial", "intermediate"].map(|class| r.cells.get(class).map_or(0.0, |mix| centre(&mix.count)));
+    let pair = of_pair(r);
     for (class, mix) in &mut r.cells {
         if found {
             let own = match class.as_str() {
@@ -341,23 +325,25 @@ fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_b
     }
 }
 
-fn blur(optics: &Optics) -> &Number {
+fn blur(optics: &mut Optics) -> &mut Number {
     match optics {
         Optics::BrightField(Microscope { extra_blur_um, .. }) => extra_blur_um,
         Optics::Gaussian(Gaussians { sigma_xy_um, .. }) => sigma_xy_um,
     }
 }
 
-fn blur_mut(optics: &mut Optics) -> &mut Number {
-    match optics {
-        Optics::BrightField(Microscope { extra_blur_um, .. }) => extra_blur_um,
-        Optics::Gaussian(Gaussians { sigma_xy_um, .. }) => sigma_xy_um,
+/// To so many digits, as recipes are read by people.
+pub(crate) fn rounded_to(value: f64, digits: i32) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
     }
+    let scale = libm::pow(10.0, f64::from(digits) - libm::ceil(libm::log10(value.abs())));
+    libm::round(value * scale) / scale
 }
 
 /// To as many digits as a recipe is read with.
 fn rounded(value: f64) -> f64 {
-    crate::number::rounded(value, 4)
+    rounded_to(value, 4)
 }
 
 fn number(value: f64) -> Number {
@@ -385,15 +371,8 @@ fn within(middle: f64, half: f64) -> Number {
 /// Nothing beyond what a recipe accepts, where the distribution reaches there.
 fn cut(number: Number, low: f64, high: f64) -> Number {
     let [least, most] = number.bounds();
-    if least >= low && most <= high {
-        return number;
-    }
-    match number {
-        Number::Fixed(value) => Number::Fixed(value.clamp(low, high)),
-        Number::Drawn { law, min, max } => {
-            Number::Drawn { law, min: if least < low { low } else { min }, max: if most > high { high } else { max } }
-        }
-    }
+    let number = if least < low { number.at_least(low) } else { number };
+    if most > high { number.at_most(high) } else { number }
 }
 
 /// A distribution like another, about another middle.

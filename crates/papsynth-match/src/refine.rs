@@ -5,12 +5,10 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use rayon::prelude::*;
 
-use crate::regression::{Estimate, Scaler};
-use crate::ridge::Features;
+use crate::regression::{Estimate, Features, Scaler};
 use crate::table::Table;
 
-/// Statistics further apart than so many standard errors count in proportion, not by the square: what a recipe cannot show
-/// must not bend all it can.
+/// Statistics further apart than so many standard errors count in proportion: what a recipe cannot show must not bend the rest.
 const FAR: f64 = 3.0;
 
 /// Steps of the optimiser, and gradients that it remembers.
@@ -29,8 +27,7 @@ pub(crate) struct Forward {
     errors: Vec<f64>,
 }
 
-/// Least standard error of a statistic, in its standard deviations over the table: even what follows its parameters closely is not
-/// followed by a parabola.
+/// Least standard error of a statistic, in its standard deviations over the table: nothing follows a parabola more closely.
 const LEAST_ERROR: f64 = 0.05;
 
 impl Forward {
@@ -39,17 +36,13 @@ impl Forward {
         let statistics: Vec<Vec<f64>> = table.statistics.iter().map(|r| scaler.scaled(r)).collect();
         let rows: Vec<Vec<f64>> = table.places.iter().map(|p| features(p)).collect();
         let features = Features::new(&rows);
-        let columns = table.names.len();
-        let fitted: Vec<(Vec<f64>, f64)> = (0..columns)
-            .into_par_iter()
-            .map(|c| {
-                let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
-                let ridge = features.best(&y);
-                let factors = std::iter::once(ridge.mean).chain(ridge.factors).collect();
-                (factors, ridge.error.sqrt().max(LEAST_ERROR))
-            })
-            .collect();
-        let (factors, errors) = fitted.into_iter().unzip();
+        let fit = |c: usize| {
+            let y: Vec<f64> = statistics.iter().map(|s| s[c]).collect();
+            let ridge = features.best(&y);
+            let factors: Vec<f64> = std::iter::once(ridge.mean).chain(ridge.factors).collect();
+            (factors, ridge.error.sqrt().max(LEAST_ERROR))
+        };
+        let (factors, errors) = (0..table.names.len()).into_par_iter().map(fit).unzip();
         Self { scaler, factors, errors }
     }
 
@@ -62,11 +55,8 @@ impl Forward {
     pub(crate) fn apart(&self, real: &[f64], simulated: &[f64]) -> Vec<f64> {
         let (a, b) = (self.scaler.scaled(real), self.scaler.scaled(simulated));
         let known = real.iter().zip(simulated).map(|(x, y)| x.is_finite() && y.is_finite());
-        known
-            .zip(a.iter().zip(&b))
-            .zip(&self.errors)
-            .map(|((known, (a, b)), e)| if known { (b - a) / e } else { f64::NAN })
-            .collect()
+        let off = a.iter().zip(&b).zip(&self.errors).map(|((a, b), e)| (b - a) / e);
+        known.zip(off).map(|(known, off)| if known { off } else { f64::NAN }).collect()
     }
 }
 
@@ -92,6 +82,7 @@ fn features(places: &[f64]) -> Vec<f64> {
 }
 
 /// What is minimised: the distance that the parabolas tell, with what they were wrong by at the last simulation taken off.
+#[derive(Clone)]
 struct Told<'a> {
     forward: &'a Forward,
     /// Statistics that count, and where they should be by the parabolas.
@@ -126,11 +117,7 @@ impl Told<'_> {
 
     fn hold(&self, places: &[f64]) -> impl Iterator<Item = f64> {
         // Half an interval is two standard errors.
-        self.moving
-            .iter()
-            .map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
-            .collect::<Vec<_>>()
-            .into_iter()
+        self.moving.iter().map(|(i, e)| 4.0 * (places[*i] - e.value) / (e.high - e.low).max(1e-9))
     }
 }
 
@@ -164,55 +151,30 @@ impl Gradient for Told<'_> {
                 *sum += slope * 2.0 * (factors[1 + i] + 2.0 * all[i] * factors[1 + count + i]);
             }
         }
-        let hold: Vec<f64> = self.hold(&places).collect();
-        let one = |(k, ((i, e), slope)): (usize, (&(usize, Estimate), &f64))| {
-            slope * (of_places[*i] + HOLD * 2.0 * hold[k] * 4.0 / (e.high - e.low).max(1e-9))
+        let one = |(((i, e), slope), hold): ((&(usize, Estimate), f64), f64)| {
+            slope * (of_places[*i] + HOLD * 2.0 * hold * 4.0 / (e.high - e.low).max(1e-9))
         };
-        Ok(self.moving.iter().zip(&slopes).enumerate().map(one).collect())
+        Ok(self.moving.iter().zip(slopes).zip(self.hold(&places)).map(one).collect())
     }
 }
 
-/// The next place to try from one whose windows were simulated.
-pub(crate) fn propose(
-    forward: &Forward,
-    real: &[f64],
-    simulated: &[f64],
-    places: &[f64],
-    moving: &[(usize, Estimate)],
-) -> Vec<f64> {
-    let (wanted, found) = (forward.scaler.scaled(real), forward.scaler.scaled(simulated));
+/// The next place to try from one whose windows were simulated; `seen` are the statistics of the real windows and of those.
+pub(crate) fn propose(forward: &Forward, seen: [&[f64]; 2], places: &[f64], moving: &[(usize, Estimate)]) -> Vec<f64> {
+    let [wanted, found] = seen.map(|values| forward.scaler.scaled(values));
     let here = features(places);
-    let known = |s: &usize| real[*s].is_finite() && simulated[*s].is_finite();
-    let aims = (0..real.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
+    let known = |s: &usize| seen.iter().all(|values| values[*s].is_finite());
+    let aims = (0..wanted.len()).filter(known).map(|s| (s, wanted[s] - found[s] + forward.at(s, &here))).collect();
     let told = Told { forward, aims, places: places.to_vec(), moving: moving.to_vec() };
     let start = told.outside(places);
     if start.is_empty() {
         return places.to_vec();
     }
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
-    let best = Executor::new(&told, solver)
+    let best = Executor::new(told.clone(), solver)
         .configure(|state| state.param(start.clone()).max_iters(STEPS))
         .timer(false)
         .run()
         .ok()
         .and_then(|result| result.state().get_best_param().cloned());
     told.inside(&best.unwrap_or(start)).0
-}
-
-impl CostFunction for &Told<'_> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, free: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        (**self).cost(free)
-    }
-}
-
-impl Gradient for &Told<'_> {
-    type Param = Vec<f64>;
-    type Gradient = Vec<f64>;
-
-    fn gradient(&self, free: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
-        (**self).gradient(free)
-    }
 }

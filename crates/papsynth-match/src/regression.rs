@@ -6,10 +6,11 @@
 //! (normalised as by Papadopoulos and Haralambous, doi:10.1016/j.neunet.2011.05.008). Rows are unseen by everything that tells
 //! them: scales, both regressions and the choice of their penalties.
 
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::ridge::{FOLDS, Features, Ridge};
+use crate::measured::reach;
 use portable_numerics::statistics::{deviation, mean};
 
 /// A value with its 95 % interval.
@@ -35,8 +36,7 @@ const FARTHEST: f64 = 4.0;
 /// Added to misses before their logarithm is taken: none is the better for being right by chance.
 const LEAST_MISS: f64 = 0.02;
 
-/// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them: what no
-/// recipe shows must not be held for more of what some do.
+/// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them.
 #[derive(Debug, Clone)]
 pub(crate) struct Scaler {
     means: Vec<f64>,
@@ -51,10 +51,8 @@ impl Scaler {
         let of = |f: fn(&[f64]) -> f64| {
             (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect()
         };
-        let range = |c: usize| {
-            column(c).iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
-        };
-        Self { means: of(mean), deviations: of(deviation), ranges: (0..columns).map(range).collect() }
+        let ranges = (0..columns).map(|c| reach(&column(c))).collect();
+        Self { means: of(mean), deviations: of(deviation), ranges }
     }
 
     pub(crate) fn scaled(&self, row: &[f64]) -> Vec<f64> {
@@ -84,38 +82,20 @@ impl Regression {
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
         let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
         // The last fold is none: it leaves nothing out.
-        let fits: Vec<(Told, Vec<Unseen>)> = (0..=FOLDS)
-            .into_par_iter()
-            .map(|fold| {
-                let (out, kept): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| i % FOLDS == fold);
-                let told = Told::new(statistics, places, &kept);
-                let tell = |row: usize| {
-                    let summary = told.summary(&statistics[row]);
-                    Unseen { row, values: told.values(&summary), summary }
-                };
-                let unseen = out.into_iter().map(tell).collect();
-                (told, unseen)
-            })
-            .collect();
-        let mut values = vec![Vec::new(); n];
-        let mut summaries = vec![Vec::new(); n];
-        let mut told = None;
-        for (fit, unseen) in fits {
-            for one in unseen {
-                (values[one.row], summaries[one.row]) = (one.values, one.summary);
-            }
-            told = Some(fit);
-        }
-        let told = told.unwrap_or_else(|| Told::new(statistics, places, &[]));
+        let without =
+            |fold: usize| Told::new(statistics, places, &(0..n).filter(|i| i % FOLDS != fold).collect::<Vec<_>>());
+        let mut fits: Vec<Told> = (0..=FOLDS).into_par_iter().map(without).collect();
+        // What each row is told by the others.
+        let summaries: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].summary(&statistics[row])).collect();
+        let values: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].values(&summaries[row])).collect();
+        let told = fits.swap_remove(FOLDS);
         let missed = |c: usize| -> Vec<f64> { values.iter().zip(places).map(|(v, p)| (v[c] - p[c]).abs()).collect() };
-        let explained = (0..columns)
-            // Places are spread evenly over 0 to 1.
-            .map(|c| 1.0 - 12.0 * missed(c).iter().map(|m| m * m).sum::<f64>() / n.max(1) as f64)
-            .collect();
-        let reach = (0..columns)
-            .into_par_iter()
-            .map(|c| Reach::new(&summaries, c, &values.iter().map(|v| v[c]).collect::<Vec<_>>(), &missed(c)))
-            .collect();
+        // Places are spread evenly over 0 to 1.
+        let explained = |c| 1.0 - 12.0 * missed(c).iter().map(|m| m * m).sum::<f64>() / n.max(1) as f64;
+        let column = |c: usize| values.iter().map(|v| v[c]).collect::<Vec<_>>();
+        let reach = |c| Reach::new(&summaries, c, &column(c), &missed(c));
+        let (explained, reach) =
+            ((0..columns).map(explained).collect(), (0..columns).into_par_iter().map(reach).collect());
         Self { told, reach, explained }
     }
 
@@ -133,13 +113,6 @@ impl Regression {
     pub fn explained(&self) -> &[f64] {
         &self.explained
     }
-}
-
-/// What a row was told by the others.
-struct Unseen {
-    row: usize,
-    values: Vec<f64>,
-    summary: Vec<f64>,
 }
 
 /// What rows of statistics tell: values without intervals.
@@ -178,8 +151,7 @@ impl Told {
     }
 }
 
-/// A summary in standard deviations of the parameter's range. Not in its own: what hardly varies tells nothing, and must not be made
-/// to.
+/// A summary in standard deviations of the parameter's range, not its own: what hardly varies tells nothing.
 fn of_one_scale(place: f64) -> f64 {
     ((place - 0.5) * 12.0_f64.sqrt()).clamp(-FARTHEST, FARTHEST)
 }
@@ -234,7 +206,7 @@ impl Reach {
             let mut times: Vec<f64> = (0..missed.len()).filter(|i| which(*i)).map(|i| missed[i] / usual[i]).collect();
             times.sort_unstable_by(f64::total_cmp);
             // As many of n + 1 as the confidence asks: the new one is one of them.
-            let rank = crate::number::whole(libm::ceil(CONFIDENCE * (times.len() as f64 + 1.0))).max(1);
+            let rank = papsynth_judge::number::whole(libm::ceil(CONFIDENCE * (times.len() as f64 + 1.0))).max(1);
             times.get(rank - 1).copied().unwrap_or(f64::INFINITY)
         };
         let mut reach = Self { misses, times: asked(&|_| true) };
@@ -259,6 +231,109 @@ impl Reach {
     fn about(&self, value: f64, usual: f64) -> Estimate {
         let half = self.times * usual;
         Estimate { value, low: (value - half).max(0.0), high: (value + half).min(1.0) }
+    }
+}
+
+/// Penalties that are tried, each a part of the rows' mean square.
+const PENALTIES: [f64; 11] = [1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0];
+
+/// Rows are left out by as many folds, every tenth row together.
+const FOLDS: usize = 10;
+
+/// Directions in which rows differ by less than this part of the most are none.
+const LEAST: f64 = 1e-12;
+
+/// Rows of features, taken apart once for all that is regressed on them: X = U S Vᵀ.
+pub(crate) struct Features {
+    /// U, a row a row.
+    turned: DMatrix<f64>,
+    /// S².
+    squares: DVector<f64>,
+    /// V S⁻¹, a row a feature.
+    back: DMatrix<f64>,
+    scale: f64,
+}
+
+/// Factors of features, and what each row would have been told by those of other folds.
+#[derive(Debug, Clone)]
+pub(crate) struct Ridge {
+    pub(crate) mean: f64,
+    pub(crate) factors: Vec<f64>,
+    pub(crate) unseen: Vec<f64>,
+    /// Mean square by which unseen rows were missed.
+    pub(crate) error: f64,
+}
+
+impl Features {
+    /// Of rows of the same length.
+    pub(crate) fn new(rows: &[Vec<f64>]) -> Self {
+        let (n, p) = (rows.len(), rows.first().map_or(0, Vec::len));
+        let x = DMatrix::from_fn(n, p, |i, j| rows[i][j]);
+        let scale = x.norm_squared() / n.max(1) as f64;
+        // Of the smaller product of X with itself: the other one has the same S.
+        let few = p <= n;
+        let eigen = SymmetricEigen::new(if few { x.tr_mul(&x) } else { &x * x.transpose() });
+        let most = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+        let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > LEAST * most).collect();
+        let squares = DVector::from_iterator(kept.len(), kept.iter().map(|i| eigen.eigenvalues[*i]));
+        let own = eigen.eigenvectors.select_columns(&kept);
+        let over = |mut m: DMatrix<f64>, divisors: &DVector<f64>| {
+            m.column_iter_mut().zip(divisors.iter()).for_each(|(mut column, by)| column.scale_mut(1.0 / by));
+            m
+        };
+        let roots = squares.map(f64::sqrt);
+        let (turned, back) = if few {
+            (over(&x * &own, &roots), over(own, &roots))
+        } else {
+            (own.clone(), over(x.tr_mul(&own), &squares))
+        };
+        Self { turned, squares, back, scale }
+    }
+
+    /// The ridge through values whose error on unseen rows is least.
+    pub(crate) fn best(&self, y: &[f64]) -> Ridge {
+        let mean = mean(y);
+        let centred = DVector::from_iterator(y.len(), y.iter().map(|v| v - mean));
+        let turned = self.turned.tr_mul(&centred);
+        let mut best = Ridge { mean, factors: vec![0.0; self.back.nrows()], unseen: Vec::new(), error: f64::MAX };
+        for penalty in PENALTIES {
+            let kept = self.squares.map(|s| s / (s + penalty * self.scale));
+            let unseen = self.unseen(y, &centred, &turned, &kept);
+            let error = unseen.iter().zip(y).map(|(u, v)| (u - v) * (u - v)).sum::<f64>() / y.len() as f64;
+            if error < best.error {
+                let factors = (&self.back * turned.component_mul(&kept)).iter().copied().collect();
+                best = Ridge { mean, factors, unseen, error };
+            }
+        }
+        best
+    }
+
+    /// What the rows of each fold would have been told by all others. Single rows would not do: the mean of the others is low where
+    /// a row is high, which the next regression would learn from.
+    fn unseen(&self, y: &[f64], centred: &DVector<f64>, turned: &DVector<f64>, kept: &DVector<f64>) -> Vec<f64> {
+        let mut unseen = y.to_vec();
+        let rest = centred - &self.turned * turned.component_mul(kept);
+        for fold in 0..FOLDS.min(y.len()) {
+            let rows: Vec<usize> = (fold..y.len()).step_by(FOLDS).collect();
+            let own = self.turned.select_rows(&rows);
+            let scaled = DMatrix::from_fn(rows.len(), kept.len(), |i, j| own[(i, j)] * kept[j]);
+            let of_fold = DVector::from_iterator(rows.len(), rows.iter().map(|i| rest[*i]));
+            // The fold's own part in its predictions is taken out: exact for a given mean.
+            let others = DMatrix::identity(rows.len(), rows.len()) - scaled * own.transpose();
+            if let Some(rest) = others.cholesky().map(|c| c.solve(&of_fold)) {
+                for (i, r) in rows.iter().zip(rest.iter()) {
+                    unseen[*i] = y[*i] - r;
+                }
+            }
+        }
+        unseen
+    }
+}
+
+impl Ridge {
+    /// For a row of features.
+    pub(crate) fn predict(&self, row: &[f64]) -> f64 {
+        self.mean + self.factors.iter().zip(row).map(|(f, x)| f * x).sum::<f64>()
     }
 }
 
@@ -314,5 +389,36 @@ mod tests {
         assert!(inside.iter().all(|part| (0.92..=0.98).contains(part)), "{inside:?}");
         assert!(explained[0] > 0.95 && explained[1] > 0.95 && explained[2] < 0.1, "{explained:?}");
         assert!(width[0] < 0.25 && width[1] < 0.2 && width[2] > 0.85, "{width:?}");
+    }
+
+    /// With few rows and with more features than rows.
+    #[test]
+    fn the_error_on_unseen_rows_is_that_of_leaving_them_out() {
+        for (n, p) in [(25, 4), (25, 40)] {
+            let at = |i: usize, j: usize| ((i * i + 3 * j) % 7) as f64 + libm::sin((i * (j + 1)) as f64);
+            let rows: Vec<Vec<f64>> = (0..n).map(|i| (0..p).map(|j| at(i, j)).collect()).collect();
+            let y: Vec<f64> = rows.iter().enumerate().map(|(i, r)| r[0] + f64::from(u8::from(i % 3 == 0))).collect();
+            let found = Features::new(&rows).best(&y);
+            let mean = mean(&y);
+            let scale = rows.iter().flatten().map(|v| v * v).sum::<f64>() / n as f64;
+            // The slow way, with each penalty, a fold left out and the mean kept.
+            let factors = |penalty: f64, kept: &dyn Fn(usize) -> bool| {
+                let kept: Vec<usize> = (0..n).filter(|i| kept(*i)).collect();
+                let x = DMatrix::from_fn(kept.len(), p, |i, j| rows[kept[i]][j]);
+                let t = DVector::from_iterator(kept.len(), kept.iter().map(|i| y[*i] - mean));
+                let g = x.tr_mul(&x) + DMatrix::identity(p, p) * (penalty * scale);
+                g.lu().solve(&x.tr_mul(&t)).unwrap()
+            };
+            let tell = |f: &DVector<f64>, row: usize| mean + rows[row].iter().zip(f).map(|(a, b)| a * b).sum::<f64>();
+            let right = |penalty: &f64| {
+                let all = factors(*penalty, &|_| true);
+                (0..n).all(|i| {
+                    let others = factors(*penalty, &|j| j % FOLDS != i % FOLDS);
+                    (tell(&others, i) - found.unseen[i]).abs() < 1e-6
+                        && (tell(&all, i) - found.predict(&rows[i])).abs() < 1e-6
+                })
+            };
+            assert!(PENALTIES.iter().any(right), "{n} rows of {p}");
+        }
     }
 }

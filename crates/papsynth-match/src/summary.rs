@@ -1,10 +1,12 @@
 //! What windows are like, in numbers that regressions learn from.
 
+use papsynth_judge::number::{single, whole};
 use papsynth_judge::{Field, Picture, Statistics, Table};
+use rayon::prelude::*;
 
 use crate::error::Error;
+use crate::noise;
 use crate::view::View;
-use crate::{noise, small};
 use portable_numerics::statistics::{deviation, mean, quantile};
 
 /// How a number enters.
@@ -25,8 +27,11 @@ impl As {
     }
 }
 
+/// A feature of a table and how it enters.
+type Feature = (&'static str, As);
+
 /// Features of nuclei that are looked at.
-const NUCLEI: [(&str, As); 25] = [
+const NUCLEI: [Feature; 25] = [
     ("nucleus area, um2", As::Log(0.0)),
     ("core absorbance", As::Itself),
     ("core above surroundings", As::Itself),
@@ -55,7 +60,7 @@ const NUCLEI: [(&str, As); 25] = [
 ];
 
 /// Features whose spread within windows and between them are told apart: where the field differs, all its nuclei do.
-const NUCLEI_APART: [(&str, As); 5] = [
+const NUCLEI_APART: [Feature; 5] = [
     ("core above surroundings", As::Log(0.02)),
     ("core sd over contrast", As::Log(0.01)),
     ("core sd without trend", As::Log(0.002)),
@@ -64,13 +69,13 @@ const NUCLEI_APART: [(&str, As); 5] = [
 ];
 
 /// The same of free cells.
-const CELLS_APART: [(&str, As); 2] = [("cytoplasm absorbance", As::Log(0.005)), ("cell area, um2", As::Log(0.0))];
+const CELLS_APART: [Feature; 2] = [("cytoplasm absorbance", As::Log(0.005)), ("cell area, um2", As::Log(0.0))];
 
 /// Distances within which pairs of nuclei are counted over all windows, µm.
 const PAIRS_UM: [f64; 5] = [8.0, 16.0, 33.0, 66.0, 130.0];
 
 /// Features of free cells.
-const CELLS: [(&str, As); 13] = [
+const CELLS: [Feature; 13] = [
     ("cell area, um2", As::Log(0.0)),
     ("cytoplasm absorbance", As::Log(0.005)),
     ("cytoplasm sd over median", As::Log(0.02)),
@@ -95,8 +100,8 @@ const LEAST: usize = 4;
 /// What is measured in a window.
 #[derive(Debug, Clone)]
 pub(crate) struct Window {
-    /// Numbers of the window as a whole, by the order of [`names_of_windows`].
-    whole: Vec<f64>,
+    /// Numbers of the window as a whole.
+    whole: Vec<(String, f64)>,
     nuclei: Table,
     cells: Table,
     /// Pairs of nuclei within each of [`PAIRS_UM`], and how many as many nuclei thrown at random would make.
@@ -130,7 +135,7 @@ fn scalars(s: &Statistics) -> Vec<(&'static str, f64)> {
     ]
 }
 
-/// Those of [`names_of_windows`] whose deviation between windows is looked at too.
+/// Those of a window as a whole whose deviation between windows is looked at too.
 const SPREAD: [&str; 13] = [
     "log noise",
     "log coverage",
@@ -147,29 +152,28 @@ const SPREAD: [&str; 13] = [
     "log part of it in layers",
 ];
 
-fn names_of_windows(s: &Statistics) -> Vec<String> {
-    let mut names: Vec<String> = scalars(s).iter().map(|(name, _)| (*name).to_owned()).collect();
-    names.extend((0..s.spectrum.len()).map(|i| format!("log power, ring {i}")));
-    names.extend(TAILS.map(|a| format!("part above {a}")));
-    names.extend((1..=noise::LAW).map(|i| format!("noise in the dark, bin {i}")));
-    names.extend(["unevenness of the light, finely", "unevenness of the light, coarsely"].map(str::to_owned));
-    names.extend(small::names());
-    names
-}
-
 impl Window {
-    pub(crate) fn new(picture: &Picture, view: &View) -> Result<(Self, Vec<String>), Error> {
+    pub(crate) fn new(picture: &Picture, view: &View) -> Result<Self, Error> {
         let Field { statistics: s, nuclei, cells, .. } = view.gauge.measure(picture)?;
+        let (grey, width) = (&picture.grey, picture.width);
         let empty = s.background_dn * f64::from(picture.full_scale) / crate::recipe::LEVELS;
-        let mut whole: Vec<f64> = scalars(&s).iter().map(|(_, value)| *value).collect();
-        whole.extend(s.spectrum);
-        whole.extend(TAILS.map(|a| As::Log(0.002).of(tail(&s.histogram, a))));
-        whole.extend(noise::law(&picture.grey, picture.width, empty));
-        whole.extend(noise::unevenness(&picture.grey, picture.width, empty));
-        whole.extend(small::counts(&picture.grey, picture.width, crate::number::single(empty)));
-        let names = names_of_windows(&s);
+        let [fine, coarse] = noise::unevenness(grey, width, empty);
+        let named = |(name, value): (&str, f64)| (name.to_owned(), value);
+        let mut whole: Vec<(String, f64)> = scalars(&s).into_iter().map(named).collect();
+        whole.extend(s.spectrum.iter().enumerate().map(|(i, power)| (format!("log power, ring {i}"), *power)));
+        whole.extend(TAILS.map(|a| (format!("part above {a}"), As::Log(0.002).of(tail(&s.histogram, a)))));
+        let law = (1..).zip(noise::law(grey, width, empty));
+        whole.extend(law.map(|(i, noise)| (format!("noise in the dark, bin {i}"), noise)));
+        whole.push(("unevenness of the light, finely".to_owned(), fine));
+        whole.push(("unevenness of the light, coarsely".to_owned(), coarse));
+        whole.extend(noise::counts(grey, width, single(empty)));
         let pairs = PAIRS_UM.map(|um| pairs(&nuclei.places, picture, um / view.pixel_um));
-        Ok((Self { whole, nuclei, cells, pairs }, names))
+        Ok(Self { whole, nuclei, cells, pairs })
+    }
+
+    /// Of several pictures, side by side.
+    pub(crate) fn all(pictures: &[Picture], view: &View) -> Result<Vec<Self>, Error> {
+        pictures.par_iter().map(|p| Self::new(p, view)).collect::<Vec<_>>().into_iter().collect()
     }
 
     pub(crate) fn nuclei(&self) -> usize {
@@ -192,7 +196,7 @@ fn pairs(places: &[[f64; 2]], picture: &Picture, within_px: f64) -> [f64; 2] {
 
 /// Part of the histogram above an absorbance.
 fn tail(histogram: &[f64], above: f64) -> f64 {
-    let from = crate::number::whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
+    let from = whole((above - papsynth_judge::HISTOGRAM_FROM) / papsynth_judge::HISTOGRAM_STEP + 0.5);
     histogram.iter().skip(from).sum()
 }
 
@@ -211,52 +215,46 @@ impl Summary {
     /// # Errors
     /// If a picture is none.
     pub fn of(pictures: &[Picture], view: &View) -> Result<Self, Error> {
-        let windows: Vec<(Window, Vec<String>)> =
-            pictures.iter().map(|p| Window::new(p, view)).collect::<Result<_, _>>()?;
-        let names = windows.first().map(|w| w.1.clone()).unwrap_or_default();
-        Ok(Self::new(&windows.into_iter().map(|w| w.0).collect::<Vec<_>>(), &names))
+        Ok(Self::new(&Window::all(pictures, view)?))
     }
 
-    pub(crate) fn new(windows: &[Window], names_of_windows: &[String]) -> Self {
-        let (mut names, mut values) = (Vec::new(), Vec::new());
-        let mut put = |name: String, value: f64| {
-            names.push(name);
-            values.push(value);
-        };
-        for (i, name) in names_of_windows.iter().enumerate() {
-            let known: Vec<f64> = windows.iter().map(|w| w.whole[i]).filter(|v| v.is_finite()).collect();
-            put(name.clone(), mean(&known));
+    pub(crate) fn new(windows: &[Window]) -> Self {
+        let mut all = Self { names: Vec::new(), values: Vec::new() };
+        for (i, (name, _)) in windows.first().into_iter().flat_map(|w| &w.whole).enumerate() {
+            let known: Vec<f64> = windows.iter().map(|w| w.whole[i].1).filter(|v| v.is_finite()).collect();
+            all.put(name.clone(), mean(&known));
             if SPREAD.contains(&name.as_str()) {
-                put(format!("{name}, sd"), As::Log(0.01).of(deviation(&known)));
+                all.put(format!("{name}, sd"), As::Log(0.01).of(deviation(&known)));
             }
         }
         let nuclei: Vec<&Table> = windows.iter().map(|w| &w.nuclei).collect();
-        for (name, scale) in NUCLEI {
-            let [middle, spread] = pooled(&nuclei, name, scale);
-            put(format!("nuclei: {name}"), middle);
-            put(format!("nuclei: {name}, spread"), As::Log(0.003).of(spread));
-        }
-        for (name, scale) in NUCLEI_APART {
-            let [within, between] = apart(&nuclei, name, scale);
-            put(format!("nuclei: {name}, within windows"), As::Log(0.01).of(within));
-            put(format!("nuclei: {name}, between windows"), As::Log(0.02).of(between));
-        }
+        all.put_things("nuclei", &nuclei, &NUCLEI, &NUCLEI_APART);
         for (i, um) in PAIRS_UM.iter().enumerate() {
             let [found, expected] = [0, 1].map(|k| windows.iter().map(|w| w.pairs[i][k]).sum::<f64>());
-            put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
+            all.put(format!("pairs of nuclei within {um} um"), libm::log((found + 1.0) / (expected + 1.0)));
         }
         let cells: Vec<&Table> = windows.iter().map(|w| &w.cells).collect();
-        for (name, scale) in CELLS {
-            let [middle, spread] = pooled(&cells, name, scale);
-            put(format!("cells: {name}"), middle);
-            put(format!("cells: {name}, spread"), As::Log(0.003).of(spread));
+        all.put_things("cells", &cells, &CELLS, &CELLS_APART);
+        all
+    }
+
+    fn put(&mut self, name: String, value: f64) {
+        self.names.push(name);
+        self.values.push(value);
+    }
+
+    /// Features of things of one kind: over all windows, and within windows and between them.
+    fn put_things(&mut self, kind: &str, tables: &[&Table], features: &[Feature], told_apart: &[Feature]) {
+        for (name, scale) in features {
+            let [middle, spread] = pooled(tables, name, *scale);
+            self.put(format!("{kind}: {name}"), middle);
+            self.put(format!("{kind}: {name}, spread"), As::Log(0.003).of(spread));
         }
-        for (name, scale) in CELLS_APART {
-            let [within, between] = apart(&cells, name, scale);
-            put(format!("cells: {name}, within windows"), As::Log(0.01).of(within));
-            put(format!("cells: {name}, between windows"), As::Log(0.02).of(between));
+        for (name, scale) in told_apart {
+            let [within, between] = apart(tables, name, *scale);
+            self.put(format!("{kind}: {name}, within windows"), As::Log(0.01).of(within));
+            self.put(format!("{kind}: {name}, between windows"), As::Log(0.02).of(between));
         }
-        Self { names, values }
     }
 }
 
@@ -272,11 +270,8 @@ fn pooled(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
 
 /// Standard deviation within tables, and that of their means without what the former makes of it.
 fn apart(tables: &[&Table], name: &str, scale: As) -> [f64; 2] {
-    let groups: Vec<Vec<f64>> = tables
-        .iter()
-        .map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<_>>())
-        .filter(|v| v.len() >= 2)
-        .collect();
+    let known = tables.iter().map(|t| t.column(name).map(|v| scale.of(v)).collect::<Vec<f64>>());
+    let groups: Vec<Vec<f64>> = known.filter(|v| v.len() >= 2).collect();
     if groups.is_empty() {
         return [f64::NAN; 2];
     }

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use papsynth::Engine;
 use papsynth::key::Key;
 use portable_numerics::random::{shuffle, uniform};
 use rand_core::SeedableRng;
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 use crate::error::Error;
 use crate::parameter::{PARAMETERS, Parameter, Values};
 use crate::recipe::{Setting, recipe, simulated};
-use crate::summary::Summary;
+use crate::summary::{Summary, Window};
 use crate::view::{MakeEngine, View};
 
 /// How far the work is.
@@ -43,9 +44,7 @@ impl Default for TableParams {
 /// Simulated recipes and what their windows are like.
 #[derive(Debug, Clone)]
 pub struct Table {
-    /// The parameters that differ between its recipes.
-    pub sought: Vec<Parameter>,
-    /// Their places in their ranges, recipe by recipe.
+    /// Places of the sought parameters in their ranges, recipe by recipe.
     pub places: Vec<Vec<f64>>,
     /// What the windows of each recipe are like.
     pub statistics: Vec<Vec<f64>>,
@@ -58,12 +57,12 @@ pub(crate) type Tell<'a> = dyn Fn(Step) -> bool + Sync + 'a;
 
 /// A table that is to be simulated: recipes from the ranges of sought parameters.
 pub struct Plan<'a> {
-    setting: &'a Setting,
+    pub(crate) setting: &'a Setting,
     known: &'a Values,
     sought: Vec<Parameter>,
     view: &'a View,
     make: &'a MakeEngine<'a>,
-    params: TableParams,
+    pub(crate) params: TableParams,
     draws: Vec<Vec<f64>>,
 }
 
@@ -79,14 +78,10 @@ impl<'a> Plan<'a> {
         make: &'a MakeEngine<'a>,
         params: &TableParams,
     ) -> Result<Self, Error> {
-        for (field, value, low, high, accepted) in [
-            ("recipes", params.recipes, 30, 100_000, "30 to 100000"),
-            ("windows", params.windows, 1, 1000, "1 to 1000"),
-        ] {
-            if value < low || value > high {
-                return Err(Error::Parameter { field, value: value as f64, accepted });
-            }
-        }
+        papsynth_judge::Error::check(&[
+            ("recipes", params.recipes as f64, [30.0, 1e5], "30 to 100000"),
+            ("windows", params.windows as f64, [1.0, 1e3], "1 to 1000"),
+        ])?;
         let sought = simulated(setting);
         let draws = latin(params.recipes, sought.len(), params.seed);
         Ok(Self { setting, known, sought, view, make, params: params.clone(), draws })
@@ -98,6 +93,26 @@ impl<'a> Plan<'a> {
         &self.sought
     }
 
+    /// The known values with other places of those that are sought.
+    pub(crate) fn values(&self, places: &[f64]) -> Values {
+        let mut values = self.known.clone();
+        for (parameter, place) in self.sought.iter().zip(places) {
+            values.set(*parameter, parameter.prior().value(*place));
+        }
+        values
+    }
+
+    /// The engine of windows of a recipe.
+    pub(crate) fn engine(&self, places: &[f64], fitted: impl Fn(Parameter) -> bool) -> Result<Engine, Error> {
+        let around = Setting { size_px: self.view.simulated_px(), ..self.setting.clone() };
+        Ok((self.make)(&recipe(&around, &self.values(places), fitted))?)
+    }
+
+    /// One of its windows.
+    pub(crate) fn window(&self, engine: &Engine, seed: u64, index: usize) -> Result<Window, Error> {
+        Window::new(&self.view.simulate(engine, Key { seed, index: index as u64 })?, self.view)
+    }
+
     /// Simulates one of the recipes: its places in the ranges of the sought parameters, and what its windows are like. The same
     /// whenever it is asked for.
     ///
@@ -105,23 +120,18 @@ impl<'a> Plan<'a> {
     /// If the recipe cannot be made.
     pub fn row(&self, row: usize) -> Result<(Vec<f64>, Summary), Error> {
         let places = &self.draws[row % self.draws.len()];
-        let values = spread_out(self.known, &self.sought, places);
-        let around = Setting { size_px: self.view.simulated_px(), ..self.setting.clone() };
-        let engine = (self.make)(&recipe(&around, &values, |_| true)).map_err(|e| Error::Engine(e.to_string()))?;
-        let windows = self.params.windows;
-        let mut pictures = Vec::with_capacity(windows);
-        for index in row * windows..(row + 1) * windows {
-            let key = Key { seed: self.params.seed, index: index as u64 };
-            pictures.push(self.view.simulate(&engine, key).map_err(|e| Error::Engine(e.to_string()))?);
-        }
-        Ok((places.clone(), Summary::of(&pictures, self.view)?))
+        let engine = self.engine(places, |_| true)?;
+        let indices = row * self.params.windows..(row + 1) * self.params.windows;
+        let windows: Result<Vec<Window>, Error> =
+            indices.map(|index| self.window(&engine, self.params.seed, index)).collect();
+        Ok((places.clone(), Summary::new(&windows?)))
     }
 
     /// Simulates all of them. The same for the same seed, whatever the threads.
     ///
     /// # Errors
     /// If more than a fifth of the recipes cannot be made, or `tell` says stop.
-    pub fn simulate(self, tell: &Tell<'_>) -> Result<Table, Error> {
+    pub fn simulate(&self, tell: &Tell<'_>) -> Result<Table, Error> {
         let recipes = self.params.recipes;
         let done = AtomicUsize::new(0);
         let stopped = AtomicBool::new(false);
@@ -139,7 +149,7 @@ impl<'a> Plan<'a> {
         if stopped.into_inner() {
             return Err(Error::Stopped);
         }
-        let mut table = Table { sought: self.sought, places: Vec::new(), statistics: Vec::new(), names: Vec::new() };
+        let mut table = Table { places: Vec::new(), statistics: Vec::new(), names: Vec::new() };
         let mut reason = String::new();
         for result in made {
             match result {
@@ -158,15 +168,6 @@ impl<'a> Plan<'a> {
         }
         Ok(table)
     }
-}
-
-/// The known values with other places of those that are sought.
-pub(crate) fn spread_out(known: &Values, sought: &[Parameter], places: &[f64]) -> Values {
-    let mut values = known.clone();
-    for (parameter, place) in sought.iter().zip(places) {
-        values.set(*parameter, parameter.prior().value(*place));
-    }
-    values
 }
 
 /// Places over 0 to 1 in so many dimensions: in each, every part of the range is met once (a Latin hypercube).
@@ -198,7 +199,8 @@ mod tests {
     fn every_part_of_every_range_is_met_once() {
         let draws = latin(50, 3, 4);
         for column in 0..3 {
-            let mut strata: Vec<usize> = draws.iter().map(|d| crate::number::whole(d[column] * 50.0)).collect();
+            let mut strata: Vec<usize> =
+                draws.iter().map(|d| papsynth_judge::number::whole(d[column] * 50.0)).collect();
             strata.sort_unstable();
             assert_eq!(strata, (0..50).collect::<Vec<_>>());
         }

@@ -4,14 +4,13 @@ use papsynth::recipe::{CellMix, RECIPE_VERSION, Recipe, is_toml_table, toml_valu
 use serde_json::Value;
 
 use crate::fit::{Answer, Fit, Origin};
-use crate::number::rounded;
+use crate::recipe::rounded_to;
 
 /// Digits that values are told with.
 const DIGITS: i32 = 3;
 
 impl Fit {
-    /// The recipe as TOML, with the value of each parameter, its interval and where it comes from. Read over the default recipe it is
-    /// [`recipe`](Self::recipe).
+    /// The recipe as TOML over the default one, with each parameter's value, interval and origin as comments.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let json = |recipe: &Recipe| serde_json::to_value(recipe).unwrap_or_default();
@@ -106,7 +105,7 @@ impl Answer {
             Origin::Simulated => "simulated",
             Origin::NotIdentified => "not identified",
         };
-        let [value, low, high] = [self.value, self.interval[0], self.interval[1]].map(|v| rounded(v, DIGITS));
+        let [value, low, high] = [self.value, self.interval[0], self.interval[1]].map(|v| rounded_to(v, DIGITS));
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         format!("{origin}: {} {value}{unit} ({low} to {high})", self.what())
     }
@@ -142,20 +141,8 @@ mod tests {
             };
             let values = Values::at(&[0.4; PARAMETERS.len()]);
             let answers = PARAMETERS.into_iter().filter(|p| setting.seeks(*p)).map(|parameter| {
-                let prior = parameter.prior();
                 let origin = if parameter.index() % 3 == 0 { Origin::NotIdentified } else { Origin::Simulated };
-                let (value, range) = (values.get(parameter), [prior.low, prior.high]);
-                Answer {
-                    parameter,
-                    path: prior.path,
-                    unit: prior.unit,
-                    origin,
-                    value,
-                    interval: range,
-                    before: value,
-                    range,
-                    width: 0.2,
-                }
+                Answer::new(parameter, origin, values.get(parameter))
             });
             let answers: Vec<Answer> = answers.collect();
             let fitted = |p| answers.iter().any(|a: &Answer| a.parameter == p && a.origin == Origin::Simulated);

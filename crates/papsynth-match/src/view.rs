@@ -2,12 +2,12 @@
 
 use papsynth::key::Key;
 use papsynth::recipe::Recipe;
-use papsynth::truth::Part;
+use papsynth::truth::Group;
 use papsynth::{Engine, Finished, Threads};
 use papsynth_judge::{Gauge, GaugeParams, Known, NucleiFrom, Picture};
 
 use crate::error::Error;
-use crate::number::whole;
+use papsynth_judge::number::{single, whole};
 
 /// Makes the engine of a recipe: with the caller's model and inputs.
 pub type MakeEngine<'a> = dyn Fn(&Recipe) -> Result<Engine, papsynth::Error> + Sync + 'a;
@@ -15,8 +15,7 @@ pub type MakeEngine<'a> = dyn Fn(&Recipe) -> Result<Engine, papsynth::Error> + S
 /// Largest window, pixels: what is larger is cut into several.
 const WINDOW_PX: [usize; 2] = [640, 480];
 
-/// Width of the slide around a window that is simulated with it, µm: cells whose middles lie there reach into the window, as they
-/// do in real fields.
+/// Width of the slide around a window that is simulated with it, µm: cells there reach into the window, as in real fields.
 const MARGIN_UM: f64 = 20.0;
 
 /// How pictures are looked at: real ones and simulated ones the same.
@@ -65,30 +64,12 @@ impl View {
 
     fn cut(&self, field: &Picture, left: usize, top: usize) -> Picture {
         let [wide, high] = self.window_px;
-        let rows = || top..(top + high).min(field.height());
-        let right = (left + wide).min(field.width);
-        let nuclei = match &field.nuclei {
-            Known::Nothing => Known::Nothing,
-            Known::Points(points) => {
-                let moved = points.iter().map(|[x, y]| [x - left as f64, y - top as f64]);
-                let inside =
-                    |[x, y]: &[f64; 2]| *x > -0.5 && *y > -0.5 && *x < wide as f64 - 0.5 && *y < high as f64 - 0.5;
-                Known::Points(moved.filter(inside).collect())
-            }
-            Known::Masks(labels) => Known::Masks(
-                rows().flat_map(|y| labels[y * field.width + left..y * field.width + right].iter().copied()).collect(),
-            ),
-        };
-        Picture {
-            name: field.name.clone(),
-            group: field.group.clone(),
-            grey: rows()
-                .flat_map(|y| field.grey[y * field.width + left..y * field.width + right].iter().copied())
-                .collect(),
-            width: right - left,
-            full_scale: field.full_scale,
-            nuclei,
+        let mut window = field.cut([left, top], [wide.min(field.width - left), high.min(field.height() - top)]);
+        if let Known::Points(points) = &mut window.nuclei {
+            let [right, bottom] = [wide, high].map(|side| side as f64 - 0.5);
+            points.retain(|[x, y]| *x > -0.5 && *y > -0.5 && *x < right && *y < bottom);
         }
+        window
     }
 
     /// Simulates a window.
@@ -123,7 +104,7 @@ impl View {
             group: String::new(),
             grey: grey.iter().skip(channel).step_by(channels).map(|g| f32::from(*g)).collect(),
             width: truth.width,
-            full_scale: crate::number::single(libm::exp2(bits) - 1.0),
+            full_scale: single(libm::exp2(bits) - 1.0),
             nuclei: self.known(&finished),
         })
     }
@@ -131,22 +112,13 @@ impl View {
     /// As much of the truth as is known of real fields.
     fn known(&self, finished: &Finished) -> Known {
         let truth = &finished.truth;
-        let nuclei = || truth.objects.iter().filter(|o| o.part == Part::Nucleus);
         match self.from {
             NucleiFrom::Search => Known::Nothing,
+            NucleiFrom::Masks => Known::Masks(truth.labels(Group::Nucleus).ids),
             NucleiFrom::Points => {
                 let pixel_um = finished.scene.view.pixel_um;
-                Known::Points(nuclei().map(|o| o.centre_um.map(|v| v / pixel_um - 0.5)).collect())
-            }
-            NucleiFrom::Masks => {
-                let mut labels = vec![0; truth.width * truth.height];
-                for object in nuclei() {
-                    for run in object.front.runs() {
-                        let row = run.y as usize * truth.width;
-                        labels[row + run.x0 as usize..row + run.x1 as usize].fill(object.id);
-                    }
-                }
-                Known::Masks(labels)
+                let nuclei = truth.objects.iter().filter(|o| o.group() == Group::Nucleus);
+                Known::Points(nuclei.map(|o| o.centre_um.map(|v| v / pixel_um - 0.5)).collect())
             }
         }
     }

@@ -3,10 +3,10 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
-use super::maps::Maps;
+use super::maps::{Maps, width_at};
 use crate::number::{nearest, whole};
-use crate::region::{Region, Shape, components, distance, distance_inside, smoothed};
-use crate::statistics::{deviation, mean, of_sorted};
+use crate::region::{Region, Shape, components, distance, smoothed};
+use crate::statistics::{deviation, mean, of_sorted, sorted};
 use crate::table::{Family, Row};
 
 /// Darker than this is a cell, absorbance after a Gaussian of 1 pixel.
@@ -41,7 +41,7 @@ pub(crate) struct Cell<'a> {
     region: Region,
     pub(crate) shape: Shape,
     nucleus: &'a Region,
-    outline: Outline,
+    pub(crate) outline: Outline,
     /// Pixels of cytoplasm, with their distance to the rim over the largest there is.
     cytoplasm: Vec<(usize, f64)>,
     /// Their absorbances in order.
@@ -59,54 +59,36 @@ pub(crate) struct Outline {
     pub(crate) straight: f64,
 }
 
-/// The free cells of a picture; `nuclei` are all its nuclei.
-pub(crate) fn cells<'a>(maps: &Maps, nuclei: &'a [Region], pixel_um: f64) -> Vec<Cell<'a>> {
+/// The free cells of a picture; `nuclei` are all its nuclei, and `ids` has their numbers from 1 on in their pixels.
+pub(crate) fn cells<'a>(maps: &Maps, ids: &[u32], nuclei: &'a [Region], pixel_um: f64) -> Vec<Cell<'a>> {
     let covered: Vec<bool> = maps.smooth.iter().map(|a| *a > COVERED).collect();
-    let mut of = vec![0_u32; covered.len()];
-    for (id, nucleus) in (1..).zip(nuclei) {
-        for p in &nucleus.pixels {
-            of[*p as usize] = id;
-        }
-    }
     let um2 = pixel_um * pixel_um;
-    let free = |region: &Region| -> Option<usize> {
+    let free = |region: Region| -> Option<Cell<'a>> {
         let area = region.pixels.len() as f64 * um2;
-        if !AREAS_UM2.contains(&area) || region.at_border(maps.height) {
+        if !AREAS_UM2.contains(&area) || region.at_border() {
             return None;
         }
-        let mut ids = region.pixels.iter().map(|p| of[*p as usize]).filter(|id| *id > 0);
-        let first = ids.next()?;
-        ids.all(|id| id == first).then_some(first as usize - 1)
+        let mut within = region.pixels.iter().map(|p| ids[*p as usize]).filter(|id| *id > 0);
+        let first = within.next()?;
+        let alone = within.all(|id| id == first);
+        alone.then(|| Cell::new(maps, ids, region.filled(), &nuclei[first as usize - 1], pixel_um))
     };
-    let found = components(&covered, maps.width).into_iter().filter_map(|region| free(&region).map(|n| (region, n)));
-    let cells = found.map(|(region, n)| Cell::new(maps, region.filled(maps.height), &nuclei[n], pixel_um));
+    let cells = components(&covered, maps.width).into_iter().filter_map(free);
     cells.filter(|cell| cell.shape.solidity >= SOLID && !cell.cytoplasm.is_empty()).collect()
 }
 
 impl<'a> Cell<'a> {
-    fn new(maps: &Maps, region: Region, nucleus: &'a Region, pixel_um: f64) -> Self {
-        let (inside, wide, [left, top]) = region.tile(1);
-        let depths = distance_inside(&inside, wide);
+    fn new(maps: &Maps, ids: &[u32], region: Region, nucleus: &'a Region, pixel_um: f64) -> Self {
+        let (tile, own) = (region.tile(1), ids[nucleus.pixels[0] as usize]);
+        let (inside, depths) = (&tile.inside, tile.depths());
         let deepest = depths.iter().fold(1.0_f32, |a, d| a.max(*d));
-        let mut elsewhere = vec![true; inside.len()];
-        for &p in &nucleus.pixels {
-            let (x, y) = nucleus.place(p);
-            if let (Ok(u), Ok(v)) = (usize::try_from(x as i64 - left), usize::try_from(y as i64 - top))
-                && u < wide
-                && let Some(pixel) = elsewhere.get_mut(v * wide + u)
-            {
-                *pixel = false;
-            }
-        }
-        let away = distance_inside(&elsewhere, wide);
+        let away = tile.distances(|i| tile.place(i).is_none_or(|p| ids[p] != own));
         let place = |i: usize| {
-            let (x, y) =
-                (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
-            (inside[i] && away[i] > NUCLEUS_MARGIN).then(|| (y * maps.width + x, f64::from(depths[i] / deepest)))
+            let place = tile.place(i).filter(|_| inside[i] && away[i] > NUCLEUS_MARGIN)?;
+            Some((place, f64::from(depths[i] / deepest)))
         };
         let cytoplasm: Vec<(usize, f64)> = (0..inside.len()).filter_map(place).collect();
-        let mut sorted: Vec<f64> = cytoplasm.iter().map(|(p, _)| f64::from(maps.absorbance[*p])).collect();
-        sorted.sort_unstable_by(f64::total_cmp);
+        let sorted = sorted(cytoplasm.iter().map(|(p, _)| f64::from(maps.absorbance[*p])));
         let outline = Outline::new(&region.outline(), CHORD_UM / pixel_um);
         Self { shape: region.shape(), region, nucleus, outline, cytoplasm, sorted }
     }
@@ -114,10 +96,6 @@ impl<'a> Cell<'a> {
     /// Median absorbance of the cytoplasm.
     pub(crate) fn middle(&self) -> f64 {
         of_sorted(&self.sorted, 0.5)
-    }
-
-    pub(crate) fn outline(&self) -> Outline {
-        self.outline
     }
 
     /// Absorbance in bins from the rim to the centre, over the cell's median; NaN where the nucleus fills a bin.
@@ -163,11 +141,8 @@ impl<'a> Cell<'a> {
 
         let pixels = || self.cytoplasm.iter().map(|c| c.0);
         for (band, name) in ["1", "2", "4", "8", "16"].into_iter().enumerate() {
-            row.put(
-                Family::Texture,
-                format!("cytoplasm power at {name} px over median"),
-                maps.power(pixels(), band) / unit,
-            );
+            let power = maps.power(pixels(), band) / unit;
+            row.put(Family::Texture, format!("cytoplasm power at {name} px over median"), power);
         }
         let inner = || self.cytoplasm.iter().filter(|c| c.1 > 0.2).map(|c| c.0);
         let slopes: Vec<f64> = inner().map(|p| f64::from(maps.slope[p])).collect();
@@ -176,33 +151,18 @@ impl<'a> Cell<'a> {
         row.put(Family::Texture, "dark spots in cytoplasm, um-2", dark / um2);
         row.put(Family::Texture, "pale spots in cytoplasm, um-2", pale / um2);
         let of_sector = |s: usize| {
-            let values: Vec<f64> = self
-                .cytoplasm
-                .iter()
-                .filter(|c| self.sector(c.0, maps.width) == s)
-                .map(|c| f64::from(maps.absorbance[c.0]))
-                .collect();
-            if values.is_empty() { f64::NAN } else { mean(&values) / unit }
+            let own = pixels().filter(|p| self.sector(*p, maps.width) == s);
+            super::mean_of(own.map(|p| f64::from(maps.absorbance[p]))) / unit
         };
         let sectors: Vec<f64> = (0..SECTORS).map(of_sector).filter(|v| v.is_finite()).collect();
         row.put(Family::Texture, "unevenness between sectors", deviation(&sectors));
         row.put(Family::Texture, "darkest sector over median", sectors.iter().copied().fold(f64::NAN, f64::max));
 
-        let mut rim: Vec<f64> = Vec::new();
-        let near = self.rim(maps.height);
-        for edge in &maps.edges {
-            if near.binary_search(&edge.pixel).is_ok() {
-                rim.push(edge.sigma);
-            }
-        }
-        rim.sort_unstable_by(f64::total_cmp);
-        let known = rim.len() >= super::edges::LEAST;
+        let near = self.rim();
+        let rim = sorted(maps.edges.iter().filter(|e| near.binary_search(&e.pixel).is_ok()).map(|e| e.sigma));
         for q in [0.25, 0.5] {
-            row.put(
-                Family::Edges,
-                format!("sigma of the cell's rim, px, quantile {q}"),
-                if known { of_sorted(&rim, q) } else { f64::NAN },
-            );
+            let name = format!("sigma of the cell's rim, px, quantile {q}");
+            row.put(Family::Edges, name, width_at(&rim, q));
         }
         row.put(Family::Edges, "steep part of the rim", rim.len() as f64 / (TAU * radius));
         row
@@ -214,18 +174,12 @@ impl<'a> Cell<'a> {
     }
 
     /// Pixels at most three from the cell's rim, in order.
-    fn rim(&self, height: usize) -> Vec<usize> {
+    fn rim(&self) -> Vec<usize> {
         const NEAR: f32 = 3.0;
-        let (inside, wide, [left, top]) = self.region.tile(whole(f64::from(NEAR)) + 1);
-        let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
-        let (inner, outer) = (distance_inside(&inside, wide), distance_inside(&outside, wide));
-        let place = |i: usize| {
-            let (x, y) =
-                (usize::try_from((i % wide) as i64 + left).ok()?, usize::try_from((i / wide) as i64 + top).ok()?);
-            (x < self.region.width && y < height && inner[i] <= NEAR && outer[i] <= NEAR)
-                .then(|| y * self.region.width + x)
-        };
-        (0..inside.len()).filter_map(place).collect()
+        let tile = self.region.tile(whole(f64::from(NEAR)) + 1);
+        let (inner, outer) = (tile.depths(), tile.heights());
+        let near = (0..inner.len()).filter(|&i| inner[i] <= NEAR && outer[i] <= NEAR);
+        near.filter_map(|i| tile.place(i)).collect()
     }
 }
 
@@ -284,6 +238,12 @@ mod tests {
         components(&inside, maps.width).remove(0)
     }
 
+    fn ids(maps: &Maps, nuclei: &[Region]) -> Vec<u32> {
+        let mut ids = vec![0; maps.absorbance.len()];
+        (1..).zip(nuclei).for_each(|(id, nucleus)| nucleus.pixels.iter().for_each(|p| ids[*p as usize] = id));
+        ids
+    }
+
     #[test]
     fn a_free_cell_has_its_profile_size_and_place() {
         // Thin at the rim, and twice as dark in the middle.
@@ -296,7 +256,7 @@ mod tests {
             }
         });
         let nuclei = [disc(&maps, 127.0, 110.0, 10.0)];
-        let cells = cells(&maps, &nuclei, PIXEL_UM);
+        let cells = cells(&maps, &ids(&maps, &nuclei), &nuclei, PIXEL_UM);
         assert_eq!(cells.len(), 1);
         let cell = &cells[0];
         assert!((cell.shape.area - PI * 4900.0).abs() < 400.0, "{:?}", cell.shape);
@@ -306,8 +266,7 @@ mod tests {
             // The camera has whole levels of grey, and the outermost bin some of the slide.
             assert!((value - wanted).abs() < if i == 0 { 0.12 } else { 0.04 }, "{i}: {value}, not {wanted}");
         }
-        let mut table = crate::table::Table::default();
-        table.push(cell.features(&maps, PIXEL_UM), cell.shape.centre);
+        let table: crate::table::Table = std::iter::once((cell.features(&maps, PIXEL_UM), cell.shape.centre)).collect();
         let value = |name: &str| table.column(name).next().unwrap();
         assert!((value("nucleus off centre, radii") - 0.1).abs() < 0.02);
         assert!((value("nucleus over cell area") - 1.0 / 49.0).abs() < 0.002);
@@ -320,7 +279,7 @@ mod tests {
             if distance([x, y], [120.0, 110.0]) < 60.0 || distance([x, y], [0.0, 0.0]) < 50.0 { 0.2 } else { 0.0 }
         };
         let maps = maps(body);
-        let count = |nuclei: &[Region]| cells(&maps, nuclei, PIXEL_UM).len();
+        let count = |nuclei: &[Region]| cells(&maps, &ids(&maps, nuclei), nuclei, PIXEL_UM).len();
         let own = disc(&maps, 120.0, 110.0, 9.0);
         assert_eq!(count(&[]), 0);
         assert_eq!(count(std::slice::from_ref(&own)), 1);

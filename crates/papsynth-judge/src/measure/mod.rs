@@ -1,29 +1,26 @@
 //! From a picture to numbers.
 
 mod cell;
-mod edges;
-mod layout;
 mod maps;
 mod noise;
 mod nucleus;
 mod patch;
-mod spectrum;
 mod statistics;
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::nuclei::{Hints, NucleiParams, nuclei};
+use crate::nuclei::{NucleiParams, nuclei};
 use crate::number::nearest;
 use crate::picture::{Known, Picture};
 use crate::table::Table;
 use maps::Maps;
 
 pub use cell::PROFILE;
-pub use layout::{clark_evans, ripley};
 pub(crate) use patch::PATCH_PX;
-pub use spectrum::frequencies;
-pub use statistics::{HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, RADII_UM, Statistics};
+pub use statistics::{
+    HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, Named, RADII_UM, Statistics, clark_evans, frequencies, ripley,
+};
 
 /// Which knowledge of nuclei is used: what both sides have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, Default)]
@@ -89,12 +86,8 @@ pub struct GaugeParams {
 
 impl Default for GaugeParams {
     fn default() -> Self {
-        Self {
-            pixel_um: 0.33,
-            nuclei_from: NucleiFrom::default(),
-            nuclei: NucleiParams::default(),
-            detail: Detail::default(),
-        }
+        let (nuclei_from, detail) = (NucleiFrom::default(), Detail::default());
+        Self { pixel_um: 0.33, nuclei_from, nuclei: NucleiParams::default(), detail }
     }
 }
 
@@ -135,20 +128,15 @@ impl Gauge {
     /// If one is outside its range.
     pub fn new(params: &GaugeParams) -> Result<Self, Error> {
         let n = &params.nuclei;
-        let ranges: [(&'static str, f64, f64, f64, &'static str); 7] = [
-            ("pixel_um", params.pixel_um, 0.02, 10.0, "0.02 to 10 um"),
-            ("nuclei.smallest_um2", n.smallest_um2, 1.0, 1e4, "1 to 10000 um2"),
-            ("nuclei.largest_um2", n.largest_um2, n.smallest_um2, 1e5, "nuclei.smallest_um2 to 100000 um2"),
-            ("nuclei.least_ellipse", n.least_ellipse, 0.0, 1.0, "0 to 1"),
-            ("nuclei.least_solidity", n.least_solidity, 0.0, 1.0, "0 to 1"),
-            ("nuclei.least_contrast", n.least_contrast, 0.0, 3.0, "0 to 3"),
-            ("nuclei.least_steepness", n.least_steepness, 0.0, 100.0, "0 to 100"),
-        ];
-        for (field, value, least, most, accepted) in ranges {
-            if !(value >= least && value <= most) {
-                return Err(Error::Parameter { field, value, accepted });
-            }
-        }
+        Error::check(&[
+            ("pixel_um", params.pixel_um, [0.02, 10.0], "0.02 to 10 um"),
+            ("nuclei.smallest_um2", n.smallest_um2, [1.0, 1e4], "1 to 10000 um2"),
+            ("nuclei.largest_um2", n.largest_um2, [n.smallest_um2, 1e5], "nuclei.smallest_um2 to 100000 um2"),
+            ("nuclei.least_ellipse", n.least_ellipse, [0.0, 1.0], "0 to 1"),
+            ("nuclei.least_solidity", n.least_solidity, [0.0, 1.0], "0 to 1"),
+            ("nuclei.least_contrast", n.least_contrast, [0.0, 3.0], "0 to 3"),
+            ("nuclei.least_steepness", n.least_steepness, [0.0, 100.0], "0 to 100"),
+        ])?;
         Ok(Self { params: params.clone() })
     }
 
@@ -164,17 +152,15 @@ impl Gauge {
         let pixel_um = self.params.pixel_um;
         let maps = Maps::new(&picture);
         let regions = self.nuclei(&maps, &picture.nuclei);
-        let cells = cell::cells(&maps, &regions, pixel_um);
-        let mut inside = vec![false; maps.absorbance.len()];
-        regions.iter().flat_map(|r| &r.pixels).for_each(|p| inside[*p as usize] = true);
-        let mut of_nuclei = Table::default();
-        for region in regions.iter().filter(|r| !r.at_border(maps.height)) {
-            of_nuclei.push(nucleus::features(&maps, region, &inside, pixel_um), region.shape().centre);
+        // In every pixel the number of its nucleus from 1 on, or 0.
+        let mut ids = vec![0; maps.absorbance.len()];
+        for (id, region) in (1..).zip(&regions) {
+            region.pixels.iter().for_each(|p| ids[*p as usize] = id);
         }
-        let mut of_cells = Table::default();
-        for cell in &cells {
-            of_cells.push(cell.features(&maps, pixel_um), cell.shape.centre);
-        }
+        let cells = cell::cells(&maps, &ids, &regions, pixel_um);
+        let free = regions.iter().filter(|r| !r.at_border());
+        let of_nuclei = free.map(|r| (nucleus::features(&maps, r, &ids, pixel_um), r.shape().centre));
+        let of_cells = cells.iter().map(|cell| (cell.features(&maps, pixel_um), cell.shape.centre));
         let (patches, thumbnail) = match self.params.detail {
             Detail::Statistics => (Table::default(), Vec::new()),
             Detail::Everything => {
@@ -187,9 +173,9 @@ impl Gauge {
             group: picture.group.clone(),
             width: maps.width,
             height: maps.height,
-            statistics: Statistics::new(&maps, &regions, &cells, pixel_um),
-            nuclei: of_nuclei,
-            cells: of_cells,
+            statistics: Statistics::new(&maps, &ids, &regions, &cells, pixel_um),
+            nuclei: of_nuclei.collect(),
+            cells: of_cells.collect(),
             patches,
             thumbnail,
             params: self.params.clone(),
@@ -197,16 +183,19 @@ impl Gauge {
     }
 
     fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<crate::region::Region> {
-        let search =
-            |hints: Hints| nuclei(&maps.absorbance, maps.width, self.params.pixel_um, &hints, &self.params.nuclei);
+        let search = |known: &Known| nuclei(&maps.absorbance, maps.width, known, &self.params);
         match (self.params.nuclei_from, known) {
-            (NucleiFrom::Masks, Known::Masks(labels)) => search(Hints::Masks(labels)),
-            (NucleiFrom::Points, Known::Points(points)) => search(Hints::Points(points)),
-            (NucleiFrom::Points, Known::Masks(labels)) => {
-                let centres: Vec<[f64; 2]> = search(Hints::Masks(labels)).iter().map(|r| r.shape().centre).collect();
-                search(Hints::Points(&centres))
+            (NucleiFrom::Masks, Known::Masks(_)) | (NucleiFrom::Points, Known::Points(_)) => search(known),
+            (NucleiFrom::Points, Known::Masks(_)) => {
+                search(&Known::Points(search(known).iter().map(|r| r.shape().centre).collect()))
             }
-            _ => search(Hints::Nothing),
+            _ => search(&Known::Nothing),
         }
     }
+}
+
+/// The mean; NaN of nothing.
+fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0_usize), |(s, n), v| (s + v, n + 1));
+    if count == 0 { f64::NAN } else { sum / count as f64 }
 }

@@ -14,15 +14,21 @@ pub(crate) struct Noise {
     pub(crate) products: [f64; 5],
 }
 
+/// Upper left corners of the blocks in a part of a picture.
+pub(crate) fn blocks([left, top]: [usize; 2], [wide, high]: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
+    let along = |from: usize, length: usize| (from..(from + length).saturating_sub(BLOCK - 1)).step_by(BLOCK);
+    along(top, high).flat_map(move |y| along(left, wide).map(move |x| [x, y]))
+}
+
 impl Noise {
-    /// What is compared with what.
-    pub(crate) const LAGS: [&'static str; 5] = ["1 across", "1 down", "1 diagonally", "2 across", "2 down"];
-    const OFFSETS: [[usize; 2]; 5] = [[1, 0], [0, 1], [1, 1], [2, 0], [0, 2]];
+    /// What is compared with what: names, steps across and down.
+    pub(crate) const LAGS: [(&'static str, [usize; 2]); 5] =
+        [("1 across", [1, 0]), ("1 down", [0, 1]), ("1 diagonally", [1, 1]), ("2 across", [2, 0]), ("2 down", [0, 2])];
 
     /// Terms of the surface that is taken off.
     const TERMS: f64 = 6.0;
 
-    pub(crate) fn of(grey: &[f32], width: usize, left: usize, top: usize) -> Self {
+    pub(crate) fn of(grey: &[f32], width: usize, [left, top]: [usize; 2]) -> Self {
         let place = |i: usize| 2.0 * (i as f64 + 0.5) / BLOCK as f64 - 1.0;
         let cells = || (0..BLOCK).flat_map(|y| (0..BLOCK).map(move |x| (x, y)));
         let value = |x: usize, y: usize| f64::from(grey[(top + y) * width + left + x]);
@@ -30,14 +36,14 @@ impl Noise {
         let surface = Surface::fit(&points, 0.0);
         let rests: Vec<f64> = points.iter().map(|(p, v)| v - surface.at(*p)).collect();
         let n = rests.len() as f64;
-        let product = |[dx, dy]: [usize; 2]| {
+        let product = |(_, [dx, dy]): (&str, [usize; 2])| {
             let pairs = cells().filter(|(x, y)| x + dx < BLOCK && y + dy < BLOCK);
             let products = pairs.map(|(x, y)| rests[y * BLOCK + x] * rests[(y + dy) * BLOCK + x + dx]);
             products.sum::<f64>() / ((BLOCK - dx) * (BLOCK - dy)) as f64
         };
         Self {
             variance: rests.iter().map(|r| r * r).sum::<f64>() / (n - Self::TERMS),
-            products: Self::OFFSETS.map(product),
+            products: Self::LAGS.map(product),
         }
     }
 
@@ -77,8 +83,8 @@ mod tests {
             let grey: Vec<f32> = (0..width * height)
                 .map(|i| crate::number::single(200.0 + 0.01 * (i % width) as f64 + of(i % width, i / width)))
                 .collect();
-            let places = (0..height).step_by(BLOCK).flat_map(|y| (0..width).step_by(BLOCK).map(move |x| (x, y)));
-            let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&grey, width, x, y)).collect();
+            let mut blocks: Vec<Noise> =
+                blocks([0, 0], [width, height]).map(|at| Noise::of(&grey, width, at)).collect();
             Noise::mean(&mut blocks).unwrap()
         };
         let plain = measured(&|x, y| white[y * width + x]);

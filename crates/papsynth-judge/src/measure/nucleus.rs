@@ -5,10 +5,11 @@ use std::f64::consts::{PI, TAU};
 use portable_numerics::statistics::correlation;
 
 use super::maps::Maps;
-use crate::moments::Histogram;
+use super::mean_of;
+use crate::moments::{DESCRIPTORS, descriptors};
 use crate::number::{nearest, whole};
-use crate::region::{Region, distance_inside};
-use crate::statistics::{deviation, mean, median, of_sorted};
+use crate::region::Region;
+use crate::statistics::{deviation, mean, median, of_sorted, sorted};
 use crate::table::{Family, Row};
 
 /// The rim, which is blurred, is left out of the core: pixels.
@@ -43,17 +44,16 @@ struct Pixel {
     sector: usize,
 }
 
-/// All features of a nucleus; `others` is true in every pixel of any nucleus.
-pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: f64) -> Row {
+/// All features of a nucleus; `ids` is above 0 in every pixel of any nucleus.
+pub(crate) fn features(maps: &Maps, region: &Region, ids: &[u32], pixel_um: f64) -> Row {
     let shape = region.shape();
-    let pixels = pixels(maps, region, others, shape.centre, whole(BEYOND_UM[1] / pixel_um) + 2);
+    let pixels = pixels(maps, region, ids, shape.centre, whole(BEYOND_UM[1] / pixel_um) + 2);
     let deepest = pixels.iter().map(|p| p.depth).fold(0.0, f64::max);
     let rim = RIM_PX.min(0.4 * deepest);
     let core: Vec<&Pixel> = pixels.iter().filter(|p| p.depth > rim).collect();
     let ring =
         |[from, to]: [f64; 2]| pixels.iter().filter(move |p| -p.depth > from / pixel_um && -p.depth <= to / pixel_um);
-    let mut core_a: Vec<f64> = core.iter().map(|p| p.a).collect();
-    core_a.sort_unstable_by(f64::total_cmp);
+    let core_a = sorted(core.iter().map(|p| p.a));
     let beside: Vec<f64> = ring(BESIDE_UM).map(|p| p.a).collect();
     let beyond: Vec<f64> = ring(BEYOND_UM).map(|p| p.a).collect();
     let (inner, middle) = (mean(&core_a), of_sorted(&core_a, 0.5));
@@ -90,18 +90,13 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
         let a = mean_of(pixels.iter().filter(|p| p.depth > 0.0 && of(p.depth) == bin).map(|p| p.a));
         row.put(Family::Rim, format!("rim to centre, bin {} of {BINS}", bin + 1), (a - outer) / contrast.max(0.02));
     }
-    let profile: Vec<f64> = (-REACH_PX..REACH_PX)
-        .map(|d| f64::from(d) + 0.5)
-        .map(|d| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a)))
-        .collect();
+    let at_depth = |d: f64| mean_of(pixels.iter().filter(|p| (p.depth - d).abs() < 0.75).map(|p| p.a));
+    let profile: Vec<f64> = (-REACH_PX..REACH_PX).map(|d| at_depth(f64::from(d) + 0.5)).collect();
     let steepest = profile.windows(2).map(|w| w[1] - w[0]).filter(|s| s.is_finite()).fold(1e-3, f64::max);
     // The step of an edge blurred by σ has the slope 1/(σ √(2π)) of its height.
     row.put(Family::Rim, "rim sigma, px", contrast / (steepest * TAU.sqrt()));
-    let membrane = profile[whole(f64::from(REACH_PX))..]
-        .iter()
-        .copied()
-        .filter(|v| v.is_finite())
-        .fold(f64::NEG_INFINITY, f64::max);
+    let inwards = profile.iter().skip(profile.len() / 2).filter(|v| v.is_finite());
+    let membrane = inwards.copied().fold(f64::NEG_INFINITY, f64::max);
     row.put(Family::Rim, "darkest depth over core", (membrane - inner) / contrast.max(0.02));
     let rim_slope = |s: usize| {
         mean_of(pixels.iter().filter(|p| p.depth.abs() < 1.5 && p.sector == s).map(|p| f64::from(maps.slope[p.index])))
@@ -111,9 +106,16 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
     row.put(Family::Rim, "rim unevenness", deviation(&slopes) / mean(&slopes).max(1e-3));
 
     let rests = detrended(&core);
-    let tile = Tile::new(&core, &rests);
+    let at = |index: usize| core.binary_search_by_key(&index, |p| p.index).ok().map(|i| rests[i]);
+    // With what lies so many pixels to the right and below.
+    let alike = |across: usize, down: usize| {
+        let inside = core.iter().zip(&rests).filter(|(p, _)| p.index % maps.width + across < maps.width);
+        let pairs = inside.filter_map(|(p, rest)| Some((*rest, at(p.index + down * maps.width + across)?)));
+        let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
+        if a.len() < 8 { f64::NAN } else { correlation(&a, &b) }
+    };
     for lag in LAGS {
-        let both = [tile.correlation(lag, 0), tile.correlation(0, lag)];
+        let both = [alike(lag, 0), alike(0, lag)];
         row.put(Family::Texture, format!("core correlation at {lag} px"), mean(&both));
         if lag <= 2 {
             row.put(Family::Noise, format!("core correlation down less across at {lag} px"), both[1] - both[0]);
@@ -131,42 +133,27 @@ pub(crate) fn features(maps: &Maps, region: &Region, others: &[bool], pixel_um: 
     row.put(Family::Texture, "dark spots, um-2", spots / um2);
     row.put(Family::Texture, "pale spots, um-2", holes / um2);
 
-    let histogram = Histogram::new(core.iter().map(|p| maps.grey[p.index]));
-    for n in 2..=6 {
-        row.put(Family::Texture, format!("log moment {n}"), histogram.log_moment(n));
-    }
-    row.put(Family::Texture, "entropy, bits", histogram.entropy());
+    let grey = descriptors(core.iter().map(|p| maps.grey[p.index]));
+    DESCRIPTORS.into_iter().zip(grey).for_each(|(name, value)| row.put(Family::Texture, name, value));
     row
 }
 
-fn pixels(maps: &Maps, region: &Region, others: &[bool], centre: [f64; 2], margin: usize) -> Vec<Pixel> {
-    let (inside, wide, [left, top]) = region.tile(margin);
-    let outside: Vec<bool> = inside.iter().map(|i| !i).collect();
-    let (depths, heights) = (distance_inside(&inside, wide), distance_inside(&outside, wide));
-    let mut pixels = Vec::with_capacity(inside.len());
-    for i in 0..inside.len() {
-        let (x, y) = ((i % wide) as i64 + left, (i / wide) as i64 + top);
-        let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
-        if x >= maps.width || y >= maps.height {
-            continue;
-        }
-        let index = y * maps.width + x;
-        if others[index] && !inside[i] {
-            continue;
+fn pixels(maps: &Maps, region: &Region, ids: &[u32], centre: [f64; 2], margin: usize) -> Vec<Pixel> {
+    let tile = region.tile(margin);
+    let (depths, heights) = (tile.depths(), tile.heights());
+    let pixel = |i: usize| {
+        let index = tile.place(i)?;
+        if ids[index] > 0 && !tile.inside[i] {
+            return None;
         }
         // The rim lies half a pixel outside the outermost pixel's centre.
-        let depth = if inside[i] { f64::from(depths[i]) - 0.5 } else { 0.5 - f64::from(heights[i]) };
-        let (x, y) = (x as f64, y as f64);
+        let depth = if tile.inside[i] { f64::from(depths[i]) - 0.5 } else { 0.5 - f64::from(heights[i]) };
+        let (x, y) = ((index % maps.width) as f64, (index / maps.width) as f64);
         let turn = libm::atan2(y - centre[1], x - centre[0]) / TAU + 0.5;
         let sector = whole(turn * SECTORS as f64).min(SECTORS - 1);
-        pixels.push(Pixel { index, x, y, a: f64::from(maps.absorbance[index]), depth, sector });
-    }
-    pixels
-}
-
-fn mean_of(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_usize), |(s, n), v| (s + v, n + 1));
-    if count == 0 { f64::NAN } else { sum / count as f64 }
+        Some(Pixel { index, x, y, a: f64::from(maps.absorbance[index]), depth, sector })
+    };
+    (0..tile.inside.len()).filter_map(pixel).collect()
 }
 
 fn known(values: impl Iterator<Item = f64>) -> Vec<f64> {
@@ -200,40 +187,4 @@ fn detrended(core: &[&Pixel]) -> Vec<f64> {
     let points: Vec<([f64; 2], f64)> = core.iter().map(|p| (place(p), p.a)).collect();
     let surface = crate::background::Surface::fit(&points, 0.0);
     core.iter().map(|p| p.a - surface.at(place(p))).collect()
-}
-
-/// Values in a rectangle, to be compared with their neighbours.
-struct Tile {
-    width: usize,
-    values: Vec<f64>,
-}
-
-impl Tile {
-    fn new(core: &[&Pixel], rests: &[f64]) -> Self {
-        let low = core.iter().fold([f64::INFINITY; 2], |l, p| [l[0].min(p.x), l[1].min(p.y)]);
-        let high = core.iter().fold([0.0_f64; 2], |h, p| [h[0].max(p.x), h[1].max(p.y)]);
-        let size = [0, 1].map(|i| whole(high[i] - low[i]) + 1);
-        let mut values = vec![f64::NAN; if core.is_empty() { 0 } else { size[0] * size[1] }];
-        for (p, rest) in core.iter().zip(rests) {
-            values[whole(p.y - low[1]) * size[0] + whole(p.x - low[0])] = *rest;
-        }
-        Self { width: size[0], values }
-    }
-
-    /// Correlation with what lies `across` pixels to the right and `down` below.
-    fn correlation(&self, across: usize, down: usize) -> f64 {
-        let (mut a, mut b) = (Vec::new(), Vec::new());
-        for (i, v) in self.values.iter().enumerate() {
-            let other = i + down * self.width + across;
-            if i % self.width + across < self.width
-                && let Some(w) = self.values.get(other)
-                && v.is_finite()
-                && w.is_finite()
-            {
-                a.push(*v);
-                b.push(*w);
-            }
-        }
-        if a.len() < 8 { f64::NAN } else { correlation(&a, &b) }
-    }
 }

@@ -2,11 +2,11 @@
 
 use multiversion::multiversion;
 
-use super::maps::{BANDS, Maps};
-use super::noise::{BLOCK, Noise};
+use super::maps::{BANDS, Maps, width_at};
+use super::noise::{Noise, blocks};
 use crate::filter::{blur, gradient};
 use crate::number::whole;
-use crate::statistics::{of_sorted, quantile};
+use crate::statistics::{of_sorted, sorted};
 use crate::table::{Family, Row, Table};
 
 /// Side of a patch, pixels; smaller fields are one patch.
@@ -44,9 +44,9 @@ struct Fine<'a> {
     maps: &'a Maps,
     gradient: [Vec<f32>; 2],
     /// Larger and smaller eigenvalue of the second derivatives (darkness is positive: a dark ridge's is negative across).
-    hessians: Vec<[Vec<f32>; 2]>,
+    hessians: Vec<(Vec<f32>, Vec<f32>)>,
     /// Coherence and energy of structure tensors.
-    tensors: Vec<[Vec<f32>; 2]>,
+    tensors: Vec<(Vec<f32>, Vec<f32>)>,
     /// Class of the pattern around every pixel.
     patterns: Vec<Vec<u8>>,
 }
@@ -55,20 +55,19 @@ struct Fine<'a> {
 pub(crate) fn patches(maps: &Maps) -> Table {
     let fine = Fine {
         maps,
-        gradient: maps.gradient(),
+        gradient: gradient(&maps.smooth, maps.width),
         hessians: HESSIANS.iter().map(|s| hessian(&blur(&maps.absorbance, maps.width, *s), maps.width, *s)).collect(),
         tensors: TENSORS.iter().map(|[s, window]| tensor(maps, *s, *window)).collect(),
         patterns: PATTERNS.iter().map(|(radius, s)| pattern(maps, *radius, *s)).collect(),
     };
-    let mut table = Table::default();
     let (wide, high) = (PATCH_PX.min(maps.width), PATCH_PX.min(maps.height));
-    for top in (0..=maps.height - high).step_by(high) {
-        for left in (0..=maps.width - wide).step_by(wide) {
-            let window = Window { left, top, wide, high };
-            table.push(features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64]);
-        }
-    }
-    table
+    let starts = |length: usize, side: usize| (0..=length - side).step_by(side);
+    let places = starts(maps.height, high).flat_map(|top| starts(maps.width, wide).map(move |left| [left, top]));
+    let patch = |[left, top]: [usize; 2]| {
+        let window = Window { left, top, wide, high };
+        (features(&fine, window), [(left + wide / 2) as f64, (top + high / 2) as f64])
+    };
+    places.map(patch).collect()
 }
 
 #[derive(Clone, Copy)]
@@ -96,10 +95,9 @@ fn features(fine: &Fine, window: Window) -> Row {
     let smooth: Vec<f32> = window.of(&maps.smooth, width, 0).collect();
     let part = |count: usize| count as f64 / a.len() as f64;
 
-    let mut sorted: Vec<f64> = smooth.iter().step_by(THINNED).map(|v| f64::from(*v)).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
+    let thinned = sorted(smooth.iter().step_by(THINNED).map(|v| f64::from(*v)));
     for q in QUANTILES {
-        row.put(Family::Stain, format!("absorbance, quantile {q}"), of_sorted(&sorted, q));
+        row.put(Family::Stain, format!("absorbance, quantile {q}"), of_sorted(&thinned, q));
     }
     for (i, from) in STEPS.iter().enumerate() {
         let to = STEPS.get(i + 1).copied().unwrap_or(f32::INFINITY);
@@ -109,25 +107,20 @@ fn features(fine: &Fine, window: Window) -> Row {
 
     let mut powers = Vec::new();
     for (i, (band, wide)) in maps.bands.iter().enumerate() {
+        let px = 1 << i;
         let values: Vec<f64> = window.of(band, *wide, i).map(f64::from).collect();
         let n = values.len() as f64;
         let square = values.iter().map(|v| v * v).sum::<f64>() / n;
         let fourth = values.iter().map(|v| v * v * v * v).sum::<f64>() / n;
         let power = libm::log10(square.max(1e-10));
-        row.put(Family::Spectrum, format!("log power at {} px", 1 << i), power);
-        row.put(
-            Family::Spectrum,
-            format!("sparseness at {} px", 1 << i),
-            libm::log10(fourth / (square * square).max(1e-18)),
-        );
+        let sparseness = libm::log10(fourth / (square * square).max(1e-18));
+        row.put(Family::Spectrum, format!("log power at {px} px"), power);
+        row.put(Family::Spectrum, format!("sparseness at {px} px"), sparseness);
         powers.push(power);
     }
     for i in 1..BANDS {
-        row.put(
-            Family::Spectrum,
-            format!("log power at {} over {} px", 1 << i, 1 << (i - 1)),
-            powers[i] - powers[i - 1],
-        );
+        let (px, finer) = (1 << i, 1 << (i - 1));
+        row.put(Family::Spectrum, format!("log power at {px} over {finer} px"), powers[i] - powers[i - 1]);
     }
 
     edges(&mut row, fine, window);
@@ -139,22 +132,19 @@ fn features(fine: &Fine, window: Window) -> Row {
         let sum: f64 = window.of(image, width, 0).zip(&object).filter(|(_, o)| **o).map(|(v, _)| f(v)).sum();
         if objects < MIN_OBJECT { f64::NAN } else { sum / objects as f64 }
     };
-    for ([high, low], sigma) in fine.hessians.iter().zip(HESSIANS) {
+    for ((high, low), sigma) in fine.hessians.iter().zip(HESSIANS) {
         let (valley, ridge) = (over(high, &|v| f64::from(v.max(0.0))), over(low, &|v| f64::from(-v.min(0.0))));
         let weak = over(high, &|v| f64::from(v.min(0.0).abs()));
         row.put(Family::Texture, format!("log dark ridges at {sigma} px"), libm::log10(ridge.max(1e-6)));
         row.put(Family::Texture, format!("pale over dark ridges at {sigma} px"), valley / ridge.max(1e-6));
         row.put(Family::Texture, format!("blobs over ridges at {sigma} px"), weak / ridge.max(1e-6));
     }
-    for ([coherence, energy], [sigma, _]) in fine.tensors.iter().zip(TENSORS) {
+    for ((coherence, energy), [sigma, _]) in fine.tensors.iter().zip(TENSORS) {
         let total = over(energy, &f64::from);
         let product: Vec<f32> = coherence.iter().zip(energy).map(|(c, e)| c * e).collect();
         row.put(Family::Texture, format!("coherence at {sigma} px"), over(coherence, &f64::from));
-        row.put(
-            Family::Texture,
-            format!("coherence of edges at {sigma} px"),
-            over(&product, &f64::from) / total.max(1e-9),
-        );
+        let of_edges = over(&product, &f64::from) / total.max(1e-9);
+        row.put(Family::Texture, format!("coherence of edges at {sigma} px"), of_edges);
     }
     for (classes, (radius, _)) in fine.patterns.iter().zip(PATTERNS) {
         let mut counts = [0_usize; CLASSES];
@@ -182,85 +172,76 @@ const MIN_OBJECT: usize = 400;
 
 fn edges(row: &mut Row, fine: &Fine, window: Window) {
     let maps = fine.maps;
-    let mut slopes: Vec<f64> = window.of(&maps.slope, maps.width, 0).step_by(THINNED).map(f64::from).collect();
-    slopes.sort_unstable_by(f64::total_cmp);
+    let slopes = sorted(window.of(&maps.slope, maps.width, 0).step_by(THINNED).map(f64::from));
     for q in [0.5, 0.75, 0.9, 0.97, 0.995] {
         row.put(Family::Edges, format!("log slope, quantile {q}"), libm::log10(of_sorted(&slopes, q).max(1e-5)));
     }
     let sum = |image: &[f32]| window.of(image, maps.width, 0).map(|v| f64::from(v.abs())).sum::<f64>();
-    row.put(
-        Family::Edges,
-        "log slope across over down",
-        libm::log10(sum(&fine.gradient[0]).max(1e-9) / sum(&fine.gradient[1]).max(1e-9)),
-    );
+    let [across, down] = fine.gradient.each_ref().map(|image| sum(image).max(1e-9));
+    row.put(Family::Edges, "log slope across over down", libm::log10(across / down));
     let within = |p: usize| {
         let (x, y) = (p % maps.width, p / maps.width);
         (window.left..window.left + window.wide).contains(&x) && (window.top..window.top + window.high).contains(&y)
     };
-    let mut widths: Vec<f64> = maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma).collect();
+    let widths = sorted(maps.edges.iter().filter(|e| within(e.pixel)).map(|e| e.sigma));
     for q in [0.1, 0.5, 0.9] {
-        let value = if widths.len() < super::edges::LEAST { f64::NAN } else { quantile(&mut widths, q) };
-        row.put(Family::Edges, format!("edge sigma, px, quantile {q}"), value);
+        row.put(Family::Edges, format!("edge sigma, px, quantile {q}"), width_at(&widths, q));
     }
 }
 
 /// Noise of the flattest blocks: its size, and how much neighbours are alike.
 fn noise(row: &mut Row, maps: &Maps, window: Window) {
-    let along = |from: usize, length: usize| (from..(from + length).saturating_sub(BLOCK - 1)).step_by(BLOCK);
-    let places = along(window.top, window.high).flat_map(|y| along(window.left, window.wide).map(move |x| (x, y)));
-    let mut blocks: Vec<Noise> = places.map(|(x, y)| Noise::of(&maps.grey, maps.width, x, y)).collect();
+    let places = blocks([window.left, window.top], [window.wide, window.high]);
+    let mut blocks: Vec<Noise> = places.map(|at| Noise::of(&maps.grey, maps.width, at)).collect();
     blocks.sort_by(|a, b| a.variance.total_cmp(&b.variance));
     blocks.truncate(whole((FLAT * blocks.len() as f64).ceil()));
     let noise = Noise::mean(&mut blocks);
     let known = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
     row.put(Family::Noise, "log noise, dn", known(&|n| 0.5 * libm::log10(n.variance.max(1e-4))));
-    for (lag, name) in Noise::LAGS.iter().enumerate() {
+    for (lag, (name, _)) in Noise::LAGS.iter().enumerate() {
         row.put(Family::Noise, format!("noise correlation {name}"), known(&|n| n.correlation(lag)));
     }
 }
 
+/// Absorbance after a Gaussian of 0, 1 or 2 pixels.
+fn smoothed(maps: &Maps, sigma: f64) -> &[f32] {
+    match sigma {
+        0.0 => &maps.absorbance,
+        1.0 => &maps.smooth,
+        _ => &maps.smoother,
+    }
+}
+
 /// Both eigenvalues of the second derivatives in units of absorbance, the larger first.
-fn hessian(image: &[f32], width: usize, sigma: f64) -> [Vec<f32>; 2] {
+fn hessian(image: &[f32], width: usize, sigma: f64) -> (Vec<f32>, Vec<f32>) {
     let [dx, dy] = gradient(image, width);
     let [dxx, dxy] = gradient(&dx, width);
     let [_, dyy] = gradient(&dy, width);
     let scale = crate::number::single(sigma * sigma);
-    let mut out = [Vec::with_capacity(image.len()), Vec::with_capacity(image.len())];
-    for ((xx, xy), yy) in dxx.iter().zip(&dxy).zip(&dyy) {
+    let of_pixel = |((xx, xy), yy): ((&f32, &f32), &f32)| {
         let half = 0.5 * (xx + yy);
         let root = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-        out[0].push(scale * (half + root));
-        out[1].push(scale * (half - root));
-    }
-    out
+        (scale * (half + root), scale * (half - root))
+    };
+    dxx.iter().zip(&dxy).zip(&dyy).map(of_pixel).unzip()
 }
 
 /// Coherence ((λ₁ − λ₂)/(λ₁ + λ₂)) and energy (λ₁ + λ₂) of the structure tensor.
-fn tensor(maps: &Maps, sigma: f64, window: f64) -> [Vec<f32>; 2] {
-    let image = if sigma > 1.0 { &maps.smoother } else { &maps.smooth };
-    let [dx, dy] = gradient(image, maps.width);
+fn tensor(maps: &Maps, sigma: f64, window: f64) -> (Vec<f32>, Vec<f32>) {
+    let [dx, dy] = gradient(smoothed(maps, sigma), maps.width);
     let product =
         |a: &[f32], b: &[f32]| blur(&a.iter().zip(b).map(|(a, b)| a * b).collect::<Vec<_>>(), maps.width, window);
     let (xx, xy, yy) = (product(&dx, &dx), product(&dx, &dy), product(&dy, &dy));
-    let mut out = [Vec::with_capacity(image.len()), Vec::with_capacity(image.len())];
-    for ((xx, xy), yy) in xx.iter().zip(&xy).zip(&yy) {
+    let of_pixel = |((xx, xy), yy): ((&f32, &f32), &f32)| {
         let (sum, difference) = (xx + yy, ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt());
-        out[0].push(if sum > 1e-12 { difference / sum } else { 0.0 });
-        out[1].push(sum);
-    }
-    out
+        (if sum > 1e-12 { difference / sum } else { 0.0 }, sum)
+    };
+    xx.iter().zip(&xy).zip(&yy).map(of_pixel).unzip()
 }
 
-/// Rotation-invariant uniform local binary patterns of eight neighbours (Ojala et al., doi:10.1109/TPAMI.2002.1017623). At the border
-/// the outermost pixels go on.
+/// Rotation-invariant uniform local binary patterns (Ojala et al., doi:10.1109/TPAMI.2002.1017623); the outermost pixels go on.
 fn pattern(maps: &Maps, radius: usize, sigma: f64) -> Vec<u8> {
-    let image = if sigma == 0.0 {
-        &maps.absorbance
-    } else if sigma == 1.0 {
-        &maps.smooth
-    } else {
-        &maps.smoother
-    };
+    let image = smoothed(maps, sigma);
     let (width, height) = (maps.width, maps.height);
     let wide = width + 2 * radius;
     let framed = |y: usize| {
@@ -315,13 +296,7 @@ mod tests {
     fn patterns_are_those_counted_pixel_by_pixel() {
         let maps = maps(41, 37, |x, y| 120.0 + ((x * x * 7 + y * 13 + x * y) % 23) as f64);
         for (radius, sigma) in PATTERNS {
-            let image = if sigma == 0.0 {
-                &maps.absorbance
-            } else if sigma == 1.0 {
-                &maps.smooth
-            } else {
-                &maps.smoother
-            };
+            let image = smoothed(&maps, sigma);
             let near = (radius * 7 + 5) / 10;
             let r = i64::try_from(radius).unwrap();
             let n = i64::try_from(near).unwrap();

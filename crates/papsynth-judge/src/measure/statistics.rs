@@ -1,15 +1,18 @@
 //! What a field is like as a whole.
 
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use rustfft::num_complex::Complex32;
+use rustfft::{Fft, FftPlannerScalar};
 use serde::{Deserialize, Serialize};
 
 use super::cell::{COVERED, Cell, PROFILE};
-use super::layout::{clark_evans, ripley};
-use super::maps::Maps;
-use super::noise::{BLOCK, Noise};
-use super::spectrum::{RINGS, rings, slope};
-use crate::number::{nearest, whole};
-use crate::region::Region;
-use crate::statistics::{median, of_sorted};
+use super::maps::{Maps, width_at};
+use super::noise::{BLOCK, Noise, blocks};
+use crate::number::{nearest, single, whole};
+use crate::region::{Region, distance};
+use crate::statistics::{line_slope, median, of_sorted, sorted};
 
 /// Radii at which Ripley's K is taken, µm: 50, 100, 200 and 300 pixels of 0.33 µm.
 pub const RADII_UM: [f64; 4] = [16.5, 33.0, 66.0, 99.0];
@@ -29,157 +32,53 @@ const TWICE: f64 = 1.6;
 /// Blocks of empty slide nowhere differ by more from the background, absorbance after a Gaussian of 1 pixel.
 const EMPTY: f32 = 0.02;
 
-/// What a field is like as a whole; NaN where it cannot be told.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Statistics {
-    /// Light of the empty slide, levels of 8 bits, mean over the field.
-    #[serde(deserialize_with = "number")]
-    pub background_dn: f64,
-    /// Its highest less its lowest, over its mean.
-    #[serde(deserialize_with = "number")]
-    pub background_valley: f64,
-    /// Its curvature across, x from −1 to 1, over its value in the middle: level × (1 + x²·this).
-    #[serde(deserialize_with = "number")]
-    pub background_x2: f64,
-    /// Its curvature down.
-    #[serde(deserialize_with = "number")]
-    pub background_y2: f64,
-    /// Standard deviation of noise on empty slide, levels of 8 bits.
-    #[serde(deserialize_with = "number")]
-    pub noise_dn: f64,
-    /// Correlation of noise with that of the pixel to the right.
-    #[serde(deserialize_with = "number")]
-    pub noise_across: f64,
-    /// With that of the pixel below.
-    #[serde(deserialize_with = "number")]
-    pub noise_down: f64,
-    /// With that of the pixel to the right and below.
-    #[serde(deserialize_with = "number")]
-    pub noise_diagonal: f64,
-    /// Part of the field that is covered by anything.
-    #[serde(deserialize_with = "number")]
-    pub coverage: f64,
-    /// Median absorbance of what is covered, nuclei left out.
-    #[serde(deserialize_with = "number")]
-    pub covered_a: f64,
-    /// Its 90th over its 10th percentile.
-    #[serde(deserialize_with = "number")]
-    pub covered_range: f64,
-    /// Part of what is covered, nuclei left out, that is more than 1.6 times as dark as its median: flaps and overlaps.
-    #[serde(deserialize_with = "number")]
-    pub layered: f64,
-    /// Exponent of the power of absorbance against frequency.
-    #[serde(deserialize_with = "number")]
-    pub spectrum_slope: f64,
-    /// 10th percentile of the blur of edges, pixels.
-    #[serde(deserialize_with = "number")]
-    pub edge_sigma_p10: f64,
-    /// Median of it.
-    #[serde(deserialize_with = "number")]
-    pub edge_sigma_p50: f64,
-    /// Nuclei a square millimetre.
-    #[serde(deserialize_with = "number")]
-    pub nuclei_mm2: f64,
-    /// Distance to the nearest neighbour over that of points at random.
-    #[serde(deserialize_with = "number")]
-    pub clark_evans: f64,
-    /// Ripley's K over that of points at random, at [`RADII_UM`].
-    #[serde(deserialize_with = "numbers")]
-    pub ripley: [f64; 4],
-    /// Median area of nuclei, µm².
-    #[serde(deserialize_with = "number")]
-    pub nucleus_um2: f64,
-    /// Free cells with one nucleus.
-    pub cells: usize,
-    /// Their median area, µm².
-    #[serde(deserialize_with = "number")]
-    pub cell_um2: f64,
-    /// Median circularity of free cells.
-    #[serde(deserialize_with = "number")]
-    pub circularity: f64,
-    /// Median solidity of them.
-    #[serde(deserialize_with = "number")]
-    pub solidity: f64,
-    /// Mean number of corners of them.
-    #[serde(deserialize_with = "number")]
-    pub corners: f64,
-    /// Median part of their outline that is straight.
-    #[serde(deserialize_with = "number")]
-    pub straight: f64,
-    /// Median over free cells of their absorbance in ten bins from rim to centre, over each cell's median.
-    #[serde(deserialize_with = "numbers")]
-    pub profile: [f64; PROFILE],
-    /// Parts of the field in bins of absorbance, from [`HISTOGRAM_FROM`] in steps of [`HISTOGRAM_STEP`].
-    pub histogram: Vec<f64>,
-    /// Logarithm to base 10 of the power of absorbance in rings of [`frequencies`](super::frequencies).
-    #[serde(deserialize_with = "numbers")]
-    pub spectrum: [f64; RINGS],
+/// Declares the statistics of a field: what they are made of, then each with its value and, of single numbers, its name.
+macro_rules! statistics {
+    (
+        ($($given:ident: $of:ty),*) { $($before:tt)* }
+        $($(#[$meta:meta])* $field:ident: $type:ty = $value:expr $(, $name:literal)? $(, names $names:ident)?;)*
+    ) => {
+        /// What a field is like as a whole; NaN where it cannot be told.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        pub struct Statistics {
+            $(
+                $(#[$meta])*
+                $(#[doc = concat!("\n\nIn reports: ", $name, ".")] #[serde(deserialize_with = "number")])?
+                pub $field: $type,
+            )*
+        }
+
+        impl Statistics {
+            pub(super) fn new($($given: $of),*) -> Self {
+                $($before)*
+                Self { $($field: $value),* }
+            }
+
+            /// All single numbers, by name.
+            #[must_use]
+            pub fn scalars(&self) -> Vec<Named> {
+                let mut all = Vec::new();
+                $(
+                    $(all.push(($name, self.$field));)?
+                    $(all.extend($names.into_iter().zip(self.$field));)?
+                )*
+                all
+            }
+        }
+    };
 }
 
-/// A statistic's name and value.
-pub type Named = (&'static str, f64);
-
-impl Statistics {
-    /// All single numbers, by name.
-    #[must_use]
-    pub fn scalars(&self) -> Vec<Named> {
-        let mut all = vec![
-            ("background, dn", self.background_dn),
-            ("background, peak to valley", self.background_valley),
-            ("background, curvature across", self.background_x2),
-            ("background, curvature down", self.background_y2),
-            ("noise, dn", self.noise_dn),
-            ("noise correlation across", self.noise_across),
-            ("noise correlation down", self.noise_down),
-            ("noise correlation diagonally", self.noise_diagonal),
-            ("coverage", self.coverage),
-            ("absorbance of what is covered", self.covered_a),
-            ("its 90th over its 10th percentile", self.covered_range),
-            ("part of it in layers", self.layered),
-            ("slope of the spectrum", self.spectrum_slope),
-            ("edge sigma p10, px", self.edge_sigma_p10),
-            ("edge sigma p50, px", self.edge_sigma_p50),
-            ("nuclei a mm2", self.nuclei_mm2),
-            ("Clark-Evans", self.clark_evans),
-        ];
-        let radii = [
-            "K over Poisson at 16.5 um",
-            "K over Poisson at 33 um",
-            "K over Poisson at 66 um",
-            "K over Poisson at 99 um",
-        ];
-        all.extend(radii.into_iter().zip(self.ripley));
-        all.extend([
-            ("area of nuclei, um2", self.nucleus_um2),
-            ("area of free cells, um2", self.cell_um2),
-            ("circularity of free cells", self.circularity),
-            ("solidity of free cells", self.solidity),
-            ("corners of free cells", self.corners),
-            ("straight part of their outline", self.straight),
-        ]);
-        all
-    }
-
-    pub(super) fn new(maps: &Maps, nuclei: &[Region], cells: &[Cell], pixel_um: f64) -> Self {
+statistics! {
+    (maps: &Maps, ids: &[u32], nuclei: &[Region], cells: &[Cell], pixel_um: f64) {
         let pixels = maps.absorbance.len() as f64;
         let noise = empty_noise(maps);
         let noise_of = |f: &dyn Fn(&Noise) -> f64| noise.as_ref().map_or(f64::NAN, f);
-        let mut inside = vec![false; maps.absorbance.len()];
-        nuclei.iter().flat_map(|n| &n.pixels).for_each(|p| inside[*p as usize] = true);
         let covered = maps.smooth.iter().filter(|a| **a > COVERED).count() as f64;
-        let mut cytoplasm: Vec<f64> = maps
-            .smooth
-            .iter()
-            .zip(&inside)
-            .filter(|(a, i)| **a > COVERED && !**i)
-            .map(|(a, _)| f64::from(*a))
-            .collect();
-        cytoplasm.sort_unstable_by(f64::total_cmp);
+        let outside = maps.smooth.iter().zip(ids).filter(|(a, id)| **a > COVERED && **id == 0);
+        let cytoplasm = sorted(outside.map(|(a, _)| f64::from(*a)));
         let middle = of_sorted(&cytoplasm, 0.5);
         let layered = cytoplasm.iter().filter(|a| **a > TWICE * middle).count() as f64 / cytoplasm.len() as f64;
-        let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
-        sigmas.sort_unstable_by(f64::total_cmp);
-        let sharp = |q: f64| if sigmas.len() < super::edges::LEAST { f64::NAN } else { of_sorted(&sigmas, q) };
+        let sigmas = sorted(maps.edges.iter().map(|e| e.sigma));
         let centres: Vec<[f64; 2]> = nuclei.iter().map(|n| n.shape().centre).collect();
         let (width, height) = (maps.width as f64, maps.height as f64);
         let um2 = pixel_um * pixel_um;
@@ -187,37 +86,115 @@ impl Statistics {
         let of_cells = |f: &dyn Fn(&Cell) -> f64| middle_of(cells.iter().map(f));
         let profiles: Vec<[f64; PROFILE]> = cells.iter().map(|c| c.profile(maps)).collect();
         let [level, _, _, x2, _, y2] = maps.background.surface.0;
-        Self {
-            background_dn: 255.0 * maps.background.mean(),
-            background_valley: maps.background.peak_to_valley(),
-            background_x2: x2 / level,
-            background_y2: y2 / level,
-            noise_dn: noise_of(&|n| n.variance.sqrt()),
-            noise_across: noise_of(&|n| n.correlation(0)),
-            noise_down: noise_of(&|n| n.correlation(1)),
-            noise_diagonal: noise_of(&|n| n.correlation(2)),
-            coverage: covered / pixels,
-            covered_a: if cytoplasm.is_empty() { f64::NAN } else { middle },
-            covered_range: of_sorted(&cytoplasm, 0.9) / of_sorted(&cytoplasm, 0.1),
-            layered,
-            spectrum_slope: slope(&spectrum),
-            edge_sigma_p10: sharp(0.1),
-            edge_sigma_p50: sharp(0.5),
-            nuclei_mm2: nuclei.len() as f64 / (pixels * um2) * 1e6,
-            clark_evans: clark_evans(&centres, width, height),
-            ripley: RADII_UM.map(|r| ripley(&centres, width, height, r / pixel_um)),
-            nucleus_um2: middle_of(nuclei.iter().map(|n| n.pixels.len() as f64 * um2)),
-            cells: cells.len(),
-            cell_um2: of_cells(&|c| c.shape.area * um2),
-            circularity: of_cells(&|c| c.shape.circularity),
-            solidity: of_cells(&|c| c.shape.solidity),
-            corners: cells.iter().map(|c| c.outline().corners).sum::<f64>() / cells.len() as f64,
-            straight: of_cells(&|c| c.outline().straight),
-            profile: std::array::from_fn(|i| middle_of(profiles.iter().map(|p| p[i]))),
-            histogram: histogram(&maps.absorbance),
-            spectrum,
+    }
+
+    /// Light of the empty slide, levels of 8 bits, mean over the field.
+    background_dn: f64 = 255.0 * maps.background.mean(), "background, dn";
+    /// Its highest less its lowest, over its mean.
+    background_valley: f64 = maps.background.peak_to_valley(), "background, peak to valley";
+    /// Its curvature across, x from −1 to 1, over its value in the middle: level × (1 + x²·this).
+    background_x2: f64 = x2 / level, "background, curvature across";
+    /// Its curvature down.
+    background_y2: f64 = y2 / level, "background, curvature down";
+    /// Standard deviation of noise on empty slide, levels of 8 bits.
+    noise_dn: f64 = noise_of(&|n| n.variance.sqrt()), "noise, dn";
+    /// Correlation of noise with that of the pixel to the right.
+    noise_across: f64 = noise_of(&|n| n.correlation(0)), "noise correlation across";
+    /// With that of the pixel below.
+    noise_down: f64 = noise_of(&|n| n.correlation(1)), "noise correlation down";
+    /// With that of the pixel to the right and below.
+    noise_diagonal: f64 = noise_of(&|n| n.correlation(2)), "noise correlation diagonally";
+    /// Part of the field that is covered by anything.
+    coverage: f64 = covered / pixels, "coverage";
+    /// Median absorbance of what is covered, nuclei left out.
+    covered_a: f64 = if cytoplasm.is_empty() { f64::NAN } else { middle }, "absorbance of what is covered";
+    /// Its 90th over its 10th percentile.
+    covered_range: f64 = of_sorted(&cytoplasm, 0.9) / of_sorted(&cytoplasm, 0.1), "its 90th over its 10th percentile";
+    /// Part of what is covered, nuclei left out, that is more than 1.6 times as dark as its median: flaps and overlaps.
+    layered: f64 = layered, "part of it in layers";
+    /// Exponent of the power of absorbance against frequency.
+    spectrum_slope: f64 = slope(&spectrum), "slope of the spectrum";
+    /// 10th percentile of the blur of edges, pixels.
+    edge_sigma_p10: f64 = width_at(&sigmas, 0.1), "edge sigma p10, px";
+    /// Median of it.
+    edge_sigma_p50: f64 = width_at(&sigmas, 0.5), "edge sigma p50, px";
+    /// Nuclei a square millimetre.
+    nuclei_mm2: f64 = nuclei.len() as f64 / (pixels * um2) * 1e6, "nuclei a mm2";
+    /// Distance to the nearest neighbour over that of points at random.
+    clark_evans: f64 = clark_evans(&centres, width, height), "Clark-Evans";
+    /// Ripley's K over that of points at random, at [`RADII_UM`].
+    #[serde(deserialize_with = "numbers")]
+    ripley: [f64; 4] = RADII_UM.map(|r| ripley(&centres, width, height, r / pixel_um)), names RIPLEY;
+    /// Median area of nuclei, µm².
+    nucleus_um2: f64 = middle_of(nuclei.iter().map(|n| n.pixels.len() as f64 * um2)), "area of nuclei, um2";
+    /// Free cells with one nucleus.
+    cells: usize = cells.len();
+    /// Their median area, µm².
+    cell_um2: f64 = of_cells(&|c| c.shape.area * um2), "area of free cells, um2";
+    /// Median circularity of free cells.
+    circularity: f64 = of_cells(&|c| c.shape.circularity), "circularity of free cells";
+    /// Median solidity of them.
+    solidity: f64 = of_cells(&|c| c.shape.solidity), "solidity of free cells";
+    /// Mean number of corners of them.
+    corners: f64 = cells.iter().map(|c| c.outline.corners).sum::<f64>() / cells.len() as f64, "corners of free cells";
+    /// Median part of their outline that is straight.
+    straight: f64 = of_cells(&|c| c.outline.straight), "straight part of their outline";
+    /// Median over free cells of their absorbance in ten bins from rim to centre, over each cell's median.
+    #[serde(deserialize_with = "numbers")]
+    profile: [f64; PROFILE] = std::array::from_fn(|i| middle_of(profiles.iter().map(|p| p[i])));
+    /// Parts of the field in bins of absorbance, from [`HISTOGRAM_FROM`] in steps of [`HISTOGRAM_STEP`].
+    histogram: Vec<f64> = histogram(&maps.absorbance);
+    /// Logarithm to base 10 of the power of absorbance in rings of [`frequencies`].
+    #[serde(deserialize_with = "numbers")]
+    spectrum: [f64; RINGS] = spectrum;
+}
+
+/// Names of the single numbers of [`Statistics::ripley`].
+const RIPLEY: [&str; 4] =
+    ["K over Poisson at 16.5 um", "K over Poisson at 33 um", "K over Poisson at 66 um", "K over Poisson at 99 um"];
+
+/// A statistic's name and value.
+pub type Named = (&'static str, f64);
+
+/// Fewer nuclei have no layout.
+const LEAST_POINTS: usize = 5;
+
+/// Mean distance to the nearest neighbour over that of as many points thrown at random, by Clark and Evans
+/// (doi:10.2307/1931034), with Donnelly's correction for the border: below 1 clustered, above it regular. NaN of fewer than five points.
+#[must_use]
+pub fn clark_evans(points: &[[f64; 2]], width: f64, height: f64) -> f64 {
+    if points.len() < LEAST_POINTS {
+        return f64::NAN;
+    }
+    let n = points.len() as f64;
+    let nearest = |i: usize| {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, p)| distance(points[i], *p)).fold(f64::INFINITY, f64::min)
+    };
+    let observed = (0..points.len()).map(nearest).sum::<f64>() / n;
+    let (area, border) = (width * height, 2.0 * (width + height));
+    observed / (0.5 * (area / n).sqrt() + (0.0514 + 0.041 / n.sqrt()) * border / n)
+}
+
+/// Ripley's K over that of points at random, πr², with the translation correction: above 1 clustered. NaN of fewer than five points.
+#[must_use]
+pub fn ripley(points: &[[f64; 2]], width: f64, height: f64, radius: f64) -> f64 {
+    if points.len() < LEAST_POINTS {
+        return f64::NAN;
+    }
+    let area = width * height;
+    let mut sum = 0.0;
+    for (i, a) in points.iter().enumerate() {
+        for b in &points[i + 1..] {
+            if distance(*a, *b) <= radius {
+                // A pair so far apart is seen only where it fits into the field.
+                let fits = (width - (a[0] - b[0]).abs()).max(1.0) * (height - (a[1] - b[1]).abs()).max(1.0);
+                sum += 2.0 * area / fits;
+            }
         }
     }
+    let n = points.len() as f64;
+    area / (n * (n - 1.0)) * sum / (PI * radius * radius)
 }
 
 /// The median of what is known; NaN of nothing.
@@ -238,12 +215,11 @@ fn histogram(absorbance: &[f32]) -> Vec<f64> {
 fn empty_noise(maps: &Maps) -> Option<Noise> {
     const LEAST: usize = 8;
     const FLATTEST: f64 = 1.0 / 30.0;
-    let along = |length: usize| (0..=length - BLOCK).step_by(BLOCK);
-    let places: Vec<(usize, usize)> = along(maps.height).flat_map(|y| along(maps.width).map(move |x| (x, y))).collect();
-    let empty = |(x, y): &&(usize, usize)| {
+    let places: Vec<[usize; 2]> = blocks([0, 0], [maps.width, maps.height]).collect();
+    let empty = |[x, y]: &&[usize; 2]| {
         (*y..y + BLOCK).all(|y| maps.smooth[y * maps.width + x..][..BLOCK].iter().all(|a| a.abs() < EMPTY))
     };
-    let noise = |(x, y): &(usize, usize)| Noise::of(&maps.grey, maps.width, *x, *y);
+    let noise = |at: &[usize; 2]| Noise::of(&maps.grey, maps.width, *at);
     let mut blocks: Vec<Noise> = places.iter().filter(empty).map(noise).collect();
     if blocks.len() < LEAST {
         blocks = places.iter().map(noise).collect();
@@ -263,4 +239,147 @@ fn numbers<'de, D: serde::Deserializer<'de>, const N: usize>(from: D) -> Result<
     let values: Vec<f64> = values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect();
     let count = values.len();
     values.try_into().map_err(|_| serde::de::Error::invalid_length(count, &"as many numbers as were written"))
+}
+
+/// Side of the windows whose spectra are averaged, pixels.
+const SIDE: usize = 256;
+
+/// Rings of frequency, cycles a pixel, each by half an octave beyond the one before.
+const RINGS: usize = 12;
+
+/// Lowest frequency of the lowest ring.
+const LOWEST: f64 = 1.0 / 128.0;
+
+/// The slope is measured between these frequencies, cycles a pixel: below lie whole cells, above noise.
+const MEASURED: [f64; 2] = [0.02, 0.15];
+
+/// Middle of each ring, cycles a pixel.
+#[must_use]
+pub fn frequencies() -> [f64; RINGS] {
+    std::array::from_fn(|i| LOWEST * libm::exp2((i as f64 + 0.5) / 2.0))
+}
+
+/// Logarithm to base 10 of the mean power a square cycle in each ring, of windows with a cosine's rim; NaN of no such frequency.
+fn rings(image: &[f32], width: usize) -> [f64; RINGS] {
+    let height = image.len() / width;
+    // The largest power of two that fits: windows never overlap.
+    let side = [SIDE, width, height].into_iter().min().unwrap_or(1);
+    let side = if side.is_power_of_two() { side } else { side.next_power_of_two() / 2 };
+    let transform = FftPlannerScalar::new().plan_fft_forward(side);
+    let rim: Vec<f32> =
+        (0..side).map(|i| single(0.5 - 0.5 * libm::cos(2.0 * PI * (i as f64 + 0.5) / side as f64))).collect();
+    let (mut sums, mut counts) = ([0.0; RINGS], [0.0; RINGS]);
+    for top in (0..=height - side).step_by(side) {
+        for left in (0..=width - side).step_by(side) {
+            let power = power(&|x, y| image[(top + y) * width + left + x], side, &rim, &transform);
+            add(&power, side, &mut sums, &mut counts);
+        }
+    }
+    std::array::from_fn(|i| if counts[i] > 0.0 { libm::log10((sums[i] / counts[i]).max(1e-12)) } else { f64::NAN })
+}
+
+/// |F|² of a window, normalised so that its mean over all frequencies is the variance.
+fn power(at: &dyn Fn(usize, usize) -> f32, side: usize, rim: &[f32], transform: &Arc<dyn Fft<f32>>) -> Vec<f32> {
+    let mean = (0..side).flat_map(|y| (0..side).map(move |x| (x, y))).map(|(x, y)| f64::from(at(x, y))).sum::<f64>()
+        / (side * side) as f64;
+    let mut rows: Vec<Complex32> = (0..side)
+        .flat_map(|y| (0..side).map(move |x| (x, y)))
+        .map(|(x, y)| Complex32::new((at(x, y) - single(mean)) * rim[x] * rim[y], 0.0))
+        .collect();
+    transform.process(&mut rows);
+    let mut columns: Vec<Complex32> = (0..side).flat_map(|x| rows[x..].iter().step_by(side).copied()).collect();
+    transform.process(&mut columns);
+    let weight: f32 = rim.iter().map(|r| r * r).sum();
+    columns.iter().map(|c| c.norm_sqr() / (weight * weight)).collect()
+}
+
+fn add(power: &[f32], side: usize, sums: &mut [f64; RINGS], counts: &mut [f64; RINGS]) {
+    let frequency = |i: usize| i.min(side - i) as f64 / side as f64;
+    for (i, value) in power.iter().enumerate() {
+        let (u, v) = (frequency(i % side), frequency(i / side));
+        let ring = 2.0 * libm::log2((u * u + v * v).sqrt().max(1e-9) / LOWEST);
+        if ring >= 0.0 && whole(ring) < RINGS {
+            sums[whole(ring)] += f64::from(*value);
+            counts[whole(ring)] += 1.0;
+        }
+    }
+}
+
+/// The exponent of the power law through the rings between whole cells and noise.
+fn slope(rings: &[f64; RINGS]) -> f64 {
+    let known = frequencies().into_iter().zip(*rings);
+    let (x, y): (Vec<f64>, Vec<f64>) = known
+        .filter(|(f, p)| *f >= MEASURED[0] && *f <= MEASURED[1] && p.is_finite())
+        .map(|(f, p)| (libm::log10(f), p))
+        .unzip();
+    line_slope(&x, &y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::{deviation, mean};
+    use portable_numerics::random::below;
+    use rand_core::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn random(count: usize, rng: &mut Xoshiro256PlusPlus) -> Vec<[f64; 2]> {
+        (0..count).map(|_| [below(128_000, rng) as f64 / 100.0, below(96_000, rng) as f64 / 100.0]).collect()
+    }
+
+    #[test]
+    fn points_at_random_have_one_and_one() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
+        let fields: Vec<Vec<[f64; 2]>> = (0..300).map(|_| random(29, &mut rng)).collect();
+        let check = |values: Vec<f64>, what: &str| {
+            let error = deviation(&values) / (values.len() as f64).sqrt();
+            assert!((mean(&values) - 1.0).abs() < 3.5 * error + 0.005, "{what}: {} ± {error}", mean(&values));
+        };
+        check(fields.iter().map(|p| clark_evans(p, 1280.0, 960.0)).collect(), "Clark-Evans");
+        for radius in [50.0, 100.0, 200.0, 300.0] {
+            check(fields.iter().map(|p| ripley(p, 1280.0, 960.0, radius)).collect(), "K");
+        }
+    }
+
+    #[test]
+    fn lattices_are_regular_and_pairs_are_clustered() {
+        let lattice: Vec<[f64; 2]> =
+            (0..48).map(|i| [80.0 + 160.0 * f64::from(i % 8), 80.0 + 160.0 * f64::from(i / 8)]).collect();
+        assert!(clark_evans(&lattice, 1280.0, 960.0) > 1.8);
+        assert_eq!(ripley(&lattice, 1280.0, 960.0, 100.0), 0.0);
+        let pairs: Vec<[f64; 2]> = lattice.iter().flat_map(|p| [*p, [p[0] + 5.0, p[1]]]).collect();
+        assert!(clark_evans(&pairs, 1280.0, 960.0) < 0.1);
+        assert!(ripley(&pairs, 1280.0, 960.0, 20.0) > 5.0);
+        assert!(clark_evans(&lattice[..4], 1280.0, 960.0).is_nan() && ripley(&[], 1.0, 1.0, 1.0).is_nan());
+    }
+
+    #[test]
+    fn white_noise_is_flat_and_has_its_variance() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        // Uniform over ±1: variance 1/3.
+        let image: Vec<f32> = (0..512 * 256).map(|_| single(below(200_001, &mut rng) as f64 / 1e5 - 1.0)).collect();
+        let rings = rings(&image, 512);
+        // From here on a ring has 300 coefficients: an error of 6 %.
+        for ring in &rings[6..] {
+            assert!((ring - libm::log10(1.0 / 3.0)).abs() < 0.08, "{rings:?}");
+        }
+        assert!(slope(&rings).abs() < 0.15);
+    }
+
+    #[test]
+    fn a_wave_is_in_the_ring_of_its_frequency() {
+        let image: Vec<f32> =
+            (0..256 * 256).map(|i| single(libm::sin(std::f64::consts::TAU * 0.11 * (i % 256) as f64))).collect();
+        let rings = rings(&image, 256);
+        let loudest = (0..RINGS).max_by(|a, b| rings[*a].total_cmp(&rings[*b])).unwrap();
+        let middle = frequencies()[loudest];
+        assert!(middle / 0.11 < libm::exp2(0.25) && 0.11 / middle < libm::exp2(0.25), "{middle}");
+    }
+
+    #[test]
+    fn the_slope_is_the_exponent() {
+        let rings = frequencies().map(|f| 1.5 - 3.2 * libm::log10(f));
+        assert!((slope(&rings) + 3.2).abs() < 1e-9);
+        assert!(slope(&[f64::NAN; RINGS]).is_nan());
+    }
 }

@@ -134,14 +134,20 @@ fn what_is_asked_for_in_vain_is_told() {
         MatchParams { pixel: PixelSize::Known(f64::NAN), ..MatchParams::default() },
         MatchParams { pixel: PixelSize::Sought(0.0), ..MatchParams::default() },
     ] {
-        assert!(matches!(Match::new(&params, &base), Err(Error::Parameter { .. })), "{params:?}");
+        assert!(
+            matches!(Match::new(&params, &base), Err(Error::Judge(papsynth_judge::Error::Parameter { .. }))),
+            "{params:?}"
+        );
     }
     let fields = fields(2, NucleiFrom::Search);
     for table in
         [TableParams { recipes: 29, ..TableParams::default() }, TableParams { windows: 0, ..Default::default() }]
     {
         let matching = Match::new(&MatchParams { pixel: PixelSize::Known(PIXEL_UM), table, rounds: 0 }, &base).unwrap();
-        assert!(matches!(matching.run(&fields, &engine, &|_| true), Err(Error::Parameter { .. })));
+        assert!(matches!(
+            matching.run(&fields, &engine, &|_| true),
+            Err(Error::Judge(papsynth_judge::Error::Parameter { .. }))
+        ));
     }
     let stop = |step: Step| !matches!(step, Step::Simulated(3.., _));
     assert_eq!(small(PixelSize::Known(PIXEL_UM), 0).run(&fields, &engine, &stop), Err(Error::Stopped));
