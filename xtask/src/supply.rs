@@ -1,4 +1,4 @@
-//! What comes from others: whether `deny.toml` allows it, and a bill of materials.
+//! What comes from others and what goes to them: whether `deny.toml` allows it, a bill of materials, and packages.
 
 use std::fs;
 use std::path::PathBuf;
@@ -7,71 +7,39 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use crate::arguments::Arguments;
-use crate::chore::{Chore, Outcome};
-use crate::shell;
+use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
-
-pub(crate) const DENY: Chore = Chore {
-    name: "deny",
-    usage: "[ARGUMENTS OF cargo deny check]",
-    about: "checks licences, sources and duplicate versions of dependencies against deny.toml",
-    details: "Runs cargo-deny, which is installed to target/tools. Without arguments it runs `cargo deny check bans licenses sources`, \
-              which needs no other files than those of Cargo; `cargo xtask deny advisories` downloads the database of advisories. Left out, with a sentence, where cargo-deny \
-              cannot be installed; a failure where CI is set.",
-    run: deny,
-};
-
-pub(crate) const SBOM: Chore = Chore {
-    name: "sbom",
-    usage: "",
-    about: "writes the bill of materials of the program, as CycloneDX, to the target folder",
-    details: "CycloneDX 1.5 in JSON, by cargo-cyclonedx, which is installed to target/tools: every crate that `papsynth` is built of, on any platform, with version, licence, \
-              SHA-256 and what it depends on. It holds no dates, serial numbers or paths: the same Cargo.lock gives the same bytes.",
-    run: sbom,
-};
 
 /// The crate whose program is shipped.
 const PROGRAM: &str = "papsynth-cli";
 
-fn deny(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
-    let mut command = match tool(workspace, "cargo-deny", "0.20.2") {
-        Ok(command) => command,
-        Err(reason) => return Outcome::skipped_unless_ci(reason),
-    };
-    let mut checks = arguments.rest();
+pub(crate) fn deny(workspace: &Workspace, checks: &[String]) -> Result<()> {
+    let mut command = tool(workspace, "cargo-deny", "0.20.2")?;
+    command.args(["--locked", "check"]).args(checks);
     if checks.is_empty() {
-        checks = ["bans", "licenses", "sources"].map(str::to_owned).into();
+        command.args(["bans", "licenses", "sources"]);
     }
-    shell::run(command.args(["--locked", "check"]).args(checks))?;
-    Ok(Outcome::Done)
+    shell::run(&mut command)
 }
 
-fn sbom(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
-    arguments.finish()?;
-    match bill(workspace)? {
-        Ok(path) => println!("{}", workspace.shown(&path)),
-        Err(reason) => return Outcome::skipped_unless_ci(reason),
-    }
-    Ok(Outcome::Done)
+pub(crate) fn sbom(workspace: &Workspace) -> Result<()> {
+    println!("{}", workspace.shown(&bill(workspace)?));
+    Ok(())
 }
 
-/// Writes the bill of materials and returns its path, or why it cannot be written.
-pub(crate) fn bill(workspace: &Workspace) -> Result<Result<PathBuf, String>> {
+/// Writes the bill of materials and returns its path.
+pub(crate) fn bill(workspace: &Workspace) -> Result<PathBuf> {
     const NAME: &str = "papsynth.cdx";
-    let mut command = match tool(workspace, "cargo-cyclonedx", "0.5.9") {
-        Ok(command) => command,
-        Err(reason) => return Ok(Err(reason)),
-    };
+    let mut command = tool(workspace, "cargo-cyclonedx", "0.5.9")?;
     command.args(["cyclonedx", "--format", "json", "--spec-version", "1.5", "--all-features", "--target", "all"]);
     // With this variable it writes no serial number.
     shell::run(command.args(["--override-filename", NAME]).env("SOURCE_DATE_EPOCH", "0"))?;
     let mut text = String::new();
     // It writes one file beside the manifest of each member.
     for package in &workspace.packages {
-        let written = package.folder.join(format!("{NAME}.json"));
+        let written = package.folder().join(format!("{NAME}.json"));
         if package.name == PROGRAM {
-            text = fs::read_to_string(&written).with_context(|| format!("cannot read {}", written.display()))?;
+            text = shell::read(&written)?;
         }
         fs::remove_file(&written).with_context(|| format!("cannot remove {}", written.display()))?;
     }
@@ -79,22 +47,40 @@ pub(crate) fn bill(workspace: &Workspace) -> Result<Result<PathBuf, String>> {
     let mut bill: Value = serde_json::from_str(&text).context("the output of cargo-cyclonedx")?;
     bill["metadata"].as_object_mut().and_then(|metadata| metadata.remove("timestamp"));
     let path = workspace.target.join(format!("{NAME}.json"));
-    fs::write(&path, format!("{bill:#}\n")).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(Ok(path))
+    shell::write(&path, &format!("{bill:#}\n"))?;
+    Ok(path)
 }
 
-/// A program that Cargo builds and installs below the target folder, if this version is not there yet; or why it cannot be installed.
-fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command, String> {
+/// A program that Cargo builds and installs below the target folder, if this version is not there yet.
+fn tool(workspace: &Workspace, name: &str, version: &str) -> Result<Command> {
     let root = workspace.target.join("tools");
     let installed = fs::read_to_string(root.join(".crates.toml")).unwrap_or_default();
     if !installed.contains(&format!("\"{name} {version} ")) {
         let mut command = workspace.cargo();
         // Without optimisation, which takes longer than it saves.
         command.args(["install", name, "--version", &format!("={version}"), "--locked", "--debug", "--root"]);
-        let failure = |error| format!("{name} {version} cannot be installed: {error}");
-        shell::run(command.arg(&root)).map_err(failure)?;
+        shell::run(command.arg(&root))
+            .map_err(|error| skipped(format!("{name} {version} cannot be installed: {error}")))?;
     }
     let mut command = Command::new(root.join("bin").join(name));
     command.current_dir(&workspace.root);
     Ok(command)
+}
+
+/// Packs every crate and builds it from its package.
+///
+/// What an earlier run has unpacked and built of our own crates is removed before: Cargo takes it for the same as long as the version is.
+pub(crate) fn publish(workspace: &Workspace) -> Result<()> {
+    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| std::env::home_dir().map(|home| home.join(".cargo"))).unwrap_or_default();
+    for registry in fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten() {
+        // The registry that such a run makes up has no host, so that its name begins with a dash.
+        if registry.file_name().to_string_lossy().starts_with('-') {
+            shell::remove(&registry.path())?;
+        }
+    }
+    let crates = workspace.root.join("crates");
+    let own = workspace.packages.iter().filter(|package| package.folder().starts_with(&crates));
+    shell::run(workspace.cargo().arg("clean").args(own.flat_map(|package| ["--package", &package.name])))?;
+    shell::run(workspace.cargo().args(["publish", "--workspace", "--dry-run", "--allow-dirty"]))
 }

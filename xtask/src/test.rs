@@ -1,36 +1,20 @@
-//! The whole test suite.
+//! The test suite, its golden images, and what takes too long for every change.
 
 use std::process::Command;
 
 use anyhow::Result;
+use clap::Args;
 
-use crate::arguments::Arguments;
-use crate::chore::{Chore, Outcome};
 use crate::shell;
 use crate::workspace::Workspace;
-
-pub(crate) const CHORE: Chore = Chore {
-    name: "test",
-    usage: "[ARGUMENTS OF cargo test]",
-    about: "runs the whole test suite: laws, oracles, golden images, doc tests, programs",
-    details: "Tests run with cargo-nextest if it is installed, otherwise with `cargo test`. Both take a part of a name (`cargo xtask test golden::`) and select targets \
-              (`cargo xtask test --lib`). With arguments, doc tests do not run. Examples are not built: the lints check them.\n\
-              Without PAPSYNTH_REFERENCE, the folder of the real material, the tests that need it are left out and say so. Crates that take long to build are left to \
-              `cargo xtask ci --full`.",
-    run,
-};
-
-fn run(workspace: &Workspace, arguments: Arguments) -> Result<Outcome> {
-    suite(workspace, Workspace::cargo_light, &arguments.rest())
-}
 
 /// Runs tests and, without arguments, doc tests of the packages that `cargo` adds to a subcommand.
 pub(crate) fn suite(
     workspace: &Workspace,
     cargo: fn(&Workspace, &[&str]) -> Command,
     arguments: &[String],
-) -> Result<Outcome> {
-    let has_nextest = shell::answers(workspace.cargo().args(["nextest", "--version"]));
+) -> Result<()> {
+    let has_nextest = shell::succeeds(workspace.cargo().args(["nextest", "--version"]));
     let mut tests = cargo(workspace, if has_nextest { &["nextest", "run"] } else { &["test"] });
     let is_target =
         |word: &String| ["--lib", "--bin", "--test", "--example", "--bench"].iter().any(|t| word.starts_with(t));
@@ -42,5 +26,50 @@ pub(crate) fn suite(
     if arguments.is_empty() {
         shell::run(cargo(workspace, &["test"]).arg("--doc"))?;
     }
-    Ok(Outcome::Done)
+    Ok(())
+}
+
+pub(crate) fn golden(workspace: &Workspace, bless: bool) -> Result<()> {
+    let mut command = workspace.cargo();
+    command.args(["test", "--package", "papsynth", "--test", "it", "golden::"]);
+    shell::run(if bless { command.env("PAPSYNTH_BLESS", "1") } else { &mut command })
+}
+
+#[derive(Args)]
+pub(crate) struct Torture {
+    /// Random moments at which runs are killed and then completed again, once on a disk that is full
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    kills: u64,
+    /// Times that inputs of every fuzz target are changed
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    fuzz: u64,
+    /// Tiny images, which must not need more memory than a tenth of them
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    tiny: u64,
+    /// Windows of a slide that are put together from tiles of three sizes
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    windows: u64,
+}
+
+pub(crate) fn torture(workspace: &Workspace, numbers: &Torture) -> Result<()> {
+    for (package, filter) in [
+        ("papsynth-cli", "sets::whatever_is_killed"),
+        ("papsynth-cli", "sets::a_full_disk"),
+        ("papsynth-dataset", "verifying::damage::every_"),
+        ("papsynth-cli", "hostile::"),
+        ("papsynth-dataset", "corpus::"),
+        ("papsynth-cli", "memory::"),
+        ("papsynth", "slide::windows_of_tiles"),
+        ("ccd-noise", "laws::"),
+    ] {
+        let mut cargo = workspace.cargo();
+        cargo.args(["test", "--release", "--package", package, "--test", "it", filter]);
+        cargo.args(["--", "--nocapture", "--include-ignored"]).env("PAPSYNTH_TORTURE", "1");
+        let Torture { kills, fuzz, tiny, windows } = numbers;
+        for (name, number) in [("KILLS", kills), ("FUZZ", fuzz), ("TINY", tiny), ("WINDOWS", windows)] {
+            cargo.env(format!("PAPSYNTH_{name}"), number.to_string());
+        }
+        shell::run(&mut cargo)?;
+    }
+    Ok(())
 }

@@ -4,16 +4,14 @@ use std::collections::BTreeMap;
 
 use optics_psf::Error as Optics;
 use optics_psf::calibrate::{self, FocusCurve, Line, Window};
-use portable_numerics::statistics::quantile;
+use portable_numerics::statistics::{deviation, quantile};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::calibration::Instrument;
 use crate::condenser::Condenser;
 use crate::error::Error;
 use crate::find;
-use crate::instrument::Instrument;
-use crate::nucleus::Nucleus;
-use crate::statistics::standard_error;
 
 /// σ at which the search of [`calibrate::focus`] ends, px, less a step of it: what reaches it may be wider.
 const WIDEST_PX: f64 = 15.8;
@@ -25,16 +23,17 @@ const LEAST_COMMON: usize = 3;
 const LEAST_NUCLEI: usize = 5;
 
 /// Where the nuclei of a stack lie.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum NucleiAt {
     /// They are found: dark, compact, sharp things.
+    #[default]
     Found,
     /// In these windows, each of which must hold one that can be measured.
     Windows(Vec<Window>),
 }
 
 /// What is known of a focus stack.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FocusParams {
     /// Where its nuclei lie.
     pub nuclei: NucleiAt,
@@ -44,9 +43,23 @@ pub struct FocusParams {
     pub instrument: Option<Instrument>,
 }
 
-impl Default for FocusParams {
-    fn default() -> Self {
-        Self { nuclei: NucleiAt::Found, step_um: None, instrument: None }
+/// One nucleus of a focus stack.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Nucleus {
+    /// Left, top, width, height, pixels.
+    pub window: [usize; 4],
+    /// Its plane in focus, counted from 0.
+    pub focused: usize,
+    /// σ in each plane, pixels.
+    pub sigma_px: Vec<f64>,
+}
+
+impl Nucleus {
+    /// σ in each plane, with the number of planes from focus.
+    pub(crate) fn points(&self) -> impl Iterator<Item = (i64, f64)> {
+        let focused = self.focused.cast_signed() as i64;
+        self.sigma_px.iter().zip(0_i64..).map(move |(sigma, plane)| (plane - focused, *sigma))
     }
 }
 
@@ -223,4 +236,9 @@ fn medians(nuclei: &[Nucleus]) -> Vec<Offset> {
         offsets.iter_mut().for_each(|o| o.fitted = common.contains(&o.planes));
     }
     offsets
+}
+
+/// The standard error of a mean; of one number alone nothing is known, and it is 0.
+pub(crate) fn standard_error(values: &[f64]) -> f64 {
+    if values.len() < 2 { 0.0 } else { deviation(values) / (values.len() as f64).sqrt() }
 }

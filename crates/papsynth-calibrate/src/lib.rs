@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod beyond;
 mod calibration;
 mod camera;
 mod condenser;
@@ -9,20 +8,14 @@ mod edge;
 mod error;
 mod find;
 mod focus;
-mod instrument;
-mod nucleus;
 mod recipe;
-mod statistics;
 
-pub use beyond::{Beyond, beyond};
-pub use calibration::Calibration;
+pub use calibration::{Calibration, Instrument};
 pub use camera::{Camera, Flats, Frame, Level, Saturation};
 pub use ccd_noise::calibrate::Light;
 pub use condenser::{Bound, Condenser};
 pub use edge::{Edge, EdgeAt};
 pub use error::Error;
-pub use focus::{Focus, FocusParams, NucleiAt, Offset, Side};
-pub use instrument::Instrument;
-pub use nucleus::Nucleus;
+pub use focus::{Focus, FocusParams, NucleiAt, Nucleus, Offset, Side};
 pub use optics_psf::calibrate::Window;
 pub use recipe::BEGINS as RECIPE_BEGINS;

@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use optics_psf::MicroscopeParams;
-use papsynth::recipe::Preset;
-use toml::{Table, Value};
+use papsynth::recipe::{Gaussians, Optics, Preset};
+use toml::Value;
 
-use crate::beyond::{Beyond, beyond};
 use crate::calibration::Calibration;
 use crate::camera::Camera;
 use crate::condenser::Bound;
+use crate::edge::beyond;
 use crate::error::Error;
 
 /// The first bytes of every text that [`Calibration`] writes for a recipe.
@@ -75,7 +75,7 @@ impl Calibration {
         let (extra, note) = match &self.edge {
             None => (0.0, "not measured: --edge finds it".to_owned()),
             Some(found) => {
-                let Beyond { expected_px, extra_px } = beyond(found, &params)?;
+                let [expected_px, extra_px] = beyond(found, &params).map_err(Error::Microscope)?;
                 let sigma_px = found.sigma_px;
                 let note =
                     format!("measured: an edge of {sigma_px:.3} px, where the lens alone makes {expected_px:.3} px");
@@ -108,15 +108,20 @@ impl Calibration {
         section.set("kind", "gaussian", "");
         let xy = self.edge.as_ref().map(|edge| [edge.sigma_px, edge.error_px].map(|px| px * instrument.pixel_um));
         let z = z.map(|(focus, scale)| [focus.proportional_px, focus.proportional_error_px].map(|px| px * scale));
-        for (key, found, option) in
-            [("sigma_xy_um", xy, "--edge finds it"), ("sigma_z_um_per_um", z, "--stack with --step-um finds it")]
-        {
+        let paper = match Preset::Paper2015.recipe().optics {
+            Optics::Gaussian(paper) => paper,
+            _ => Gaussians::default(),
+        };
+        for (key, found, paper, option) in [
+            ("sigma_xy_um", xy, paper.sigma_xy_um, "--edge finds it"),
+            ("sigma_z_um_per_um", z, paper.sigma_z_um_per_um, "--stack with --step-um finds it"),
+        ] {
             match found {
                 Some([value, error]) => {
                     section.set(key, round(value, 4), format!("measured: {value:.4} +- {error:.4}"))
                 }
                 None => {
-                    let paper = papers_optics().remove(key).unwrap_or(Value::Float(0.0));
+                    let paper = Value::try_from(paper).unwrap_or(Value::Float(0.0));
                     section.set(key, paper, format!("not measured: the paper's; {option}"));
                 }
             }
@@ -145,12 +150,6 @@ impl Calibration {
         section.set("dark_current_e_per_s", 0.0, "not measured: a part of the offset");
         Some(section.to_toml())
     }
-}
-
-/// The optics of the paper's preset.
-fn papers_optics() -> Table {
-    let recipe: Table = toml::from_str(&Preset::Paper2015.recipe().to_toml()).unwrap_or_default();
-    recipe.get("optics").and_then(Value::as_table).cloned().unwrap_or_default()
 }
 
 /// A number of no more digits than were measured.

@@ -107,18 +107,13 @@ impl Array {
             let start = number.checked_mul(side).filter(|&start| start < end)?;
             Some(start..start.saturating_add(side).min(end))
         };
-        let block = (|| {
-            Some(Block {
-                planes: part(shard.z, self.shard_planes, planes)?,
-                rows: part(shard.y, self.shard, rows)?,
-                columns: part(shard.x, self.shard, columns)?,
-            })
-        })();
-        match block {
-            Some(block) => Ok(block),
-            None => {
-                argument(format!("{shard:?} lies outside an array of {planes} x {rows} x {columns} pixels (z, y, x)"))
-            }
+        match (
+            part(shard.z, self.shard_planes, planes),
+            part(shard.y, self.shard, rows),
+            part(shard.x, self.shard, columns),
+        ) {
+            (Some(planes), Some(rows), Some(columns)) => Ok(Block { planes, rows, columns }),
+            _ => argument(format!("{shard:?} lies outside an array of {planes} x {rows} x {columns} pixels (z, y, x)")),
         }
     }
 

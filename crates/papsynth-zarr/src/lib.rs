@@ -2,10 +2,8 @@
 #![forbid(unsafe_code)]
 
 mod array;
-mod crc32c;
 mod document;
 mod error;
-mod halve;
 mod pyramid;
 mod read;
 mod sample;
@@ -14,8 +12,7 @@ mod shard;
 pub use array::{Array, Block, Shard};
 pub use document::{Channel, Image, Labels, Space, VERSION};
 pub use error::Error;
-pub use halve::{halved, halved_labels};
 pub use pyramid::{Form, Pyramid, Tiling, levels_until};
 pub use read::ShardReader;
-pub use sample::{Kind, Sample};
+pub use sample::{Kind, Sample, halved, halved_labels};
 pub use shard::{ShardEncoder, shard_bytes};

@@ -6,7 +6,6 @@ use std::ops::Range;
 use zstd::bulk::Decompressor;
 
 use crate::array::{Array, Block, Shard};
-use crate::crc32c::crc32c;
 use crate::error::{Error, argument, damaged};
 use crate::sample::Sample;
 use crate::shard::ABSENT;
@@ -45,7 +44,7 @@ impl<R: Read + Seek> ShardReader<R> {
         let mut bytes = vec![0; size];
         file.read_exact(&mut bytes)?;
         let (entries, checksum) = bytes.split_at(size - CHECKSUM);
-        if crc32c(entries).to_le_bytes() != checksum {
+        if crc32c::crc32c(entries).to_le_bytes() != checksum {
             return damaged("the checksum of its index is another".to_owned());
         }
         let number = |bytes: &[u8]| bytes.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
@@ -60,6 +59,7 @@ impl<R: Read + Seek> ShardReader<R> {
     fn check(&self, data: u64) -> Result<(), Error> {
         let (array, block) = (&self.array, &self.block);
         let [rows, columns] = [block.rows.len(), block.columns.len()].map(|side| side.div_ceil(array.chunk));
+        let most = zstd::zstd_safe::compress_bound(array.chunk_bytes()) as u64;
         let mut left = data;
         for (number, &[start, bytes]) in self.index.iter().enumerate() {
             let (column, rest) = (number % array.chunks(), number / array.chunks());
@@ -72,7 +72,7 @@ impl<R: Read + Seek> ShardReader<R> {
             if !is_due {
                 continue;
             }
-            if start.checked_add(bytes).is_none_or(|end| end > data) || bytes > self.most() {
+            if start.checked_add(bytes).is_none_or(|end| end > data) || bytes > most {
                 return damaged(format!(
                     "chunk {number} is said to have {bytes} bytes from {start} on, of {data} in all"
                 ));
@@ -83,11 +83,6 @@ impl<R: Read + Seek> ShardReader<R> {
             }
         }
         if left == 0 { Ok(()) } else { damaged(format!("{left} of its bytes belong to no chunk")) }
-    }
-
-    /// Most bytes of a compressed chunk.
-    fn most(&self) -> u64 {
-        zstd::zstd_safe::compress_bound(self.array.chunk_bytes()) as u64
     }
 
     /// What the shard holds.

@@ -1,4 +1,4 @@
-//! The numbers of an array.
+//! The numbers of an array, and images of half the width and height.
 
 /// The type of an array's numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,51 +54,109 @@ pub trait Sample: Copy + Default + PartialEq + sealed::Sealed {
 
 mod sealed {
     pub trait Sealed {}
-
-    impl Sealed for u8 {}
-    impl Sealed for u16 {}
-    impl Sealed for u32 {}
-    impl Sealed for f32 {}
 }
 
-macro_rules! integer {
-    ($type:ty, $kind:expr) => {
+macro_rules! sample {
+    ($type:ty, $kind:ident, $mean:expr) => {
+        impl sealed::Sealed for $type {}
+
         impl Sample for $type {
-            const KIND: Kind = $kind;
+            const KIND: Kind = Kind::$kind;
 
             fn put(self, out: &mut Vec<u8>) {
                 out.extend_from_slice(&self.to_le_bytes());
             }
 
             fn get(bytes: &[u8]) -> Self {
-                bytes.first_chunk().map_or(0, |bytes| Self::from_le_bytes(*bytes))
+                bytes.first_chunk().map_or_else(Self::default, |bytes| Self::from_le_bytes(*bytes))
             }
 
-            #[expect(clippy::cast_possible_truncation, reason = "a mean is no larger than the largest")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "a mean is no larger than the largest, and rounded once"
+            )]
             fn mean(of: [Self; 4]) -> Self {
-                ((of.iter().map(|&v| u64::from(v)).sum::<u64>() + 2) / 4) as Self
+                $mean(of.map(Into::into)) as Self
             }
         }
     };
 }
 
-integer!(u8, Kind::U8);
-integer!(u16, Kind::U16);
-integer!(u32, Kind::U32);
+sample!(u8, U8, mean);
+sample!(u16, U16, mean);
+sample!(u32, U32, mean);
+sample!(f32, F32, |[a, b, c, d]: [f64; 4]| (a + b + c + d) / 4.0);
 
-impl Sample for f32 {
-    const KIND: Kind = Kind::F32;
+fn mean(of: [u64; 4]) -> u64 {
+    (of.iter().sum::<u64>() + 2) / 4
+}
 
-    fn put(self, out: &mut Vec<u8>) {
-        out.extend_from_slice(&self.to_le_bytes());
+/// An image of half the width and height, each pixel the mean of two by two ([`Sample::mean`]).
+///
+/// `values` are rows of `width` numbers. An odd last row or column counts twice, so that a pixel at the border is the mean of those of
+/// its four that there are, a half upwards, and the result has `width.div_ceil(2)` columns. Blocks that begin at even rows and columns
+/// may be halved one by one: together they are the whole image halved.
+#[must_use]
+pub fn halved<T: Sample>(values: &[T], width: usize) -> Vec<T> {
+    by_fours(values, width, T::mean)
+}
+
+/// The same for labels, of which no mean can be taken: each pixel is the upper left of the four.
+#[must_use]
+pub fn halved_labels<T: Sample>(values: &[T], width: usize) -> Vec<T> {
+    by_fours(values, width, |[upper_left, ..]| upper_left)
+}
+
+fn by_fours<T: Sample>(values: &[T], width: usize, one: impl Fn([T; 4]) -> T) -> Vec<T> {
+    let width = width.max(1);
+    let rows: Vec<&[T]> = values.chunks_exact(width).collect();
+    let mut half = Vec::with_capacity(width.div_ceil(2) * rows.len().div_ceil(2));
+    for pair in rows.chunks(2) {
+        let (upper, lower) = (pair[0], pair[pair.len() - 1]);
+        for (above, below) in upper.chunks(2).zip(lower.chunks(2)) {
+            let last = above.len() - 1;
+            half.push(one([above[0], above[last], below[0], below[last]]));
+        }
+    }
+    half
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn means_are_those_by_hand() {
+        // A half goes up, odd borders count twice.
+        assert_eq!(halved(&[0_u8, 1, 9, 1, 0, 8, 5, 6, 250], 3), [1, 9, 6, 250]);
+        assert_eq!(halved(&[255_u8; 12], 4), [255; 4]);
+        assert_eq!(halved(&[u32::MAX; 4], 2), [u32::MAX]);
+        assert_eq!(halved(&[0.0_f32, 1.0, 2.0, 4.0], 2), [1.75]);
+        assert_eq!(halved_labels(&[1_u32, 2, 3, 4, 5, 6, 7, 8, 9], 3), [1, 3, 7, 9]);
+        assert!(halved::<u8>(&[], 0).is_empty());
     }
 
-    fn get(bytes: &[u8]) -> Self {
-        bytes.first_chunk().map_or(0.0, |bytes| Self::from_le_bytes(*bytes))
-    }
-
-    #[expect(clippy::cast_possible_truncation, reason = "rounded once")]
-    fn mean([a, b, c, d]: [Self; 4]) -> Self {
-        ((f64::from(a) + f64::from(b) + f64::from(c) + f64::from(d)) / 4.0) as Self
+    proptest! {
+        /// Against the sum over the pixels that there are.
+        #[test]
+        fn pixels_are_means_of_those_that_there_are(width in 1_usize..20, height in 1_usize..20, seed in 0_u64..1000) {
+            let at = |x: usize, y: usize| (x as u64 * 7919 + y as u64 * 104_729 + seed * 31) % 65_536;
+            let values: Vec<u16> =
+                (0..width * height).map(|i| u16::try_from(at(i % width, i / width)).unwrap()).collect();
+            let half = halved(&values, width);
+            prop_assert_eq!(half.len(), width.div_ceil(2) * height.div_ceil(2));
+            for (i, &found) in half.iter().enumerate() {
+                let (x, y) = (i % width.div_ceil(2) * 2, i / width.div_ceil(2) * 2);
+                let there: Vec<u64> = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
+                    .into_iter()
+                    .filter(|&[x, y]| x < width && y < height)
+                    .map(|[x, y]| at(x, y))
+                    .collect();
+                let count = there.len() as u64;
+                prop_assert_eq!(u64::from(found), (2 * there.iter().sum::<u64>() + count) / (2 * count));
+            }
+        }
     }
 }

@@ -4,7 +4,6 @@ use zstd::bulk::Compressor;
 use zstd::zstd_safe::CParameter;
 
 use crate::array::{Array, Block, Shard, ZSTD_LEVEL};
-use crate::crc32c::crc32c;
 use crate::error::{Error, argument};
 use crate::sample::Sample;
 
@@ -101,7 +100,7 @@ impl ShardEncoder {
             }
         }
         let mut bytes: Vec<u8> = self.index.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
-        bytes.extend(crc32c(&bytes).to_le_bytes());
+        bytes.extend(crc32c::crc32c(&bytes).to_le_bytes());
         Ok(bytes)
     }
 }

@@ -1,15 +1,12 @@
 //! Instructions of small works, compared with those that are kept.
 
-use std::collections::BTreeMap;
-use std::fs;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::arguments::Arguments;
-use crate::chore::Outcome;
-use crate::shell;
+use crate::shell::{self, skipped};
 use crate::workspace::Workspace;
 
 /// The program that does the works, and the counts that are kept of them.
@@ -29,56 +26,45 @@ const TOLERANCE_PERCENT: f64 = 2.0;
 /// Instructions by name of the work.
 type Counts = BTreeMap<String, u64>;
 
-pub(super) fn run(workspace: &Workspace, mut arguments: Arguments) -> Result<Outcome> {
-    let bless = arguments.flag("--bless");
-    arguments.finish()?;
+pub(crate) fn run(workspace: &Workspace, bless: bool) -> Result<()> {
     let path = workspace.root.join(FILE);
     let compiler = compiler(workspace)?;
-    let mut kept = read(&path)?;
-    if !shell::answers(Command::new("valgrind").arg("--version")) {
-        return Outcome::skipped_unless_ci("valgrind is not installed, which counts instructions".to_owned());
+    let mut kept: BTreeMap<String, Counts> =
+        serde_json::from_str(&shell::read(&path)?).with_context(|| format!("{FILE} is not in order"))?;
+    if !shell::answers("valgrind", "--version") {
+        return Err(skipped("valgrind is not installed, which counts instructions"));
     }
     if !bless && !kept.contains_key(&compiler) {
-        return Outcome::skipped_unless_ci(format!("{FILE} has no counts for {compiler}; --bless adds them"));
+        return Err(skipped(format!("{FILE} has no counts for {compiler}; --bless adds them")));
     }
     let found = count(workspace)?;
-    let old = kept.get(&compiler).cloned().unwrap_or_default();
-    let lines = compare(&old, &found);
+    let lines = compare(kept.get(&compiler).unwrap_or(&Counts::new()), &found);
     println!("\nInstructions, {compiler}:\n\n{}", table(&lines));
     if bless {
         kept.insert(compiler, found);
-        let text = serde_json::to_string_pretty(&kept).context("counts as JSON")?;
-        fs::write(&path, text + "\n").with_context(|| format!("cannot write {FILE}"))?;
+        shell::write(&path, &(serde_json::to_string_pretty(&kept).context("counts as JSON")? + "\n"))?;
         println!("{FILE} holds them now.");
-        return Ok(Outcome::Done);
+        return Ok(());
     }
-    let bad: Vec<&str> = lines.iter().filter(|line| line.verdict.is_bad()).map(|line| line.name.as_str()).collect();
+    let bad: Vec<&str> =
+        lines.iter().filter(|line| line.change.is_none_or(is_more)).map(|line| line.name.as_str()).collect();
     ensure!(
         bad.is_empty(),
         "more than {TOLERANCE_PERCENT} % above what is kept, or not kept at all: {}. `cargo xtask bench counts --bless` takes it as it is",
         bad.join(", ")
     );
-    if lines.iter().any(|line| line.verdict == Verdict::Fewer) {
+    if lines.iter().any(|line| line.change.is_some_and(is_fewer)) {
         println!("Some take fewer instructions than is kept: bless it, so that they stay so.");
     }
-    Ok(Outcome::Done)
+    Ok(())
 }
 
 /// The compiler and the machine it makes programs for.
 fn compiler(workspace: &Workspace) -> Result<String> {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let text = shell::output(Command::new(rustc).arg("-vV").current_dir(&workspace.root))?;
+    let text = shell::output(shell::rustc().arg("-vV").current_dir(&workspace.root))?;
     let after = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).map(str::trim);
     let both = after("release:").zip(after("host:")).with_context(|| format!("`rustc -vV` says {text}"))?;
     Ok(format!("rustc {} {}", both.0, both.1))
-}
-
-fn read(path: &Path) -> Result<BTreeMap<String, Counts>> {
-    match fs::read_to_string(path) {
-        Ok(text) => serde_json::from_str(&text).with_context(|| format!("{FILE} is not in order")),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(BTreeMap::new()),
-        Err(error) => Err(error).with_context(|| format!("cannot read {FILE}")),
-    }
 }
 
 /// Builds the program and runs each of its works under valgrind.
@@ -117,66 +103,45 @@ fn collected(text: &str) -> Option<u64> {
 /// A work, what is kept and what was found.
 struct Line {
     name: String,
+    /// None of a work that is new.
     kept: Option<u64>,
+    /// None of a work that is gone.
     found: Option<u64>,
-    verdict: Verdict,
+    /// The change in per cent.
+    change: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
-    Same,
-    More,
-    Fewer,
-    /// It is not kept yet.
-    New,
-    /// There is no such work any more.
-    Gone,
+fn is_more(change: f64) -> bool {
+    change > TOLERANCE_PERCENT
 }
 
-impl Verdict {
-    fn is_bad(self) -> bool {
-        matches!(self, Self::More | Self::New | Self::Gone)
-    }
+fn is_fewer(change: f64) -> bool {
+    change < -TOLERANCE_PERCENT
 }
 
 fn compare(kept: &Counts, found: &Counts) -> Vec<Line> {
-    let mut names: Vec<&String> = kept.keys().chain(found.keys()).collect();
-    names.sort();
-    names.dedup();
+    let names: BTreeSet<&String> = kept.keys().chain(found.keys()).collect();
     let line = |name: &String| {
         let (kept, found) = (kept.get(name).copied(), found.get(name).copied());
-        let verdict = match (kept, found) {
-            (Some(kept), Some(found)) => match change(kept, found) {
-                change if change > TOLERANCE_PERCENT => Verdict::More,
-                change if change < -TOLERANCE_PERCENT => Verdict::Fewer,
-                _ => Verdict::Same,
-            },
-            (None, _) => Verdict::New,
-            (_, None) => Verdict::Gone,
-        };
-        Line { name: name.clone(), kept, found, verdict }
+        let change = kept.zip(found).map(|(kept, found)| 100.0 * (found as f64 - kept as f64) / kept as f64);
+        Line { name: name.clone(), kept, found, change }
     };
     names.into_iter().map(line).collect()
 }
 
-/// The change in per cent.
-fn change(kept: u64, found: u64) -> f64 {
-    100.0 * (found as f64 - kept as f64) / kept as f64
-}
-
 fn table(lines: &[Line]) -> String {
     let mut text = format!("{:<16} {:>14} {:>14} {:>9}\n", "work", "kept", "found", "change");
-    for Line { name, kept, found, verdict } in lines {
-        let shown = |count: &Option<u64>| count.map_or("-".to_owned(), |count| count.to_string());
-        let change = kept.zip(*found).map_or("-".to_owned(), |(kept, found)| format!("{:+.2} %", change(kept, found)));
-        let words = match verdict {
-            Verdict::Same => "",
-            Verdict::More => "  MORE",
-            Verdict::Fewer => "  fewer: bless it",
-            Verdict::New => "  not kept yet",
-            Verdict::Gone => "  gone",
+    for Line { name, kept, found, change } in lines {
+        let words = match change {
+            Some(change) if is_more(*change) => "  MORE",
+            Some(change) if is_fewer(*change) => "  fewer: bless it",
+            Some(_) => "",
+            None if kept.is_none() => "  not kept yet",
+            None => "  gone",
         };
-        text.push_str(&format!("{name:<16} {:>14} {:>14} {change:>9}{words}\n", shown(kept), shown(found)));
+        let [kept, found] = [kept, found].map(|count| count.map_or("-".to_owned(), |count| count.to_string()));
+        let change = change.map_or("-".to_owned(), |change| format!("{change:+.2} %"));
+        text += &format!("{name:<16} {kept:>14} {found:>14} {change:>9}{words}\n");
     }
     text
 }
@@ -185,16 +150,15 @@ fn table(lines: &[Line]) -> String {
 mod tests {
     use super::*;
 
-    fn counts(pairs: &[(&str, u64)]) -> Counts {
-        pairs.iter().map(|(name, count)| ((*name).to_owned(), *count)).collect()
-    }
-
     #[test]
     fn two_per_cent_more_go_and_more_does_not() {
-        let kept = counts(&[("a", 1000), ("b", 1000), ("c", 1000), ("d", 1000)]);
-        let found = counts(&[("a", 1020), ("b", 1021), ("c", 979), ("e", 5)]);
-        let verdicts: Vec<_> = compare(&kept, &found).iter().map(|line| line.verdict).collect();
-        assert_eq!(verdicts, [Verdict::Same, Verdict::More, Verdict::Fewer, Verdict::Gone, Verdict::New]);
+        let counts = |pairs: [(&str, u64); 4]| pairs.map(|(name, count)| (name.to_owned(), count)).into();
+        let kept = counts([("a", 1000), ("b", 1000), ("c", 1000), ("d", 1000)]);
+        let found = counts([("a", 1020), ("b", 1021), ("c", 979), ("e", 5)]);
+        let table = table(&compare(&kept, &found));
+        let ends = ["change", "+2.00 %", "+2.10 %  MORE", "-2.10 %  fewer: bless it", "-  gone", "-  not kept yet"];
+        assert_eq!(table.lines().count(), ends.len());
+        assert!(table.lines().zip(ends).all(|(line, end)| line.ends_with(end)), "{table}");
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! What was found at which commit: a file of lines, and its picture.
 
 use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
-use std::io::Write;
 use std::process::Command;
 
 use anyhow::{Context, Result};
@@ -27,21 +25,17 @@ pub(super) fn record(workspace: &Workspace, lines: &[Line]) -> Result<()> {
     let line =
         json!({ "commit": commit, "changed": changed, "machine": machine(), "noise": "exact Poisson", "rows": rows });
     let path = workspace.root.join(FILE);
-    let mut file =
-        OpenOptions::new().create(true).append(true).open(&path).with_context(|| format!("cannot open {FILE}"))?;
-    writeln!(file, "{line}").with_context(|| format!("cannot write {FILE}"))?;
-    let history = fs::read_to_string(&path).with_context(|| format!("cannot read {FILE}"))?;
+    let history = format!("{}{line}\n", shell::read(&path)?);
+    shell::write(&path, &history)?;
     let history = history.lines().map(serde_json::from_str).collect::<Result<Vec<Value>, _>>().context(FILE)?;
-    fs::write(workspace.root.join(PICTURE), draw(&history)).with_context(|| format!("cannot write {PICTURE}"))?;
+    shell::write(&workspace.root.join(PICTURE), &draw(&history))?;
     println!("{FILE} has a line more, {PICTURE} was drawn anew.");
     Ok(())
 }
 
 /// What is kept of a row.
 fn value(source: Source, found: &Found) -> Option<Value> {
-    let Found::Figures(figures) = found else {
-        return None;
-    };
+    let figures = found.as_ref().ok()?;
     // Six digits are more than any machine repeats.
     let short = |value: f64| format!("{value:.5e}").parse::<f64>().unwrap_or(value);
     let unit = match source {
@@ -54,7 +48,7 @@ fn value(source: Source, found: &Found) -> Option<Value> {
 
 /// The name of the processor.
 fn machine() -> String {
-    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
     name.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
 }

@@ -1,11 +1,17 @@
-//! Both sides in turn.
+//! Both sides in turn: the Python programs of benches/peers, and ours.
 
 use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use serde::Deserialize;
+use serde_json::Value;
 
 use super::rows::{Growth, Row, Source};
-use super::sides::{Answer, Kernels, Measured, Ours, Peer};
+use crate::shell;
+use crate::workspace::Workspace;
 
 /// Frames and stacks that a process makes for one figure: of the peer, of ours.
 const FRAMES: [usize; 2] = [3, 15];
@@ -18,135 +24,207 @@ const AT_ONCE: [usize; 2] = [6, 60];
 const KERNEL_S: f64 = 0.25;
 
 /// What was found of a row: time in milliseconds, memory in MB, or an exponent.
-#[derive(Clone, Copy)]
-pub(crate) struct Figures {
-    pub(crate) peer: Option<f64>,
-    pub(crate) ours: f64,
+pub(super) struct Figures {
+    pub(super) peer: Option<f64>,
+    pub(super) ours: f64,
 }
 
 impl Figures {
     /// Ours over the peer's.
-    pub(crate) fn ratio(self) -> Option<f64> {
+    pub(super) fn ratio(&self) -> Option<f64> {
         self.peer.map(|peer| self.ours / peer)
+    }
+
+    /// Medians of times in seconds.
+    fn of_times([mut peer, mut ours]: [Vec<f64>; 2]) -> Self {
+        Self { peer: Some(1e3 * median(&mut peer)), ours: 1e3 * median(&mut ours) }
     }
 }
 
 /// A row's figures, or why there are none.
-pub(crate) enum Found {
-    Figures(Figures),
-    Missing(String),
+pub(super) type Found = Result<Figures, String>;
+
+/// Median CPU and wall time of one piece of work, and the peak memory of the process.
+#[derive(Clone, Copy, Deserialize)]
+struct Measured {
+    #[serde(rename = "cpu_med")]
+    cpu_s: f64,
+    #[serde(rename = "wall_med")]
+    wall_s: f64,
+    peak_mb: f64,
 }
 
 /// Everyone who takes part.
-pub(crate) struct Race {
-    peer: Option<Peer>,
-    ours: Ours,
+pub(super) struct Race {
+    /// With the packages of the peer, if they can be had.
+    python: Option<PathBuf>,
+    scripts: PathBuf,
+    scratch: PathBuf,
+    /// The example `peer_workload` of the engine, which images benches/peer.toml.
+    workload: PathBuf,
+    /// The works of papsynth-benches.
+    works: PathBuf,
     /// Programs of kernels, the peer's and ours.
-    kernels: Option<(Kernels, Kernels)>,
+    kernels: Option<[Kernels; 2]>,
     /// Whole programs that were measured already, the peer's and ours.
-    programs: BTreeMap<&'static str, (Measured, Measured)>,
+    programs: BTreeMap<&'static str, [Vec<Measured>; 2]>,
     /// How often both sides are measured.
     turns: usize,
     /// What there is to say below the table.
-    pub(crate) notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 impl Race {
-    pub(crate) fn new(peer: Option<Peer>, ours: Ours, turns: usize) -> Self {
-        Self { peer, ours, kernels: None, programs: BTreeMap::new(), turns, notes: Vec::new() }
+    /// Builds our programs.
+    pub(super) fn new(workspace: &Workspace, python: Option<PathBuf>, turns: usize) -> Result<Self> {
+        let (example, works) = ("peer_workload", "papsynth-benches");
+        shell::run(workspace.cargo().args(["build", "--release", "--package", "papsynth", "--example", example]))?;
+        shell::run(workspace.cargo().args(["build", "--release", "--package", works, "--bin", works]))?;
+        let scratch = workspace.target.join("peers");
+        shell::make(&scratch)?;
+        Ok(Self {
+            python,
+            scripts: workspace.root.join("benches/peers"),
+            scratch,
+            workload: workspace.program("release/examples", example),
+            works: workspace.program("release", works),
+            kernels: None,
+            programs: BTreeMap::new(),
+            turns,
+            notes: Vec::new(),
+        })
     }
 
-    pub(crate) fn row(&mut self, row: &Row) -> Result<Found> {
-        if row.source.needs_peer() && self.peer.is_none() {
-            return Ok(Found::Missing("no peer".to_owned()));
+    pub(super) fn row(&mut self, row: &Row) -> Result<Found> {
+        if self.python.is_none() && !matches!(row.source, Source::TwoThreads | Source::Growth(_)) {
+            return Ok(Err("no peer".to_owned()));
         }
-        let figures = match row.source {
+        Ok(Ok(match row.source {
             Source::Kernel(theirs, ours) => return self.kernel(theirs, ours),
             Source::Program(work) => {
-                let (peer, ours) = self.program(work)?;
-                Figures { peer: Some(1e3 * peer.cpu_s), ours: 1e3 * ours.cpu_s }
+                let both = self.program(work)?;
+                Figures::of_times(both.each_ref().map(|all| all.iter().map(|m| m.cpu_s).collect()))
             }
             Source::Memory(work) => {
-                let (peer, ours) = self.program(work)?;
-                Figures { peer: Some(peer.peak_mb), ours: ours.peak_mb }
+                let both = self.program(work)?;
+                let [peer, ours] = both.each_ref().map(|all| all.iter().map(|m| m.peak_mb).fold(0.0, f64::max));
+                Figures { peer: Some(peer), ours }
             }
-            Source::TwoCores => self.two_cores()?,
-            Source::TwoThreads => self.two_threads()?,
+            Source::TwoCores => Figures::of_times(self.in_turn(
+                |race| Ok(1.0 / race.peer(2, "frame", AT_ONCE[0])?.iter().map(|side| 1.0 / side.wall_s).sum::<f64>()),
+                |race| race.own_frame_s(1, 2),
+            )?),
+            Source::TwoThreads => {
+                Figures::of_times(self.in_turn(|race| race.own_frame_s(2, 1), |race| race.own_frame_s(1, 2))?)
+            }
             Source::Growth(growth) => Figures { peer: None, ours: self.growth(growth)? },
-        };
-        Ok(Found::Figures(figures))
+        }))
     }
 
-    fn peer(&self) -> Result<&Peer> {
-        self.peer.as_ref().context("there is no peer")
+    /// What is found when both sides are measured in turn.
+    fn in_turn<T>(&self, peer: impl Fn(&Self) -> Result<T>, ours: impl Fn(&Self) -> Result<T>) -> Result<[Vec<T>; 2]> {
+        let mut found = [Vec::new(), Vec::new()];
+        for _ in 0..self.turns {
+            found[0].push(peer(self)?);
+            found[1].push(ours(self)?);
+        }
+        Ok(found)
     }
 
     fn kernel(&mut self, theirs: &str, ours: &str) -> Result<Found> {
         if self.kernels.is_none() {
-            self.kernels = Some((self.peer()?.kernels()?, self.ours.kernels()?));
+            self.kernels = Some([Kernels::start(self.python("kernels.py", &self.scratch)?)?, self.own_kernels()?]);
         }
-        let (peer, own) = self.kernels.as_mut().context("they were just started")?;
-        let (mut peer_s, mut own_s) = (Vec::new(), Vec::new());
+        let programs = self.kernels.as_mut().context("they were just started")?;
+        let mut seconds = [Vec::new(), Vec::new()];
         for _ in 0..self.turns {
-            for (program, work, seconds) in [(&mut *peer, theirs, &mut peer_s), (&mut *own, ours, &mut own_s)] {
+            for ((program, work), seconds) in programs.iter_mut().zip([theirs, ours]).zip(&mut seconds) {
                 match program.measure(work, KERNEL_S)? {
-                    Answer::Figures(figures) => seconds.extend(figures),
-                    Answer::Missing(reason) => return Ok(Found::Missing(reason)),
+                    Ok(figures) => seconds.extend(figures),
+                    Err(reason) => return Ok(Err(reason)),
                 }
             }
         }
-        Ok(Found::Figures(Figures { peer: Some(1e3 * median(&mut peer_s)), ours: 1e3 * median(&mut own_s) }))
+        Ok(Ok(Figures::of_times(seconds)))
     }
 
-    fn program(&mut self, work: &'static str) -> Result<(Measured, Measured)> {
-        if let Some(known) = self.programs.get(work) {
-            return Ok(*known);
+    /// Whole programs: `frame` or `stack`.
+    fn program(&mut self, work: &'static str) -> Result<&[Vec<Measured>; 2]> {
+        if !self.programs.contains_key(work) {
+            let [theirs, own] = if work == "stack" { STACKS } else { FRAMES };
+            let both = self.in_turn(
+                |race| race.peer(1, work, theirs)?.first().copied().context("one process was started"),
+                |race| {
+                    let report = shell::output(Command::new(&race.workload).args([work, &own.to_string()]))?;
+                    Ok(serde_json::from_value(shell::last_json(&report)?)?)
+                },
+            )?;
+            self.programs.insert(work, both);
         }
-        let [theirs, own] = if work == "stack" { STACKS } else { FRAMES };
-        let (mut peer, mut ours) = (Vec::new(), Vec::new());
-        for _ in 0..self.turns {
-            peer.push(self.peer()?.measure(work, theirs)?);
-            ours.push(self.ours.measure(work, own)?);
-        }
-        let both = (middle(&peer), middle(&ours));
-        self.programs.insert(work, both);
-        Ok(both)
+        self.programs.get(work).context("it was just measured")
     }
 
-    /// Time of a frame with both cores at work: two threads of ours.
-    fn own_two_threads(&self) -> Result<f64> {
-        Ok(1e3 / self.ours.frames_per_s(1, 2 * AT_ONCE[1], 2)?)
+    /// The peer's whole program in so many processes at the same moment.
+    fn peer(&self, processes: usize, work: &str, repetitions: usize) -> Result<Vec<Measured>> {
+        let folders: Vec<PathBuf> = (0..processes).map(|k| self.scratch.join(format!("process-{k}"))).collect();
+        let start = |folder: &PathBuf| {
+            let mut command = self.python("bench_frame.py", folder)?;
+            command.args(["numba", work, "1", &repetitions.to_string()]).stdout(Stdio::null());
+            command.spawn().context("cannot start Python")
+        };
+        for mut child in folders.iter().map(start).collect::<Result<Vec<_>>>()? {
+            let status = child.wait()?;
+            ensure!(status.success(), "bench_frame.py failed ({status})");
+        }
+        let read = |folder: &PathBuf| {
+            let report = shell::read(&folder.join(format!("peer_out/{work}_numba_t1.json")))?;
+            Ok(serde_json::from_value(shell::last_json(&report)?)?)
+        };
+        folders.iter().map(read).collect()
     }
 
-    fn two_cores(&self) -> Result<Figures> {
-        let (mut peer, mut ours) = (Vec::new(), Vec::new());
-        for _ in 0..self.turns {
-            let sides = self.peer()?.side_by_side(2, "frame", AT_ONCE[0])?;
-            peer.push(1e3 / sides.iter().map(|side| 1.0 / side.wall_s).sum::<f64>());
-            ours.push(self.own_two_threads()?);
-        }
-        Ok(Figures { peer: Some(median(&mut peer)), ours: median(&mut ours) })
+    /// A script of the peer, in a folder.
+    fn python(&self, script: &str, folder: &Path) -> Result<Command> {
+        shell::make(folder)?;
+        let mut command = Command::new(self.python.as_ref().context("there is no peer")?);
+        // What Python compiles goes below the target folder, not beside the sources.
+        command.env("PYTHONPYCACHEPREFIX", self.scratch.join("bytecode"));
+        command.env("NUMBA_CACHE_DIR", self.scratch.join("numba"));
+        command.arg(self.scripts.join(script)).current_dir(folder);
+        Ok(command)
     }
 
-    fn two_threads(&self) -> Result<Figures> {
-        let (mut processes, mut threads) = (Vec::new(), Vec::new());
-        for _ in 0..self.turns {
-            processes.push(1e3 / self.ours.frames_per_s(2, AT_ONCE[1], 1)?);
-            threads.push(self.own_two_threads()?);
-        }
-        Ok(Figures { peer: Some(median(&mut processes)), ours: median(&mut threads) })
+    /// Seconds a frame of ours, while so many processes of so many threads run at the same moment.
+    fn own_frame_s(&self, processes: usize, threads: usize) -> Result<f64> {
+        let frames = AT_ONCE[1] * threads;
+        let start = |_| {
+            let mut command = Command::new(&self.workload);
+            command.args(["throughput", &frames.to_string(), &threads.to_string()]).stdout(Stdio::piped());
+            command.spawn().with_context(|| format!("cannot start {}", self.workload.display()))
+        };
+        let children = (0..processes).map(start).collect::<Result<Vec<_>>>()?;
+        let per_s = children.into_iter().try_fold(0.0, |sum, child| {
+            let report = shell::last_json(&String::from_utf8(child.wait_with_output()?.stdout)?)?;
+            let own = report["frames_per_s"].as_f64();
+            Ok::<_, anyhow::Error>(sum + own.with_context(|| format!("`frames_per_s` is missing from {report}"))?)
+        })?;
+        Ok(1.0 / per_s)
+    }
+
+    fn own_kernels(&self) -> Result<Kernels> {
+        let mut command = Command::new(&self.works);
+        command.arg(&self.scratch);
+        Kernels::start(command)
     }
 
     /// The exponent of time against size, by least squares on logarithms.
     #[expect(clippy::disallowed_methods, reason = "a figure for people, which reaches no pixel")]
     fn growth(&mut self, growth: &Growth) -> Result<f64> {
         // A process of its own, so that the memory of large fields is given back.
-        let mut own = self.ours.kernels()?;
+        let mut own = self.own_kernels()?;
         let (mut points, mut words) = (Vec::new(), Vec::new());
         for &size in growth.sizes {
-            let Answer::Figures(mut figures) = own.measure(&format!("{}-{size}", growth.kind), KERNEL_S)? else {
-                continue;
-            };
+            let Ok(mut figures) = own.measure(&format!("{}-{size}", growth.kind), KERNEL_S)? else { continue };
             let seconds = median(&mut figures);
             words.push(format!("{size}: {:.2} ms", 1e3 * seconds));
             if size >= growth.from {
@@ -163,13 +241,44 @@ impl Race {
     }
 }
 
-/// The median of times, the largest of memory.
-fn middle(all: &[Measured]) -> Measured {
-    let median_of = |value: fn(&Measured) -> f64| median(&mut all.iter().map(value).collect::<Vec<_>>());
-    Measured {
-        cpu_s: median_of(|m| m.cpu_s),
-        wall_s: median_of(|m| m.wall_s),
-        peak_mb: all.iter().map(|m| m.peak_mb).fold(0.0, f64::max),
+/// A program that does the works it is asked for, line by line.
+struct Kernels {
+    child: Child,
+    /// Closed to end the program.
+    asked: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl Kernels {
+    fn start(mut command: Command) -> Result<Self> {
+        let child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+        let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
+        let (asked, answers) = (child.stdin.take(), child.stdout.take());
+        Ok(Self { child, asked, answers: BufReader::new(answers.context("its output is ours")?) })
+    }
+
+    /// Has a work done for about so many seconds: CPU seconds of each time, or why it cannot be done here.
+    fn measure(&mut self, work: &str, seconds: f64) -> Result<Result<Vec<f64>, String>> {
+        let asked = self.asked.as_mut().context("the program was ended")?;
+        writeln!(asked, "{work} {seconds}").with_context(|| format!("cannot ask for `{work}`"))?;
+        asked.flush()?;
+        let mut line = String::new();
+        let read = self.answers.read_line(&mut line)?;
+        ensure!(read > 0, "no answer to `{work}`: its program has ended");
+        let value: Value = serde_json::from_str(&line).with_context(|| format!("`{work}`: no JSON, but `{line}`"))?;
+        if let Some(reason) = value["missing"].as_str() {
+            return Ok(Err(reason.to_owned()));
+        }
+        let figures = serde_json::from_value(value["cpu_s"].clone());
+        Ok(Ok(figures.with_context(|| format!("no figures in {value}"))?))
+    }
+}
+
+impl Drop for Kernels {
+    fn drop(&mut self) {
+        // The end of its input ends it; whether it ended well is of no matter any more.
+        self.asked = None;
+        let _ = self.child.wait();
     }
 }
 

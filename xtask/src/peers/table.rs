@@ -4,85 +4,68 @@ use super::race::{Figures, Found};
 use super::rows::{Row, Source};
 
 /// A row with what was found of it.
-pub(crate) type Line = (&'static Row, Found);
+pub(super) type Line = (&'static Row, Found);
 
-const HEAD: [&str; 8] = ["name", "work", "peer", "peer's", "ours", "ratio", "at most", "try for"];
+/// How a number is written.
+type Text = fn(f64) -> String;
 
-/// How far a figure got.
-#[derive(Debug, PartialEq, Eq)]
-enum Reached {
-    Tried,
-    Wanted,
-    Nothing,
-}
+const HEAD: [&str; 9] = ["name", "work", "peer", "peer's", "ours", "ratio", "at most", "try for", ""];
 
 /// The whole table as text.
-pub(crate) fn text(lines: &[Line]) -> String {
-    let mut cells: Vec<Vec<String>> = vec![HEAD.iter().map(|&word| word.to_owned()).chain([String::new()]).collect()];
+pub(super) fn text(lines: &[Line]) -> String {
+    let mut cells = vec![HEAD.map(str::to_owned)];
     cells.extend(lines.iter().map(|(row, found)| cells_of(row, found)));
-    let width = |column: usize| cells.iter().map(|line| line.get(column).map_or(0, String::len)).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..=HEAD.len()).map(width).collect();
+    let width = |column: usize| cells.iter().map(|line| line[column].len()).max().unwrap_or(0);
+    let widths: [usize; 9] = std::array::from_fn(width);
     let mut text = String::new();
-    for line in cells {
+    for line in &cells {
         let mut words = String::new();
-        for (column, (cell, width)) in line.iter().zip(&widths).enumerate() {
+        for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
             // Words stand to the left, figures to the right.
-            let cell = if (3..8).contains(&column) { format!("{cell:>width$}") } else { format!("{cell:<width$}") };
-            words.push_str(&cell);
-            words.push_str("  ");
+            words += &if (3..8).contains(&column) { format!("{cell:>width$}  ") } else { format!("{cell:<width$}  ") };
         }
-        text.push_str(words.trim_end());
-        text.push('\n');
+        text = text + words.trim_end() + "\n";
     }
     text
 }
 
-fn cells_of(row: &Row, found: &Found) -> Vec<String> {
-    let wanted = |value: f64| match row.source {
-        Source::Memory(_) => format!("{value:.0} MB"),
-        Source::Growth(_) => format!("{value:.2}"),
-        _ => fraction(value),
+fn cells_of(row: &Row, found: &Found) -> [String; 9] {
+    let (wanted, shown): (Text, Text) = match row.source {
+        Source::Memory(_) => (|value| format!("{value:.0} MB"), |value| format!("{value:.1} MB")),
+        Source::Growth(_) => (|value| format!("{value:.2}"), |value| format!("{value:.3}")),
+        _ => (fraction, milliseconds),
     };
-    let mut cells = vec![row.name.to_owned(), row.work.to_owned(), row.peer.to_owned()];
-    match found {
-        Found::Missing(reason) => {
-            cells.extend(["-", "-", "-"].map(str::to_owned));
-            cells.extend([wanted(row.at_most), row.try_for.map_or("-".to_owned(), wanted)]);
-            cells.push(format!("skipped: {reason}"));
-        }
-        Found::Figures(figures) => {
-            let shown = |value: f64| match row.source {
-                Source::Memory(_) => format!("{value:.1} MB"),
-                Source::Growth(_) => format!("{value:.3}"),
-                _ => milliseconds(value),
-            };
-            cells.push(figures.peer.map_or("-".to_owned(), shown));
-            cells.push(shown(figures.ours));
-            cells.push(figures.ratio().map_or("-".to_owned(), fraction));
-            cells.extend([wanted(row.at_most), row.try_for.map_or("-".to_owned(), wanted)]);
-            let words = match reached(row, *figures) {
-                Reached::Tried => "what is tried for",
-                Reached::Wanted => "what is wanted",
-                Reached::Nothing => "NOT YET",
-            };
-            cells.push(words.to_owned());
-        }
-    }
-    cells
+    let or_dash = |value: Option<f64>, text: Text| value.map_or("-".to_owned(), text);
+    let figures = found.as_ref().ok();
+    [
+        row.name.to_owned(),
+        row.work.to_owned(),
+        row.peer.to_owned(),
+        or_dash(figures.and_then(|figures| figures.peer), shown),
+        or_dash(figures.map(|figures| figures.ours), shown),
+        or_dash(figures.and_then(Figures::ratio), fraction),
+        wanted(row.at_most),
+        or_dash(row.try_for, wanted),
+        match found {
+            Ok(figures) => reached(row, figures).to_owned(),
+            Err(reason) => format!("skipped: {reason}"),
+        },
+    ]
 }
 
-fn reached(row: &Row, figures: Figures) -> Reached {
+/// How far a figure got.
+fn reached(row: &Row, figures: &Figures) -> &'static str {
     let figure = match row.source {
         Source::Memory(_) | Source::Growth(_) => Some(figures.ours),
         _ => figures.ratio(),
     };
     let within = |limit: f64| figure.is_some_and(|figure| figure <= limit);
     if row.try_for.is_some_and(within) {
-        Reached::Tried
+        "what is tried for"
     } else if within(row.at_most) {
-        Reached::Wanted
+        "what is wanted"
     } else {
-        Reached::Nothing
+        "NOT YET"
     }
 }
 
@@ -123,9 +106,9 @@ mod tests {
     #[test]
     fn a_row_says_how_far_it_got() {
         let frame = &ROWS[0];
-        let at = |ours| reached(frame, Figures { peer: Some(100.0), ours });
-        assert_eq!([at(2.0), at(4.0), at(6.0)], [Reached::Tried, Reached::Wanted, Reached::Nothing]);
-        let text = text(&[(frame, Found::Missing("no peer".to_owned()))]);
+        let at = |ours| reached(frame, &Figures { peer: Some(100.0), ours });
+        assert_eq!([at(2.0), at(4.0), at(6.0)], ["what is tried for", "what is wanted", "NOT YET"]);
+        let text = text(&[(frame, Err("no peer".to_owned()))]);
         assert!(text.contains("1/20") && text.contains("skipped: no peer"), "{text}");
     }
 }
