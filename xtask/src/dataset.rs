@@ -17,7 +17,7 @@ pub(crate) fn run(workspace: &Workspace) -> Result<()> {
     }
     let [fields, stack] = folders.each_ref().map(|folder| workspace.shown(folder));
     println!(
-        "\nEight labelled fields are in {fields}, a focus stack in {stack}; README.md tells what each of their files is."
+        "\nEight labelled fields are in {fields}, a focus stack in {stack}; crates/papsynth-dataset/README.md names their files."
     );
     Ok(())
 }

@@ -1,6 +1,5 @@
 //! How far synthetic fields are from real ones that nothing was fitted to.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -31,11 +30,10 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
     let folder = workspace.target.join("realism");
     shell::make(&folder)?;
     let halves = halves(&reference.join("cervix93"), &folder)?;
+    let matched = |grade: &str| folder.join(format!("matched-{grade}.toml"));
     let mut table = String::from("fields | recipe | judged | AUC (95 %) | between real halves\n---|---|---|---|---\n");
-    let scanner = folder.join("extended-focus.toml");
-    begin(workspace, "extended-focus", &scanner)?;
     for (grade, name, preset) in GRADES {
-        let matched = folder.join(format!("matched-{grade}.toml"));
+        let matched = matched(grade);
         let mut fit = program(workspace);
         fit.args(["match", "--pixel-um", PIXEL_UM, "--group", grade, "--preset", preset, "--out"]).arg(&matched);
         fit.arg(&halves[0]);
@@ -43,28 +41,24 @@ pub(crate) fn run(workspace: &Workspace, quick: bool) -> Result<()> {
             fit.arg("--quick");
         }
         shell::run(&mut fit)?;
-        let init = folder.join(format!("default-{grade}.toml"));
-        begin(workspace, preset, &init)?;
-        let mut recipes = vec![("default", &init), ("matched", &matched)];
+        let mut recipes = vec![("default", vec!["--preset".into(), preset.into()]), ("matched", vec![matched])];
         if grade == "N" {
-            recipes.push(("extended-focus", &scanner));
+            recipes.push(("extended-focus", vec!["--preset".into(), "extended-focus".into()]));
         }
         for (what, recipe) in recipes {
             let fields = folder.join(format!("fields-{what}-{grade}"));
             // Few real fields are of one slide.
-            let words: [OsString; 5] =
-                [recipe.into(), "--frames".into(), FRAMES.into(), "--set".into(), "slide.fields=1".into()];
-            dataset::generate(program(workspace), &fields, words)?;
+            let words = ["--frames", FRAMES, "--set", "slide.fields=1"].map(PathBuf::from);
+            dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words))?;
             let report = folder.join(format!("report-{what}-{grade}"));
             let mut judge = program(workspace);
             judge.arg("judge").arg(&halves[1]).arg(&fields).arg("--out").arg(&report);
             judge.args(["--pixel-um", PIXEL_UM, "--group", grade]);
             shell::run(&mut judge)?;
-            table.push_str(&judgements(&report, name, what)?);
+            table += &judgements(&report, name, what)?;
         }
     }
-    let matched = folder.join("matched-N.toml");
-    for (what, recipe) in [("default", None), ("matched", Some(&matched))] {
+    for (what, recipe) in [("default", None), ("matched", Some(matched("N")))] {
         table += &match python::environment(workspace, "forest", FOREST) {
             Ok(python) => forest(workspace, &python, &reference, &folder, what, recipe)?,
             Err(reason) if reason.is::<Skipped>() => {
@@ -82,12 +76,6 @@ fn program(workspace: &Workspace) -> Command {
     let mut command = workspace.cargo();
     command.args(["run", "--release", "--package", "papsynth-cli", "--"]);
     command
-}
-
-/// Writes the recipe of a preset anew.
-fn begin(workspace: &Workspace, preset: &str, file: &Path) -> Result<()> {
-    let _ = std::fs::remove_file(file);
-    shell::run(program(workspace).args(["init", "--preset", preset, "--out"]).arg(file))
 }
 
 /// Two folders with every other field of each grade, and what is known of them.
@@ -159,7 +147,7 @@ fn forest(
     reference: &Path,
     folder: &Path,
     what: &str,
-    recipe: Option<&PathBuf>,
+    recipe: Option<PathBuf>,
 ) -> Result<String> {
     let stack = reference.join("focus_stack");
     let fields = folder.join(format!("fields-forest-{what}"));
@@ -174,8 +162,7 @@ fn forest(
         "slide.fields=1",
     ];
     let words = ["--frames", "26"].into_iter().chain(settings.iter().flat_map(|setting| ["--set", setting]));
-    let recipe = recipe.map(OsString::from);
-    dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words.map(OsString::from)))?;
+    dataset::generate(program(workspace), &fields, recipe.into_iter().chain(words.map(PathBuf::from)))?;
     let mut command = Command::new(python);
     command.arg(workspace.root.join("xtask/python/pixel_forest.py")).arg(&fields);
     command.arg(stack.join("extended_focus.png")).arg(stack.join("nuclei.png"));

@@ -38,22 +38,21 @@ pub(crate) fn run(workspace: &Workspace, bless: bool) -> Result<()> {
         return Err(skipped(format!("{FILE} has no counts for {compiler}; --bless adds them")));
     }
     let found = count(workspace)?;
-    let lines = compare(kept.get(&compiler).unwrap_or(&Counts::new()), &found);
-    println!("\nInstructions, {compiler}:\n\n{}", table(&lines));
+    let old = kept.get(&compiler).cloned().unwrap_or_default();
+    let (table, bad) = compare(&old, &found);
+    println!("\nInstructions, {compiler}:\n\n{table}");
     if bless {
         kept.insert(compiler, found);
         shell::write(&path, &(serde_json::to_string_pretty(&kept).context("counts as JSON")? + "\n"))?;
         println!("{FILE} holds them now.");
         return Ok(());
     }
-    let bad: Vec<&str> =
-        lines.iter().filter(|line| line.change.is_none_or(is_more)).map(|line| line.name.as_str()).collect();
     ensure!(
         bad.is_empty(),
         "more than {TOLERANCE_PERCENT} % above what is kept, or not kept at all: {}. `cargo xtask bench counts --bless` takes it as it is",
         bad.join(", ")
     );
-    if lines.iter().any(|line| line.change.is_some_and(is_fewer)) {
+    if table.contains(FEWER) {
         println!("Some take fewer instructions than is kept: bless it, so that they stay so.");
     }
     Ok(())
@@ -100,50 +99,30 @@ fn collected(text: &str) -> Option<u64> {
     (number > 0).then_some(number)
 }
 
-/// A work, what is kept and what was found.
-struct Line {
-    name: String,
-    /// None of a work that is new.
-    kept: Option<u64>,
-    /// None of a work that is gone.
-    found: Option<u64>,
-    /// The change in per cent.
-    change: Option<f64>,
-}
+const FEWER: &str = "  fewer: bless it";
 
-fn is_more(change: f64) -> bool {
-    change > TOLERANCE_PERCENT
-}
-
-fn is_fewer(change: f64) -> bool {
-    change < -TOLERANCE_PERCENT
-}
-
-fn compare(kept: &Counts, found: &Counts) -> Vec<Line> {
-    let names: BTreeSet<&String> = kept.keys().chain(found.keys()).collect();
-    let line = |name: &String| {
-        let (kept, found) = (kept.get(name).copied(), found.get(name).copied());
-        let change = kept.zip(found).map(|(kept, found)| 100.0 * (found as f64 - kept as f64) / kept as f64);
-        Line { name: name.clone(), kept, found, change }
-    };
-    names.into_iter().map(line).collect()
-}
-
-fn table(lines: &[Line]) -> String {
+/// The table, and the names of works that take more, are new or are gone.
+fn compare<'a>(kept: &'a Counts, found: &'a Counts) -> (String, Vec<&'a str>) {
     let mut text = format!("{:<16} {:>14} {:>14} {:>9}\n", "work", "kept", "found", "change");
-    for Line { name, kept, found, change } in lines {
+    let mut bad = Vec::new();
+    for name in kept.keys().chain(found.keys()).collect::<BTreeSet<_>>() {
+        let (kept, found) = (kept.get(name), found.get(name));
+        let change = kept.zip(found).map(|(kept, found)| 100.0 * (*found as f64 - *kept as f64) / *kept as f64);
         let words = match change {
-            Some(change) if is_more(*change) => "  MORE",
-            Some(change) if is_fewer(*change) => "  fewer: bless it",
+            Some(change) if change > TOLERANCE_PERCENT => "  MORE",
+            Some(change) if change < -TOLERANCE_PERCENT => FEWER,
             Some(_) => "",
             None if kept.is_none() => "  not kept yet",
             None => "  gone",
         };
-        let [kept, found] = [kept, found].map(|count| count.map_or("-".to_owned(), |count| count.to_string()));
+        if !["", FEWER].contains(&words) {
+            bad.push(name.as_str());
+        }
+        let [kept, found] = [kept, found].map(|count| count.map_or("-".to_owned(), u64::to_string));
         let change = change.map_or("-".to_owned(), |change| format!("{change:+.2} %"));
         text += &format!("{name:<16} {kept:>14} {found:>14} {change:>9}{words}\n");
     }
-    text
+    (text, bad)
 }
 
 #[cfg(test)]
@@ -155,7 +134,8 @@ mod tests {
         let counts = |pairs: [(&str, u64); 4]| pairs.map(|(name, count)| (name.to_owned(), count)).into();
         let kept = counts([("a", 1000), ("b", 1000), ("c", 1000), ("d", 1000)]);
         let found = counts([("a", 1020), ("b", 1021), ("c", 979), ("e", 5)]);
-        let table = table(&compare(&kept, &found));
+        let (table, bad) = compare(&kept, &found);
+        assert_eq!(bad, ["b", "d", "e"]);
         let ends = ["change", "+2.00 %", "+2.10 %  MORE", "-2.10 %  fewer: bless it", "-  gone", "-  not kept yet"];
         assert_eq!(table.lines().count(), ends.len());
         assert!(table.lines().zip(ends).all(|(line, end)| line.ends_with(end)), "{table}");
