@@ -138,10 +138,8 @@ fn files(
 
 /// Whether a file is one of a format that keeps many frames in a file.
 fn is_sharded(path: &str) -> bool {
-    Format::ALL
-        .into_iter()
-        .filter(|format| format.is_sharded())
-        .any(|format| path.split('/').next() == Some(format.name()))
+    let first = path.split('/').next();
+    Format::ALL.into_iter().any(|format| format.is_sharded() && first == Some(format.name()))
 }
 
 fn add(sums: &mut BTreeMap<String, u64>, counts: BTreeMap<String, u64>) {
@@ -261,7 +259,7 @@ fn contact_sheet(dataset: &Dataset, shards: &[u64]) -> Result<Vec<u8>, Error> {
         folder.release(record.files.iter().map(|file| file.path.as_str()));
         left = left.saturating_sub(record.frames.len());
     }
-    sheet.into_picture().to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
+    sheet.picture.to_png().map_err(Error::io("encode", &folder.path(names::SHEET)))
 }
 
 /// The head, then every file: those of no shard, then shard by shard, each record after the files it vouches for.

@@ -169,7 +169,7 @@ fn edge(mask: &Mask) -> Vec<[u32; 2]> {
 
 /// Small pictures of the first frames with their truth, side by side, each under its name.
 pub(crate) struct ContactSheet {
-    picture: Picture,
+    pub(crate) picture: Picture,
     frames: usize,
 }
 
@@ -202,10 +202,6 @@ impl ContactSheet {
         self.picture.write(name, x, y);
         let [width, height] = fitted([image.width, image.height()], Self::SIZE);
         self.picture.draw(image, white, masks, Place { x, y: y + Self::CAPTION, width, height });
-    }
-
-    pub(crate) fn into_picture(self) -> Picture {
-        self.picture
     }
 }
 

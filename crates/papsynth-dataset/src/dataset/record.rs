@@ -117,24 +117,23 @@ impl ShardRecord {
     fn check_frames(&self) -> Result<(), Problem> {
         let each = self.layout.frames_per_shard;
         let room = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);
-        let wrong = |index: u64, what: &str| Err(json(format!("frame {index}: {what}")));
         let mut before = None;
         for frame in &self.frames {
             let FrameSummary { index, width, height, bits, channels, .. } = *frame;
-            let side = 1..=LARGEST_SIDE_PX;
-            if !room.contains(&index) || before.is_some_and(|before| before >= index) {
-                return wrong(index, "is none of this shard, or not in order");
-            }
-            if !side.contains(&width) || !side.contains(&height) {
-                return wrong(index, &format!("{width} x {height} pixels; expected 1 to {LARGEST_SIDE_PX} a side"));
-            }
-            if ![1, 3].contains(&channels) || !(1..=16).contains(&bits) {
-                return wrong(index, &format!("{channels} channels of {bits} bits; expected 1 or 3 of 1 to 16"));
-            }
-            if frame.planes_um.is_empty() || frame.planes_um.len() > MOST_PLANES {
-                return wrong(index, &format!("{} planes; expected 1 to {MOST_PLANES}", frame.planes_um.len()));
-            }
-            before = Some(index);
+            let (side, planes) = (1..=LARGEST_SIDE_PX, frame.planes_um.len());
+            let wrong = if !room.contains(&index) || before.is_some_and(|before| before >= index) {
+                "is none of this shard, or not in order".to_owned()
+            } else if !side.contains(&width) || !side.contains(&height) {
+                format!("{width} x {height} pixels; expected 1 to {LARGEST_SIDE_PX} a side")
+            } else if ![1, 3].contains(&channels) || !(1..=16).contains(&bits) {
+                format!("{channels} channels of {bits} bits; expected 1 or 3 of 1 to 16")
+            } else if !(1..=MOST_PLANES).contains(&planes) {
+                format!("{planes} planes; expected 1 to {MOST_PLANES}")
+            } else {
+                before = Some(index);
+                continue;
+            };
+            return Err(json(format!("frame {index}: {wrong}")));
         }
         Ok(())
     }

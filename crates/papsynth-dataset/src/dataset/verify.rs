@@ -190,7 +190,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>,
     match (named, &dataset.map) {
         (Some(named), None) => flaws.push(Finding::made_wrong(named, "is missing from the list of files")),
         (_, Some(kept)) if named != Some(kept) => {
-            flaws.push(Finding::made_wrong(kept, "follows neither from recipe nor from shards"))
+            flaws.push(Finding::made_wrong(kept, "follows neither from recipe nor from shards"));
         }
         // The name of a map begins with the hash of its content.
         (Some(named), Some(_))

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::fault;
 use super::pending::{FileRecord, Output, Pending, is_temporary};
 use super::store::{Home, Remote};
-use crate::bytes::{measure, sha256};
+use crate::bytes::measure;
 use crate::error::{Error, Problem};
 
 /// How carefully files are looked at.
@@ -163,7 +163,7 @@ impl Folder {
 
     /// Writes a whole file, unless there is one of the same content.
     pub(crate) fn keep(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
-        let record = FileRecord { path: name.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) };
+        let record = FileRecord::of(name, bytes);
         if self.flaw(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
     }
 

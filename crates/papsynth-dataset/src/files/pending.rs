@@ -25,6 +25,12 @@ pub struct FileRecord {
     pub sha256: String,
 }
 
+impl FileRecord {
+    pub(crate) fn of(path: &str, bytes: &[u8]) -> Self {
+        Self { path: path.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) }
+    }
+}
+
 const TEMPORARY_ENDING: &str = ".tmp";
 
 /// Whether a file of this name is one that was never finished.
@@ -87,7 +93,7 @@ impl Pending {
         let written = self.handle()?.write_all(bytes).and_then(|()| fault::sync(&self.file));
         written.map_err(Error::io("write", &self.path))?;
         self.rename()?;
-        Ok(FileRecord { path: self.name.clone(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
+        Ok(FileRecord::of(&self.name, bytes))
     }
 
     /// As [`commit`](Self::commit), if there is no such file. Says whether there was none.

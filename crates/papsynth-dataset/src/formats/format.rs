@@ -103,14 +103,12 @@ impl Format {
     }
 
     /// Whether it keeps many frames in a file.
-    #[must_use]
-    pub fn is_sharded(self) -> bool {
+    pub(crate) fn is_sharded(self) -> bool {
         matches!(self, Self::Webdataset | Self::Huggingface)
     }
 
     /// Whether it has room for one object of a group a pixel.
-    #[must_use]
-    pub fn is_flat(self) -> bool {
+    pub(crate) fn is_flat(self) -> bool {
         matches!(self, Self::Cellpose | Self::Stardist)
     }
 

@@ -132,8 +132,7 @@ impl SlideHead {
     }
 
     /// The SHA-256 of `slide.json`.
-    #[must_use]
-    pub fn sha256(&self) -> String {
+    pub(super) fn sha256(&self) -> String {
         sha256(&self.to_json())
     }
 

@@ -3,11 +3,10 @@
 use std::collections::BTreeSet;
 
 use papsynth::truth::Group;
-use papsynth_zarr::{Array, Pyramid};
+use papsynth_zarr::Shard;
 
-use super::record::{HEAD, LAYERS, folder};
+use super::record::{Forms, HEAD, LAYERS, folder};
 use super::set::{CARD, SlideSet, THUMBNAIL, UPPER, name_of, place, record_name};
-use crate::bytes::sha256;
 use crate::dataset::Finding;
 use crate::error::Error;
 use crate::files::{Check, FileRecord};
@@ -70,34 +69,28 @@ impl SlideSet {
 
     /// The names of the files that a record must name.
     fn vouched_for(&self, record: &str) -> Vec<String> {
-        let Some(at) = self.all().find(|&at| record_name(at) == record) else {
-            let upper = |labels: Option<&str>, pyramid: &Pyramid| {
-                let levels = pyramid.levels().iter().enumerate().skip(pyramid.with_shard());
-                let files = |(level, array): (usize, &Array)| {
-                    array.shards().map(|shard| format!("{}/{}", folder(labels, level), array.file(shard))).collect()
+        let at = self.all().find(|&at| record_name(at) == record);
+        let mut names = match at {
+            Some(at) => {
+                ["csv", "geojson", "parquet"].map(|ending| format!("objects/{}.{ending}", name_of(at))).to_vec()
+            }
+            None => vec![CARD.to_owned(), THUMBNAIL.to_owned()],
+        };
+        let Forms { image, labels, layers } = &self.forms;
+        let labels = Group::ALL.map(|group| (Some(group.name()), labels));
+        for (labels, pyramid) in labels.into_iter().chain([(None, image), (Some(LAYERS), layers)]) {
+            for (level, array) in pyramid.levels().iter().enumerate() {
+                let shards: Vec<Shard> = match at {
+                    Some(at) if level < pyramid.with_shard() => {
+                        (0..array.shape()[1]).map(|plane| place(at, plane)).collect()
+                    }
+                    None if level >= pyramid.with_shard() => array.shards().collect(),
+                    _ => continue,
                 };
-                levels.flat_map::<Vec<String>, _>(files).collect()
-            };
-            return [vec![CARD.to_owned(), THUMBNAIL.to_owned()], self.of_arrays(upper)].concat();
-        };
-        let square = |labels: Option<&str>, pyramid: &Pyramid| {
-            let planes = if labels.is_none() { self.head.planes_um.len() } else { 1 };
-            let levels = pyramid.levels().iter().enumerate().take(pyramid.with_shard());
-            let files = |(level, array): (usize, &Array)| {
-                let name = |plane| format!("{}/{}", folder(labels, level), array.file(place(at, plane)));
-                (0..planes).map(name).collect()
-            };
-            levels.flat_map::<Vec<String>, _>(files).collect()
-        };
-        let objects = ["csv", "geojson", "parquet"].map(|ending| format!("objects/{}.{ending}", name_of(at)));
-        [objects.to_vec(), self.of_arrays(square)].concat()
-    }
-
-    /// What is told of the pyramids of the picture and of all labels.
-    fn of_arrays(&self, tell: impl Fn(Option<&str>, &Pyramid) -> Vec<String>) -> Vec<String> {
-        let labels = Group::ALL.iter().map(|group| tell(Some(group.name()), &self.forms.labels));
-        let others = [tell(None, &self.forms.image), tell(Some(LAYERS), &self.forms.layers)];
-        labels.chain(others).flatten().collect()
+                names.extend(shards.into_iter().map(|at| format!("{}/{}", folder(labels, level), array.file(at))));
+            }
+        }
+        names
     }
 
     fn record_names(&self) -> impl Iterator<Item = String> + use<> {
@@ -110,13 +103,8 @@ impl SlideSet {
 
     /// The files that are no shard's: what they must be follows from `slide.json`.
     fn given(&self) -> Result<Vec<FileRecord>, Error> {
-        let file = |path: &str, bytes: &[u8]| FileRecord {
-            path: path.to_owned(),
-            bytes: bytes.len() as u64,
-            sha256: sha256(bytes),
-        };
-        let mut files = vec![file(HEAD, &self.head.to_json())];
-        files.extend(self.documents()?.iter().map(|(path, bytes)| file(path, bytes)));
+        let mut files = vec![FileRecord::of(HEAD, &self.head.to_json())];
+        files.extend(self.documents()?.iter().map(|(path, bytes)| FileRecord::of(path, bytes)));
         for (path, sha256) in
             [(names::RECIPE, &self.head.identity.recipe_sha256), (names::MODEL, &self.head.identity.model_sha256)]
         {
