@@ -2,7 +2,7 @@ use rand_core::Rng;
 
 use crate::bloom::spread;
 use crate::chain::{Chain, Marker, expose_row, gather_row, mean_row, read_row};
-use crate::field::{NoiseField, whole_rows};
+use crate::field::{NoiseField, rows, whole_rows};
 use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
 /// A camera: photo-electrons in, grey levels out (Eq. 13 without its optics).
@@ -49,7 +49,7 @@ pub struct Exposure {
 }
 
 /// Variance of rounding to whole grey levels.
-const ROUNDING: f64 = 1.0 / 12.0;
+pub(crate) const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Camera {
     /// Checks the parameters.
@@ -211,11 +211,11 @@ impl Camera {
         assert_eq!(out.len(), electrons.len(), "out has the wrong number of pixels");
         let (field, chain) = (NoiseField::new(key), &self.chain);
         let pattern = |y| chain.pattern.as_ref().map(|pattern| pattern.row(y));
-        let (rows, mut exposure) = (electrons.chunks_exact(width), Exposure::default());
+        let (light, mut exposure) = (electrons.chunks_exact(width), Exposure::default());
         if let (Blooming::On { vertical, anti_blooming }, None) = (self.params.blooming, origin) {
             let full_well = chain.full_well as u32;
             let mut charge = vec![0; electrons.len()];
-            for (y, (electrons, charge)) in (0..).zip(rows.zip(charge.chunks_exact_mut(width))) {
+            for (y, (electrons, charge)) in (0..).zip(light.zip(charge.chunks_exact_mut(width))) {
                 gather_row(chain, &field.row(y), pattern(y).as_ref(), electrons, charge);
             }
             exposure = spread(&mut charge, width, full_well, vertical, anti_blooming);
@@ -226,7 +226,7 @@ impl Camera {
             }
         } else {
             let origin = origin.unwrap_or_default();
-            for (y, (electrons, out)) in crate::field::rows(origin).zip(rows.zip(out.chunks_exact_mut(width))) {
+            for (y, (electrons, out)) in rows(origin).zip(light.zip(out.chunks_exact_mut(width))) {
                 let marker = &mut Marker { y, runs: runs.as_deref_mut() };
                 let pattern = pattern(y);
                 exposure.saturated +=

@@ -1,5 +1,3 @@
-use crate::params::{Error, require};
-
 /// One peak of a spectrum: a Gaussian with a width of its own on either side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lobe {
@@ -40,15 +38,6 @@ pub enum Lamp {
 }
 
 impl Lamp {
-    pub(crate) fn check(self) -> Result<(), Error> {
-        match self {
-            Self::Halogen { temperature_k: t } => {
-                require("lamp.temperature_k", t, (1e3..=1e4).contains(&t), "from 1000 to 10000")
-            }
-            Self::Led | Self::Even => Ok(()),
-        }
-    }
-
     /// Power at a wavelength, in a unit of its own.
     pub(crate) fn power(self, wavelength_um: f64) -> f64 {
         match self {

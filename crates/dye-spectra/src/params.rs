@@ -68,7 +68,9 @@ impl Default for ColourParams {
 impl ColourParams {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let Self { lamp, sensor: _, from_um, to_um, wavelengths, mixing: _ } = *self;
-        lamp.check()?;
+        if let Lamp::Halogen { temperature_k: t } = lamp {
+            require("lamp.temperature_k", t, (1e3..=1e4).contains(&t), "from 1000 to 10000")?;
+        }
         require("to_um", to_um, to_um > 0.40 && to_um <= 0.70, "above 0.40 and at most 0.70")?;
         require("from_um", from_um, from_um >= 0.40 && from_um < to_um, "at least 0.40 and below to_um")?;
         require("wavelengths", wavelengths as f64, (1..=1024).contains(&wavelengths), "from 1 to 1024")

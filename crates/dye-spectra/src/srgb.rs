@@ -112,8 +112,8 @@ fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {
 
 #[cfg(feature = "image")]
 impl crate::Colour {
-    /// The picture that a screen shows: light of [`transmittance_into`](Self::transmittance_into), row by row of `width`, by the matrix
-    /// [`to_srgb`](Self::to_srgb) and the curve [`encode_srgb`].
+    /// The picture that a screen shows: light of [`transmittance_into`](Self::transmittance_into), row by row of `width`,
+    /// by the matrix [`to_srgb`](Self::to_srgb) and the curve [`encode_srgb`].
     ///
     /// ```
     /// use dye_spectra::{Colour, ColourParams, Dye, amounts};

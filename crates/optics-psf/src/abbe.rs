@@ -107,13 +107,6 @@ struct Plane {
     scratch: PlaneScratch<f64, 8>,
 }
 
-impl Plane {
-    /// Spectrum of the field.
-    fn forward(&mut self) {
-        self.plan.forward(&self.field, &mut self.spectrum, &mut self.scratch);
-    }
-}
-
 impl Abbe {
     /// Checks the grid, whose samples lie [`Microscope::pitch_um`] apart.
     ///
@@ -166,7 +159,7 @@ impl Abbe {
             spectrum: vec![Complex64::ZERO; samples],
             scratch: PlaneScratch::default(),
         };
-        plane.forward();
+        plane.plan.forward(&plane.field, &mut plane.spectrum, &mut plane.scratch);
         let entering = plane.spectrum.clone();
         let mut image = vec![0.0; samples];
         for band in self.microscope.bands() {
@@ -204,7 +197,7 @@ impl Abbe {
                 for (value, &[re, im]) in plane.field.iter_mut().zip(&layer.amplitude) {
                     *value *= Complex64::new(re, im) / samples;
                 }
-                plane.forward();
+                plane.plan.forward(&plane.field, &mut plane.spectrum, &mut plane.scratch);
             }
             self.filter(plane, s, lens.objective + RIM, |f| lens.passes(square(f)).then(|| lens.waves(f)));
             let share = share / (samples * samples);

@@ -7,8 +7,8 @@ use crate::Microscope;
 use crate::lane_plane::{LANES, Lanes};
 use crate::transfer::{SIDED_SAMPLES, Transfer, corners};
 
-/// Up to this distance from focus, and from that one on, µm of mountant: the correction of the
-/// in-focus form is whole, and gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
+/// Up to this distance from focus, and from that one on, µm of mountant: the correction of the in-focus form is whole, and
+/// gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
 const CORRECTED_UM: [f64; 2] = [1.0, 2.0];
 
 /// The part of the correction that is lost under a full aperture. It says how light that is scattered twice interferes,
@@ -180,16 +180,18 @@ fn add_restored(table: &Table, focused: &Table, at: Block<'_>, spectrum: &[Lanes
 #[inline(always)]
 fn accumulate(weights: &[f32; LANES], k: usize, spectrum: &[Lanes], sum: &mut [Lanes]) {
     let [last_from, last_to] = [spectrum.len() - k, sum.len() - k];
-    let mut weigh = |from: usize, to: usize| {
-        for (to, from) in sum[to].iter_mut().zip(&spectrum[from]) {
-            for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
-                *to += from * weight;
-            }
-        }
-    };
-    weigh(k, k);
+    weigh(weights, &spectrum[k], &mut sum[k]);
     if k > 0 {
-        weigh(last_from, last_to);
+        weigh(weights, &spectrum[last_from], &mut sum[last_to]);
+    }
+}
+
+#[inline(always)]
+fn weigh(weights: &[f32; LANES], from: &Lanes, to: &mut Lanes) {
+    for (to, from) in to.iter_mut().zip(from) {
+        for ((to, from), weight) in to.iter_mut().zip(from).zip(weights) {
+            *to += from * weight;
+        }
     }
 }
 

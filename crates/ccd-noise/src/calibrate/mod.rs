@@ -4,6 +4,7 @@ mod level;
 
 pub use level::{Level, Light};
 
+use crate::camera::ROUNDING;
 use crate::error::{Error, require, within};
 use crate::{CameraParams, ReadNoise};
 use level::measure;
@@ -104,9 +105,6 @@ const FALLEN: f64 = 0.8;
 
 /// Beyond this share of pixels at level 0 a dark frame is cut off (EMVA 1288: 0.5 %).
 const CUT_OFF: f64 = 0.005;
-
-/// Variance of rounding to whole grey levels.
-const ROUNDING: f64 = 1.0 / 12.0;
 
 impl PhotonTransfer {
     /// Checks the parameters.
