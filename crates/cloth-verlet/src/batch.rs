@@ -2,7 +2,7 @@
 
 use crate::lanes::{Binding, Curve, Lane, Node, advance, confine, project, single, verlet};
 use crate::mesh::{Disc, Pair};
-use crate::outline::distance;
+use crate::outline::{Outline, distance};
 use crate::ring::{Ring, View};
 use crate::{Point, VerletParams, Vertex, XpbdParams};
 
@@ -36,13 +36,15 @@ impl Topology {
 /// One sheet before it is pressed, in units of its outline's equivalent radius.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
+    /// What it is pressed into, and where round that its first rim vertex stands.
+    pub(crate) shape: Outline,
+    pub(crate) offset: f64,
     pub(crate) rest: Vec<Point>,
     pub(crate) heights: Vec<f64>,
     /// The outline before and after.
     pub(crate) outline: [Vec<Point>; 2],
 }
 
-/// The state of `L` sheets.
 #[derive(Debug)]
 pub(crate) struct Batch<const L: usize> {
     now: Vec<Node<L>>,
@@ -81,7 +83,6 @@ impl<const L: usize> Batch<L> {
         }
     }
 
-    /// The vertices of one lane.
     pub(crate) fn lane(&self, l: usize) -> Vec<Vertex> {
         self.now.iter().map(|n| n.map(|lane| f64::from(lane[l]))).collect()
     }

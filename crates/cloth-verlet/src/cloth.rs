@@ -29,13 +29,6 @@ pub struct Job<'a> {
     pub excess: f64,
 }
 
-/// An outline on its way to a sheet.
-struct Task {
-    outline: Outline,
-    start: Start,
-    offset: f64,
-}
-
 impl Cloth {
     /// Builds the mesh: the same for the same number of vertices.
     ///
@@ -56,16 +49,12 @@ impl Cloth {
     ///
     /// If the outline has fewer than 3 points, one that is not finite, or no area.
     pub fn crumple<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Sheet, Error> {
-        let task = self.task(Job { outline, excess: self.params.excess }, rng)?;
-        self.solved(&[&task]).pop().ok_or(Error::TooFewPoints { points: 0 })
+        let start = self.start(Job { outline, excess: self.params.excess }, rng)?;
+        self.solved(&[&start]).pop().ok_or(Error::TooFewPoints { points: 0 })
     }
 
     /// Presses sheets into outlines, each with its own source of random numbers, many at a time: the quick way.
-    /// Each result is that of [`Cloth::crumple`], bit by bit.
-    ///
-    /// # Errors
-    ///
-    /// Each outline has its own result; see [`Cloth::crumple`].
+    /// Each result, or error, is that of [`Cloth::crumple`], bit by bit.
     ///
     /// # Panics
     ///
@@ -78,53 +67,46 @@ impl Cloth {
 
     /// The same, each sheet with an excess of its own.
     ///
-    /// # Errors
-    ///
-    /// Each sheet has its own result; see [`Cloth::crumple`].
-    ///
     /// # Panics
     ///
     /// If there are not as many sources as sheets.
     pub fn crumple_each<R: Rng>(&self, jobs: &[Job<'_>], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
         assert_eq!(jobs.len(), rngs.len(), "each outline needs its own source of random numbers");
-        let tasks: Vec<Result<Task, Error>> = jobs.iter().zip(rngs).map(|(job, rng)| self.task(*job, rng)).collect();
-        let good: Vec<&Task> = tasks.iter().flatten().collect();
+        let starts: Vec<Result<Start, Error>> = jobs.iter().zip(rngs).map(|(job, rng)| self.start(*job, rng)).collect();
+        let good: Vec<&Start> = starts.iter().flatten().collect();
         let mut sheets = good.chunks(LANES).flat_map(|chunk| self.solved(chunk));
-        let mut next = |_: &Task| sheets.next().ok_or(Error::TooFewPoints { points: 0 });
-        tasks.iter().map(|task| task.as_ref().map_err(Error::clone).and_then(&mut next)).collect()
+        let mut next = |_: &Start| sheets.next().ok_or(Error::TooFewPoints { points: 0 });
+        starts.iter().map(|start| start.as_ref().map_err(Error::clone).and_then(&mut next)).collect()
     }
 
-    fn task<R: Rng + ?Sized>(&self, job: Job<'_>, rng: &mut R) -> Result<Task, Error> {
+    fn start<R: Rng + ?Sized>(&self, job: Job<'_>, rng: &mut R) -> Result<Start, Error> {
         check_excess(job.excess)?;
-        let outline = Outline::new(job.outline)?;
-        let (start, offset) = rest::start(&self.disc, &outline, job.excess, &self.params, rng);
-        Ok(Task { outline, start, offset })
+        Ok(rest::start(&self.disc, Outline::new(job.outline)?, job.excess, &self.params, rng))
     }
 
-    /// Up to [`LANES`] tasks.
-    fn solved(&self, tasks: &[&Task]) -> Vec<Sheet> {
-        if tasks.len() <= FEW {
-            tasks.iter().map(|task| self.finished(task, &self.run::<1>(&[task]).lane(0))).collect()
+    /// Up to [`LANES`] sheets.
+    fn solved(&self, starts: &[&Start]) -> Vec<Sheet> {
+        if starts.len() <= FEW {
+            starts.iter().map(|start| self.finished(start, &self.run::<1>(&[start]).lane(0))).collect()
         } else {
-            let batch = self.run::<LANES>(tasks);
-            tasks.iter().enumerate().map(|(l, task)| self.finished(task, &batch.lane(l))).collect()
+            let batch = self.run::<LANES>(starts);
+            starts.iter().enumerate().map(|(l, start)| self.finished(start, &batch.lane(l))).collect()
         }
     }
 
-    fn run<const L: usize>(&self, tasks: &[&Task]) -> Batch<L> {
-        let starts: Vec<&Start> = tasks.iter().map(|t| &t.start).collect();
-        let mut batch = Batch::new(&self.topology, &starts);
+    fn run<const L: usize>(&self, starts: &[&Start]) -> Batch<L> {
+        let mut batch = Batch::new(&self.topology, starts);
         solve(&mut batch, &self.topology, &self.params);
         batch
     }
 
-    fn finished(&self, task: &Task, vertices: &[Vertex]) -> Sheet {
-        let mut sheet = self.refinement.apply(vertices, &task.start.rest);
+    fn finished(&self, start: &Start, vertices: &[Vertex]) -> Sheet {
+        let mut sheet = self.refinement.apply(vertices, &start.rest);
         let hemmed = matches!(self.params.solver, Solver::Xpbd(_));
         if hemmed {
-            self.refinement.hem(&mut sheet, &task.outline, task.offset);
+            self.refinement.hem(&mut sheet, &start.shape, start.offset);
         }
-        let Outline { points, centre, radius } = &task.outline;
+        let Outline { points, centre, radius } = &start.shape;
         let inside = Inside::new(points);
         for (v, &from_centre) in sheet.vertices.iter_mut().zip(sheet.radius.iter()) {
             // The hem lies on the outline already.
@@ -152,8 +134,8 @@ mod tests {
     use super::*;
     use crate::Rest;
     use crate::mesh::cross;
-    use crate::outline::{distance, sides};
-    use crate::testing::{angular, area, rng, wavy};
+    use crate::outline::{distance, moments, sides};
+    use crate::testing::{angular, rng, wavy};
 
     fn few() -> ClothParams {
         ClothParams { vertices: 300, ..ClothParams::default() }
@@ -181,7 +163,7 @@ mod tests {
             let cloth = Cloth::new(&params).unwrap();
             let ceiling = if let Solver::Xpbd(x) = &params.solver { x.ceiling } else { f64::INFINITY };
             for outline in outlines() {
-                let size = (area(&outline).abs() / std::f64::consts::PI).sqrt();
+                let size = (moments(&outline).0.abs() / std::f64::consts::PI).sqrt();
                 let sheet = cloth.crumple(&outline, &mut rng(6)).unwrap();
                 for v in sheet.vertices() {
                     let most = ceiling * size * (1.0 + 1e-6);
@@ -197,7 +179,7 @@ mod tests {
         let outline = wavy(2.0, 0.08);
         for stream in 7..10 {
             let sheet = cloth.crumple(&outline, &mut rng(stream)).unwrap();
-            let (strain, excess) = (sheet.edge_strain_rms(), sheet.rest_area() / area(&outline));
+            let (strain, excess) = (sheet.edge_strain_rms(), sheet.rest_area() / moments(&outline).0);
             assert!(strain < 0.03 && (excess - 1.12).abs() < 0.005, "{strain} {excess}");
         }
     }
@@ -215,7 +197,7 @@ mod tests {
                     .map(|t| t.map(|v| [sheet.vertices()[v as usize][0], sheet.vertices()[v as usize][1]]))
                     .map(|[a, b, c]| cross(a, b, c) / 2.0)
                     .sum();
-                assert!((shadow / area(&outline).abs() - 1.0).abs() < 1e-9, "{shadow}");
+                assert!((shadow / moments(&outline).0.abs() - 1.0).abs() < 1e-9, "{shadow}");
                 for (a, _) in sides(&outline) {
                     assert!(sheet.vertices().iter().any(|v| distance([v[0], v[1]], a) < 1e-6));
                 }
@@ -343,14 +325,14 @@ mod tests {
     fn lanes_agree_with_the_slow_solvers() {
         for params in [ClothParams::paper(), ClothParams { steps: 12, ..few() }] {
             let cloth = Cloth::new(&params).unwrap();
-            let task = |k: u8| {
+            let start = |k: u8| {
                 let (outline, excess) = (wavy(2.0 + f64::from(k), 0.08), params.excess);
-                cloth.task(Job { outline: &outline, excess }, &mut rng(u64::from(k))).unwrap()
+                cloth.start(Job { outline: &outline, excess }, &mut rng(u64::from(k))).unwrap()
             };
-            let tasks: Vec<Task> = (0..4).map(task).collect();
-            let batch = cloth.run::<LANES>(&tasks.iter().collect::<Vec<_>>());
-            for (l, task) in tasks.iter().enumerate() {
-                let (found, slow) = (batch.lane(l), slow(&cloth, &task.start));
+            let starts: Vec<Start> = (0..4).map(start).collect();
+            let batch = cloth.run::<LANES>(&starts.iter().collect::<Vec<_>>());
+            for (l, start) in starts.iter().enumerate() {
+                let (found, slow) = (batch.lane(l), slow(&cloth, start));
                 let errors = found.as_flattened().iter().zip(slow.as_flattened()).map(|(p, q)| (p - q) * (p - q));
                 let rms = (errors.sum::<f64>() / slow.len() as f64).sqrt();
                 assert!(rms < 1e-3, "lane {l}: {rms}");

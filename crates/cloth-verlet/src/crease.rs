@@ -11,7 +11,6 @@ use std::sync::Arc;
 const STRIPS: u32 = 12;
 /// Part of the radius within which a vertex counts as lying on a line: a cut there would only leave slivers.
 const ON_LINE: f64 = 1e-6;
-/// Most whole turns of a roll.
 const MOST_TURNS: u32 = 100;
 
 /// A straight fold. What lies beyond the line is bent up round a tube that touches the sheet there, without being stretched.
@@ -130,9 +129,8 @@ impl Sheet {
                 continue;
             }
             // Turn the triangle so that its first corner is alone on its side, or on the line.
-            let alone =
-                (0..3).find(|&k| places[k] == 0).or_else(|| (0..3).find(|&k| places.iter().sum::<i32>() == -places[k]));
-            let Some(k) = alone else { continue };
+            let sum: i32 = places.iter().sum();
+            let Some(k) = (0..3).find(|&k| places[k] == 0).or((0..3).find(|&k| sum == -places[k])) else { continue };
             let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
             if places[k] == 0 {
                 let m = self.divide(&mut made, far, line, b, c);
@@ -286,7 +284,7 @@ fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
 mod tests {
     use super::*;
     use crate::sheet::rim;
-    use crate::testing::{angular, area, rng, wavy};
+    use crate::testing::{angular, rng, wavy};
     use crate::{Cloth, ClothParams, View};
 
     const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, turn: Turn::Flap };
@@ -345,7 +343,7 @@ mod tests {
             let place = |&(v, _): &(u32, u32)| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]];
             let rim: Vec<Point> = rim(&sheet.edges).iter().map(place).collect();
             let pieces = crease_outline(&rim, &crease).unwrap();
-            let areas: f64 = pieces.iter().map(|p| area(p)).sum();
+            let areas: f64 = pieces.iter().map(|p| moments(p).0).sum();
             sheet.fold(&crease).unwrap();
             let shadow: f64 = sheet
                 .triangles()
@@ -377,14 +375,14 @@ mod tests {
         let u = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [6.0, 9.0], [6.0, 3.0], [3.0, 3.0], [3.0, 9.0], [0.0, 9.0]];
         let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, turn: Turn::Flap };
         let pieces = crease_outline(&u, &crease).unwrap();
-        let mut areas: Vec<f64> = pieces.iter().map(|p| area(p)).collect();
+        let mut areas: Vec<f64> = pieces.iter().map(|p| moments(p).0).collect();
         areas.sort_by(f64::total_cmp);
         assert_eq!(areas.len(), 3);
         for (found, wanted) in areas.iter().zip([12.0, 12.0, 39.0]) {
             assert!((found - wanted).abs() < 1e-3, "{areas:?}");
         }
         let whole = crease_outline(&angular(), &Crease { point: [0.0, 100.0], ..crease }).unwrap();
-        assert!(whole.len() == 1 && (area(&whole[0]) - 54.0).abs() < 1e-9);
+        assert!(whole.len() == 1 && (moments(&whole[0]).0 - 54.0).abs() < 1e-9);
     }
 
     #[test]

@@ -59,7 +59,6 @@ impl Disc {
     }
 }
 
-/// Adds x and y times the weights.
 #[multiversion(targets = "simd")]
 fn add_multiples(xs: &mut [f64], ys: &mut [f64], weights: &[f64], [x, y]: Point) {
     for ((sum_x, sum_y), w) in xs.iter_mut().zip(ys).zip(weights) {

@@ -82,7 +82,6 @@ impl Outline {
     }
 }
 
-/// The sides of a closed polygon.
 pub(crate) fn sides(points: &[Point]) -> impl Iterator<Item = (Point, Point)> {
     points.iter().copied().zip(points.iter().copied().cycle().skip(1))
 }

@@ -31,18 +31,18 @@ pub(crate) fn outline_points(disc: &Disc, params: &ClothParams) -> usize {
     }
 }
 
-/// A sheet before it is pressed, and where round the outline its first rim vertex stands.
+/// A sheet before it is pressed.
 pub(crate) fn start<R: Rng + ?Sized>(
     disc: &Disc,
-    outline: &Outline,
+    shape: Outline,
     excess: f64,
     params: &ClothParams,
     rng: &mut R,
-) -> (Start, f64) {
+) -> Start {
     let offset = uniform(rng);
-    let target = outline.resampled(outline_points(disc, params), offset);
+    let target = shape.resampled(outline_points(disc, params), offset);
     let (rest, from) = match params.rest {
-        Rest::Disc => round(disc, &target, outline, excess, params),
+        Rest::Disc => round(disc, &target, &shape, excess, params),
         Rest::Outline => {
             let from = grown(&target, excess, rng);
             (flattened(disc, &from, excess), from)
@@ -53,7 +53,7 @@ pub(crate) fn start<R: Rng + ?Sized>(
         Solver::Xpbd(p) => (p.lift, disc.rim),
     };
     let heights = (0..rest.len()).map(|v| if v < held { 0.0 } else { lift * uniform(rng) }).collect();
-    (Start { rest, heights, outline: [from, target] }, offset)
+    Start { shape, offset, rest, heights, outline: [from, target] }
 }
 
 /// The paper's start: a disc, turned so that its rim stands where the outline's points are.

@@ -59,7 +59,6 @@ struct Corner<const L: usize> {
     inverse: Lane<L>,
 }
 
-/// A circle that holds a group of sides.
 #[derive(Debug, Clone, Copy)]
 struct Circle<const L: usize> {
     middle: [Lane<L>; 2],
@@ -67,7 +66,6 @@ struct Circle<const L: usize> {
 }
 
 impl<const L: usize> Circle<L> {
-    /// Round corners that follow each other.
     #[inline(always)]
     fn round(corners: &[Corner<L>]) -> Circle<L> {
         let (first, last) = (&corners[0].at, &corners[corners.len() - 1].at);
@@ -99,7 +97,6 @@ impl<const L: usize> Circle<L> {
     }
 }
 
-/// The outline of every lane.
 #[derive(Debug)]
 pub(crate) struct Ring<const L: usize> {
     pub(crate) points: Curve<L>,
@@ -116,15 +113,9 @@ pub(crate) struct Ring<const L: usize> {
 impl<const L: usize> Ring<L> {
     pub(crate) fn new(points: Curve<L>, vertices: usize) -> Ring<L> {
         let corner = |&at: &[Lane<L>; 2]| Corner { at, normal: [Lane::ZERO; 2], inverse: Lane::ZERO };
-        let corners = points.iter().chain(points.first()).map(corner).collect();
-        let nowhere = Circle { middle: [Lane::ZERO; 2], radius: Lane::ZERO };
-        Ring {
-            corners,
-            circles: vec![nowhere; points.len().div_ceil(GROUP)],
-            before: points.clone(),
-            points,
-            slack: vec![Lane::ZERO; vertices],
-        }
+        let corners: Vec<Corner<L>> = points.iter().chain(points.first()).map(corner).collect();
+        let circles = (0..points.len().div_ceil(GROUP)).map(|group| Circle::round(group_of(&corners, group))).collect();
+        Ring { corners, circles, before: points.clone(), points, slack: vec![Lane::ZERO; vertices] }
     }
 
     /// Moves every vertex from `first` on that is outside to the nearest of the sides in its view, after step `step`.
@@ -137,7 +128,7 @@ impl<const L: usize> Ring<L> {
         for ((node, view), slack) in now.iter_mut().zip(views).zip(&mut self.slack).skip(first) {
             let mut any = false;
             for l in 0..L {
-                slack[l] = slack[l] - pace[l];
+                slack[l] -= pace[l];
                 any |= slack[l] < pace[l] * stride;
             }
             if any {
@@ -257,61 +248,6 @@ impl<const L: usize> Nearest<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::single;
-    use crate::testing::rng;
-    use portable_numerics::random::uniform;
-
-    /// Every side of the groups in view, in the view's order.
-    fn slow<const L: usize>(p: &[Lane<L>; 2], ring: &Ring<L>, view: &View) -> Nearest<L> {
-        let zero = Lane([0.0; L]);
-        let mut nearest = Nearest { away: Lane([f32::MAX; L]), off: [zero; 2], outwards: zero };
-        for group in view.groups(ring.circles.len()) {
-            for pair in group_of(&ring.corners, group).windows(2) {
-                nearest.meet(p, &pair[0], &pair[1]);
-            }
-        }
-        nearest
-    }
-
-    /// Rings with notches, and points in and around them and on their corners; lanes that are due or not.
-    fn agree<const L: usize>(sides: usize, seed: u64) {
-        let mut rng = rng(seed);
-        let mut value = || uniform(&mut rng);
-        let curve: Curve<L> = (0..sides)
-            .map(|k| {
-                let angle = TAU * k as f64 / sides as f64;
-                let radii: [f64; L] = std::array::from_fn(|_| 0.8 + 0.2 * libm::cos(3.0 * angle) + 0.1 * value());
-                [libm::cos(angle), libm::sin(angle)].map(|c| Lane(radii.map(|r| single(r * c))))
-            })
-            .collect();
-        let mut ring = Ring::new(curve, 0);
-        ring.measure();
-        for k in 0..400 {
-            let place = [0, 1].map(|_| 2.4 * value() - 1.2);
-            let p = if k % 4 == 0 {
-                ring.corners[k % sides].at
-            } else {
-                place.map(|c| Lane(std::array::from_fn(|_| single(c + 0.1 * value()))))
-            };
-            let due: [bool; L] = std::array::from_fn(|_| value() < 0.7);
-            let view = View::from(place, sides);
-            let quick = Nearest::to(&p, &due, &ring.corners, &ring.circles, &view);
-            let wanted = slow(&p, &ring, &view);
-            for l in (0..L).filter(|&l| due[l]) {
-                // All but the sign of zero, which nothing depends on.
-                let found = |n: &Nearest<L>| [n.away[l], n.off[0][l], n.off[1][l], n.outwards[l]];
-                assert_eq!(found(&quick), found(&wanted), "{sides} sides, point {k}, lane {l}");
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_passed_over_is_not_nearest() {
-        for (seed, sides) in [8, 9, 75, 112, 330].into_iter().enumerate() {
-            agree::<16>(sides, seed as u64);
-            agree::<1>(sides, seed as u64);
-        }
-    }
 
     #[test]
     fn a_view_holds_its_part_of_the_outline_once() {

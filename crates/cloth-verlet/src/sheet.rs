@@ -97,7 +97,6 @@ impl Sheet {
         (0..self.triangles.len()).map(|t| self.rest_area_of(t)).sum()
     }
 
-    /// Area of triangle `t` in the flat sheet.
     pub(crate) fn rest_area_of(&self, t: usize) -> f64 {
         let [a, b, c] = self.triangles[t].map(|v| self.rest[v as usize]);
         0.5 * cross(a, b, c).abs()

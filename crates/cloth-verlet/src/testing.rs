@@ -5,11 +5,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use std::f64::consts::TAU;
 
-/// "cloth", as the seed of all tests.
-const SEED: u64 = 0x63_6c6f_7468;
-
 pub(crate) fn rng(stream: u64) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(SEED + stream)
+    Xoshiro256PlusPlus::seed_from_u64(0x63_6c6f_7468 + stream)
 }
 
 /// A closed curve r = 100 (1 + depth cos(waves θ + 1)) of 200 points, off the origin.
@@ -24,9 +21,4 @@ pub(crate) fn wavy(waves: f64, depth: f64) -> Vec<Point> {
 /// An L, walked the other way round than [`wavy`].
 pub(crate) fn angular() -> Vec<Point> {
     vec![[0.0, 0.0], [0.0, 9.0], [4.0, 9.0], [4.0, 4.5], [8.0, 4.5], [8.0, 0.0]]
-}
-
-/// Signed area of a polygon.
-pub(crate) fn area(polygon: &[Point]) -> f64 {
-    crate::outline::moments(polygon).0
 }

@@ -3,8 +3,7 @@
 use portable_numerics::fourier::LaneFft;
 
 use crate::Error;
-use crate::complex::{multiply, unit};
-use crate::outline::{Point, count_as_f64, signed_area};
+use crate::outline::{Point, signed_area};
 
 /// Fewest points that enclose an area.
 const FEWEST_POINTS: usize = 3;
@@ -54,7 +53,7 @@ impl Descriptors {
             .map(|place| {
                 let bin = (place + count - half) % count;
                 let share = if place.abs_diff(half) == shared { 2.0 } else { 1.0 };
-                sums[bin].map(|v| v / (share * count_as_f64(count)))
+                sums[bin].map(|v| v / (share * count as f64))
             })
             .collect();
         Ok(Self { terms })
@@ -69,7 +68,7 @@ impl Descriptors {
         if terms.len() < FEWEST_POINTS || terms.len().is_multiple_of(2) {
             return Err(Error::Parameter {
                 field: "number of descriptors",
-                value: count_as_f64(terms.len()),
+                value: terms.len() as f64,
                 accepted: "odd and at least 3 (l from -h to h)",
             });
         }
@@ -229,8 +228,8 @@ impl Descriptors {
 
     /// The terms with their l.
     pub(crate) fn each(&self) -> impl Iterator<Item = (f64, Point)> + '_ {
-        let centre = count_as_f64(self.harmonics());
-        self.terms.iter().enumerate().map(move |(place, &u)| (count_as_f64(place) - centre, u))
+        let centre = self.harmonics() as f64;
+        self.terms.iter().enumerate().map(move |(place, &u)| (place as f64 - centre, u))
     }
 
     fn map(&self, change: impl Fn(f64, Point) -> Point) -> Self {
@@ -259,4 +258,15 @@ impl From<Descriptors> for Vec<Point> {
 
 pub(crate) fn modulus(u: Point) -> f64 {
     (u[0] * u[0] + u[1] * u[1]).sqrt()
+}
+
+/// The product of two complex numbers.
+pub(crate) fn multiply(a: Point, b: Point) -> Point {
+    [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
+}
+
+/// e^{iφ}.
+pub(crate) fn unit(phi: f64) -> Point {
+    let (sin, cos) = libm::sincos(phi);
+    [cos, sin]
 }

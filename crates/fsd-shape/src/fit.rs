@@ -1,14 +1,13 @@
 //! From a set of outlines to their statistics.
 
+use nalgebra::DMatrix;
 use portable_numerics::statistics::{deviation, mean};
 
-use crate::coordinates::add_scaled;
 use crate::descriptors::Descriptors;
-use crate::outline::{Point, count_as_f64, resample, signed_area};
-use crate::pca::{dot, mean_of, principal_axes, sd_of};
+use crate::outline::{Point, resample, signed_area};
 use crate::roughness::Fine;
 use crate::sample::Bend;
-use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics};
+use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics, add_scaled};
 use crate::steps::to_steps;
 use crate::{Error, ShapeModel};
 
@@ -87,20 +86,22 @@ impl ShapeModel {
             }
         };
         if !(1..=4096).contains(&params.harmonics) {
-            let value = count_as_f64(params.harmonics);
+            let value = params.harmonics as f64;
             return Err(Error::Parameter { field: "harmonics", value, accepted: "1..=4096" });
         }
         if outlines.len() < FEWEST_OUTLINES {
             return Err(Error::TooFewOutlines { count: outlines.len(), needed: FEWEST_OUTLINES });
         }
         let mut ln_radii = Vec::with_capacity(outlines.len());
-        let mut shapes = Vec::with_capacity(outlines.len());
+        let mut shapes: Vec<Vec<f64>> = Vec::with_capacity(outlines.len());
         for (index, outline) in outlines.iter().enumerate() {
             let described = describe(outline, params.harmonics)
                 .map_err(|source| Error::TrainingOutline { index, source: Box::new(source) })?;
             ln_radii.push(libm::log(described.radius()));
             let shape = described.normalised();
-            shapes.push(coordinates(&if lambda.is_some() { shape.aligned() } else { shape }));
+            let shape = if lambda.is_some() { shape.aligned() } else { shape };
+            // Re u₋ₕ, Im u₋ₕ, … without u₀.
+            shapes.push(shape.each().filter(|&(l, _)| l != 0.0).flat_map(|(_, u)| u).collect());
         }
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
@@ -143,11 +144,6 @@ fn describe(outline: &[Point], harmonics: usize) -> Result<Descriptors, Error> {
     Ok(Descriptors::from_outline(&points)?.truncated(harmonics))
 }
 
-/// Re u₋ₕ, Im u₋ₕ, … without u₀.
-fn coordinates(shape: &Descriptors) -> Vec<f64> {
-    shape.each().filter(|&(l, _)| l != 0.0).flat_map(|(_, u)| u).collect()
-}
-
 /// Shrinkage: Σ = (1 − λ) S + λ diag S, the diagonal taken in directions and steps; as components of (1 − λ) S and residuals
 /// that restore the diagonal.
 fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: f64) {
@@ -187,7 +183,7 @@ fn notable_moments(scores: &[f64]) -> (f64, f64) {
     if scores.len() < ENOUGH_FOR_MOMENTS {
         return (0.0, 0.0);
     }
-    let n = count_as_f64(scores.len());
+    let n = scores.len() as f64;
     let power = |k: i32| scores.iter().map(|&s| (0..k).fold(1.0, |product, _| product * s)).sum::<f64>() / n;
     let variance = power(2);
     let g1 = power(3) / (variance * variance.sqrt());
@@ -202,4 +198,99 @@ fn notable_moments(scores: &[f64]) -> (f64, f64) {
     let kurtosis =
         notable(kurtosis, (24.0 / n).sqrt()).clamp(Bend::least_kurtosis(skewness), PrincipalComponent::MOST_KURTOSIS);
     (skewness, kurtosis)
+}
+
+/// A direction of unit length and the variance along it.
+struct Axis {
+    variance: f64,
+    direction: Vec<f64>,
+}
+
+/// Axes of the sample covariance of `deviations` (rows whose mean is 0), by falling variance; those without variance are left out.
+/// The largest entry of a direction is positive.
+fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
+    let (count, dims) = (deviations.len(), deviations.first().map_or(0, Vec::len));
+    let freedom = count as f64 - 1.0;
+    let rows = DMatrix::from_fn(count, dims, |i, k| deviations[i][k]);
+    // The smaller of YᵀY and YYᵀ: both have the eigenvalues of the covariance, and an eigenvector v of YYᵀ gives Yᵀv.
+    // `tr_mul` sums in one order on every processor; `*` does not.
+    let (eigen, directions) = if count < dims {
+        let columns = rows.transpose();
+        let eigen = columns.tr_mul(&columns).symmetric_eigen();
+        let directions = rows.tr_mul(&eigen.eigenvectors);
+        (eigen.eigenvalues, directions)
+    } else {
+        let eigen = rows.tr_mul(&rows).symmetric_eigen();
+        (eigen.eigenvalues, eigen.eigenvectors)
+    };
+    // What is left of a variance of 0 after rounding; the mean takes one degree of freedom, so there always is one.
+    let floor = eigen.max() * f64::EPSILON * count.min(dims) as f64;
+    let mut axes: Vec<Axis> = eigen
+        .iter()
+        .zip(directions.column_iter())
+        .filter(|&(&value, _)| value > floor)
+        .map(|(value, direction)| {
+            let scale = direction[direction.icamax()].signum() / direction.norm();
+            Axis { variance: value / freedom, direction: direction.iter().map(|v| v * scale).collect() }
+        })
+        .collect();
+    axes.sort_by(|a, b| b.variance.total_cmp(&a.variance));
+    axes
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut mean = vec![0.0; rows[0].len()];
+    for row in rows {
+        add_scaled(&mut mean, row, 1.0 / rows.len() as f64);
+    }
+    mean
+}
+
+/// Standard deviation of each column of rows with mean 0.
+fn sd_of(deviations: &[Vec<f64>]) -> Vec<f64> {
+    let freedom = deviations.len() as f64 - 1.0;
+    (0..deviations[0].len())
+        .map(|k| (deviations.iter().map(|row| row[k] * row[k]).sum::<f64>() / freedom).sqrt())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::{Rng, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    #[test]
+    fn axes_are_eigenvectors_of_the_covariance_whichever_side_is_longer() {
+        for (count, dims) in [(9, 30), (40, 12), (12, 12), (2, 5)] {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x9CA);
+            let mut value = |k: usize| f64::from(rng.next_u32() >> 16) / (k + 1) as f64;
+            let mut rows: Vec<Vec<f64>> = (0..count).map(|_| (0..dims).map(&mut value).collect()).collect();
+            let mean = mean_of(&rows);
+            rows.iter_mut().for_each(|row| add_scaled(row, &mean, -1.0));
+            let axes = principal_axes(&rows);
+            assert_eq!(axes.len(), dims.min(count - 1));
+            assert!(axes.is_sorted_by(|a, b| a.variance >= b.variance));
+            let total: f64 = sd_of(&rows).iter().map(|sd| sd * sd).sum();
+            assert!((axes.iter().map(|axis| axis.variance).sum::<f64>() / total - 1.0).abs() < 1e-12);
+            for Axis { variance, direction } in &axes {
+                let mut left: Vec<f64> = direction.iter().map(|v| -variance * v).collect();
+                for row in &rows {
+                    add_scaled(&mut left, row, dot(row, direction) / (count as f64 - 1.0));
+                }
+                assert!(dot(&left, &left).sqrt() < 1e-12 * total);
+                assert!((dot(direction, direction) - 1.0).abs() < 1e-12);
+                assert!(direction.iter().all(|v| v.abs() <= direction.iter().copied().fold(0.0, f64::max)));
+            }
+        }
+    }
+
+    #[test]
+    fn equal_rows_have_no_axes() {
+        assert!(principal_axes(&[vec![0.0; 4], vec![0.0; 4]]).is_empty());
+    }
 }

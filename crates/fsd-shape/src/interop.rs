@@ -22,17 +22,13 @@ impl Descriptors {
         self.outline(count).into_iter().map(Into::into)
     }
 
-    /// [`Descriptors::outline`] as points of `nalgebra`. Other libraries' points become `[f64; 2]` by `into`.
+    /// [`Descriptors::outline`] as points of `nalgebra`.
     ///
     /// ```
-    /// use fsd_shape::Descriptors;
-    /// use nalgebra::{Point2, distance};
-    ///
+    /// # use nalgebra::Point2;
     /// let square = [Point2::new(0.0, 0.0), Point2::new(6.0, 0.0), Point2::new(6.0, 6.0), Point2::new(0.0, 6.0)];
-    /// let descriptors = Descriptors::from_outline(&square.map(Into::into))?;
-    /// for (p, q) in descriptors.nalgebra_outline(4).zip(&square) {
-    ///     assert!(distance(&p, q) < 1e-12);
-    /// }
+    /// let smooth = fsd_shape::Descriptors::from_outline(&square.map(Into::into))?.nalgebra_outline(4);
+    /// assert!(smooth.zip(&square).all(|(p, q)| nalgebra::distance(&p, q) < 1e-12));
     /// # Ok::<(), fsd_shape::Error>(())
     /// ```
     #[cfg(feature = "nalgebra")]

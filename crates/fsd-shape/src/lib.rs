@@ -2,8 +2,6 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
-mod complex;
-mod coordinates;
 mod crossing;
 mod descriptors;
 mod error;
@@ -13,8 +11,6 @@ mod fit;
 mod interop;
 mod model;
 mod outline;
-#[cfg(feature = "fit")]
-mod pca;
 #[cfg(feature = "fit")]
 mod roughness;
 mod sample;

@@ -4,13 +4,11 @@ use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
 
 use crate::Error;
-use crate::complex::{multiply, unit};
-use crate::coordinates::{add_scaled, finest_coarse, order, terms};
 use crate::crossing::self_intersects;
-use crate::descriptors::{Descriptors, modulus};
-use crate::outline::{Point, count_as_f64};
+use crate::descriptors::{Descriptors, modulus, multiply, unit};
+use crate::outline::Point;
 use crate::sample::Bend;
-use crate::statistics::{Residual, ShapeStatistics};
+use crate::statistics::{Residual, ShapeStatistics, add_scaled, finest_coarse, order, terms};
 use crate::steps::from_steps;
 
 /// Tries of a draw before it gives up. The paper's model, the worst in use, fails less than half of the time.
@@ -151,7 +149,7 @@ impl Modulation {
         }
         let reach = harmonics / MODULATION_SHARE;
         // Σ over ±m of E|fₘ|² = 1, with real and imaginary part alike.
-        let sd = sigma / (4.0 * count_as_f64(reach)).sqrt();
+        let sd = sigma / (4.0 * reach as f64).sqrt();
         let coarse = finest_coarse(harmonics);
         let detail = |place: usize| place.abs_diff(harmonics) > coarse;
         let powers: Vec<f64> = statistics

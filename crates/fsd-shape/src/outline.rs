@@ -39,8 +39,7 @@ pub fn centroid(outline: &[Point]) -> Point {
         sum = [sum[0] + p[0], sum[1] + p[1]];
     }
     // Three times twice the area: the centroid of the triangle (0, p, q) is a third of p + q.
-    let (sum, divisor) =
-        if twice_area == 0.0 { (sum, count_as_f64(outline.len())) } else { (moment, 3.0 * twice_area) };
+    let (sum, divisor) = if twice_area == 0.0 { (sum, outline.len() as f64) } else { (moment, 3.0 * twice_area) };
     [origin[0] + sum[0] / divisor, origin[1] + sum[1] / divisor]
 }
 
@@ -75,9 +74,7 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
         return outline.first().map_or(Vec::new(), |&first| vec![first; count]);
     };
     let length = places[count];
-    let mut points = Vec::with_capacity(count);
-    place(outline, &arc, &places[..count], &mut points);
-
+    let mut points = place(outline, &arc, &places[..count]);
     let mut best = points.clone();
     let mut best_spread = f64::INFINITY;
     let mut chords = vec![0.0; count + 1];
@@ -90,8 +87,8 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
             squares += chord * chord;
             chords[k + 1] = total;
         }
-        let mean = total / count_as_f64(count);
-        let spread = (squares / count_as_f64(count) / (mean * mean) - 1.0).max(0.0).sqrt();
+        let mean = total / count as f64;
+        let spread = (squares / count as f64 / (mean * mean) - 1.0).max(0.0).sqrt();
         if spread < best_spread {
             best_spread = spread;
             best.clone_from(&points);
@@ -102,7 +99,7 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
         // Arc length as a function of chord length, read at equal chords.
         let mut moved = Vec::with_capacity(count + 1);
         let mut k = 0;
-        for target in (0..count).map(|k| count_as_f64(k) * mean) {
+        for target in (0..count).map(|k| k as f64 * mean) {
             while k + 1 < count && chords[k + 1] <= target {
                 k += 1;
             }
@@ -111,7 +108,7 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
         }
         moved.push(length);
         places = moved;
-        place(outline, &arc, &places[..count], &mut points);
+        points = place(outline, &arc, &places[..count]);
     }
     best
 }
@@ -127,9 +124,7 @@ pub fn resample_along(outline: &[Point], count: usize) -> Vec<Point> {
     let Some((arc, places)) = even_places(outline, count) else {
         return outline.first().map_or(Vec::new(), |&first| vec![first; count]);
     };
-    let mut points = Vec::with_capacity(count);
-    place(outline, &arc, &places[..count], &mut points);
-    points
+    place(outline, &arc, &places[..count])
 }
 
 /// The arc length at each vertex and at the end, and `count` even arc lengths and the whole; nothing if the outline has no length.
@@ -141,24 +136,24 @@ fn even_places(outline: &[Point], count: usize) -> Option<(Vec<f64>, Vec<f64>)> 
         length += distance(p, q);
         arc.push(length);
     }
-    let step = length / count_as_f64(count);
-    let mut places: Vec<f64> = (0..count).map(|k| count_as_f64(k) * step).collect();
+    let step = length / count as f64;
+    let mut places: Vec<f64> = (0..count).map(|k| k as f64 * step).collect();
     places.push(length);
     (length > 0.0 && length.is_finite()).then_some((arc, places))
 }
 
 /// Points of the polygon at ascending arc lengths `places`; `arc` holds the arc length at each vertex and at the end.
-fn place(outline: &[Point], arc: &[f64], places: &[f64], points: &mut Vec<Point>) {
-    points.clear();
+fn place(outline: &[Point], arc: &[f64], places: &[f64]) -> Vec<Point> {
     let mut edge = 0;
-    for &s in places {
+    let at = |&s: &f64| {
         while edge + 1 < outline.len() && arc[edge + 1] <= s {
             edge += 1;
         }
         let (p, q) = (outline[edge], outline[(edge + 1) % outline.len()]);
         let t = ratio(s - arc[edge], arc[edge + 1] - arc[edge]);
-        points.push([p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]);
-    }
+        [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]
+    };
+    places.iter().map(at).collect()
 }
 
 /// Place of a part within a whole, 0..=1; 0 in a whole of no length.
@@ -183,8 +178,4 @@ pub(crate) fn cross(p: Point, q: Point) -> f64 {
 pub(crate) fn distance(p: Point, q: Point) -> f64 {
     let d = sub(p, q);
     (d[0] * d[0] + d[1] * d[1]).sqrt()
-}
-
-pub(crate) fn count_as_f64(count: usize) -> f64 {
-    count as f64
 }

@@ -2,12 +2,10 @@
 
 use portable_numerics::statistics::deviation;
 
-use crate::coordinates::{finest_coarse, order, terms};
 use crate::descriptors::Descriptors;
+use crate::fit::dot;
 use crate::model::LEAST_FOR_LOCAL;
-use crate::outline::count_as_f64;
-use crate::pca::dot;
-use crate::statistics::ShapeStatistics;
+use crate::statistics::{ShapeStatistics, finest_coarse, order, terms};
 
 /// Places per harmonic at which detail is looked at.
 const PLACES_PER_HARMONIC: usize = 8;
@@ -87,7 +85,7 @@ impl Fine {
         }
         // An even normal field of complex numbers has E|h|⁴ = 2 (E|h|²)²; modulated by 1 + σf with f a standard normal,
         // this grows by (1 + 6s + 3s²) / (1 + s)², s = σ². Solved for s: √(2 / (3 − growth)) − 1.
-        let even = 2.0 * count_as_f64(places) * count_as_f64(self.details.len());
+        let even = 2.0 * places as f64 * self.details.len() as f64;
         let growth = (fourth / even).clamp(1.0, GREATEST_GROWTH);
         ((2.0 / (3.0 - growth)).sqrt() - 1.0).sqrt()
     }

@@ -1,7 +1,7 @@
 //! What a shape model knows: numbers about a population of outlines, none of the outlines.
 
 use crate::Error;
-use crate::outline::count_as_f64;
+use crate::outline::Point;
 use crate::sample::Bend;
 use crate::steps;
 
@@ -96,34 +96,22 @@ impl ShapeStatistics {
     /// If `digits` is 0 or above 17.
     pub fn rounded(&self, digits: usize) -> Result<Self, Error> {
         if !(1..=17).contains(&digits) {
-            return Err(Error::Parameter { field: "digits", value: count_as_f64(digits), accepted: "1..=17" });
+            return Err(Error::Parameter { field: "digits", value: digits as f64, accepted: "1..=17" });
         }
-        let round = |v: f64| round_to(v, digits);
-        let all = |values: &[f64]| values.iter().map(|&v| round(v)).collect();
-        Ok(Self {
-            harmonics: self.harmonics,
-            outlines: self.outlines,
-            ln_radius_mean: round(self.ln_radius_mean),
-            ln_radius_sd: round(self.ln_radius_sd),
-            mean: all(&self.mean),
-            components: self
-                .components
-                .iter()
-                .map(|c| {
-                    let skewness = round(c.skewness);
-                    // Rounding may carry a score just past what its skewness allows.
-                    let excess_kurtosis = round(c.excess_kurtosis).max(Bend::least_kurtosis(skewness));
-                    PrincipalComponent { loading: all(&c.loading), skewness, excess_kurtosis }
-                })
-                .collect(),
-            residual: self.residual,
-            residual_sd: all(&self.residual_sd),
-            roughness_sd: round(self.roughness_sd),
-            local_roughness: round(self.local_roughness),
-        })
+        // The nearest number of so many digits, by way of its decimal form: exact, and the same everywhere.
+        let round = |v: &mut f64| *v = format!("{v:.*e}", digits - 1).parse().unwrap_or(*v);
+        let mut rounded = self.clone();
+        let Self { ln_radius_mean, ln_radius_sd, roughness_sd, local_roughness, .. } = &mut rounded;
+        [ln_radius_mean, ln_radius_sd, roughness_sd, local_roughness].into_iter().for_each(round);
+        rounded.mean.iter_mut().chain(&mut rounded.residual_sd).for_each(round);
+        for PrincipalComponent { loading, skewness, excess_kurtosis } in &mut rounded.components {
+            loading.iter_mut().chain([&mut *skewness, &mut *excess_kurtosis]).for_each(round);
+            // Rounding may carry a score just past what its skewness allows.
+            *excess_kurtosis = excess_kurtosis.max(Bend::least_kurtosis(*skewness));
+        }
+        Ok(rounded)
     }
 
-    /// Number of coordinates of a shape.
     pub(crate) fn coordinates(&self) -> usize {
         4 * self.harmonics
     }
@@ -153,7 +141,6 @@ impl ShapeStatistics {
         powers
     }
 
-    /// Whether the numbers fit together.
     pub(crate) fn check(&self) -> Result<(), Error> {
         if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
             return wrong("harmonics", format!("is {}; accepted: 1..={MOST_HARMONICS}", self.harmonics));
@@ -202,7 +189,28 @@ fn wrong(field: &'static str, problem: String) -> Result<(), Error> {
     Err(Error::Statistics { field, problem })
 }
 
-/// The nearest number of so many decimal digits, by way of its decimal form: exact, and the same everywhere.
-fn round_to(value: f64, digits: usize) -> f64 {
-    format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
+/// |l| of coordinate k.
+pub(crate) fn order(k: usize, harmonics: usize) -> usize {
+    let place = k / 2;
+    if place < harmonics { harmonics - place } else { place + 1 - harmonics }
+}
+
+/// Descriptors of the coordinates of a shape, u₀ = 0.
+pub(crate) fn terms(coordinates: &[f64]) -> Vec<Point> {
+    let mut terms: Vec<Point> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+    terms.insert(terms.len() / 2, [0.0, 0.0]);
+    terms
+}
+
+/// Highest |l| that counts as form, not as detail: a fifth of the harmonics. Of 40 that is 8, up to where the components explain
+/// outlines of cells; beyond, the residual does.
+pub(crate) fn finest_coarse(harmonics: usize) -> usize {
+    (harmonics / 5).max(1)
+}
+
+/// a += weight · b.
+pub(crate) fn add_scaled(a: &mut [f64], b: &[f64], weight: f64) {
+    for (x, y) in a.iter_mut().zip(b) {
+        *x += weight * y;
+    }
 }

@@ -10,75 +10,58 @@
 //! the step is small (a fifth of the direction in outlines of cells), which ties u₁₊ₘ to u₁₋ₘ. Independent descriptors break
 //! that tie: the points of such a draw crowd here and spread there, and its perimeter comes out too short.
 
-use crate::outline::count_as_f64;
-
 /// The first m whose pair is free: below it u₀, u₁, u₋₁ belong to the pose.
 const FIRST: usize = 3;
 
 /// Replaces each pair u₁₊ₘ, u₁₋ₘ of coordinates by direction and step.
 #[cfg(any(test, feature = "fit"))]
 pub(crate) fn to_steps(coordinates: &mut [f64]) {
-    for m in pairs(coordinates) {
-        let (high, low) = places(coordinates, m);
-        let (up, down) = (count_as_f64(m) + 1.0, 1.0 - count_as_f64(m));
-        let (a, b) = (up * coordinates[high], up * coordinates[high + 1]);
-        let (c, d) = (down * coordinates[low], down * coordinates[low + 1]);
+    change_pairs(coordinates, |high, low, up, down| {
+        let ([a, b], [c, d]) = (high.map(|v| up * v), low.map(|v| down * v));
         // direction = (dₘ − conj d₋ₘ) / 2i, step = (dₘ + conj d₋ₘ) / 2
-        coordinates[high] = (b + d) / 2.0;
-        coordinates[high + 1] = (c - a) / 2.0;
-        coordinates[low] = (a + c) / 2.0;
-        coordinates[low + 1] = (b - d) / 2.0;
-    }
+        [[(b + d) / 2.0, (c - a) / 2.0], [(a + c) / 2.0, (b - d) / 2.0]]
+    });
 }
 
 /// The inverse of [`to_steps`].
 pub(crate) fn from_steps(coordinates: &mut [f64]) {
-    for m in pairs(coordinates) {
-        let (high, low) = places(coordinates, m);
-        let (up, down) = (count_as_f64(m) + 1.0, 1.0 - count_as_f64(m));
-        let (direction, step) = ([coordinates[high], coordinates[high + 1]], [coordinates[low], coordinates[low + 1]]);
-        coordinates[high] = (step[0] - direction[1]) / up;
-        coordinates[high + 1] = (step[1] + direction[0]) / up;
-        coordinates[low] = (step[0] + direction[1]) / down;
-        coordinates[low + 1] = (direction[0] - step[1]) / down;
-    }
+    change_pairs(coordinates, |direction, step, up, down| {
+        let (high, low) =
+            ([step[0] - direction[1], step[1] + direction[0]], [step[0] + direction[1], direction[0] - step[1]]);
+        [high.map(|v| v / up), low.map(|v| v / down)]
+    });
 }
 
 /// Mean squares of coordinates whose directions and steps are independent and have these mean squares.
 pub(crate) fn squares_from_steps(squares: &mut [f64]) {
-    for m in pairs(squares) {
-        let (high, low) = places(squares, m);
-        let (up, down) = (count_as_f64(m) + 1.0, 1.0 - count_as_f64(m));
-        let (direction, step) = ([squares[high], squares[high + 1]], [squares[low], squares[low + 1]]);
-        let (re, im) = (step[0] + direction[1], step[1] + direction[0]);
-        squares[high] = re / (up * up);
-        squares[high + 1] = im / (up * up);
-        squares[low] = re / (down * down);
-        squares[low + 1] = im / (down * down);
+    change_pairs(squares, |direction, step, up, down| {
+        let sums = [step[0] + direction[1], step[1] + direction[0]];
+        [sums.map(|v| v / (up * up)), sums.map(|v| v / (down * down))]
+    });
+}
+
+/// Replaces each pair u₁₊ₘ, u₁₋ₘ by what `change` makes of it and of 1 + m and 1 − m.
+fn change_pairs(coordinates: &mut [f64], change: impl Fn([f64; 2], [f64; 2], f64, f64) -> [[f64; 2]; 2]) {
+    // As pairs of Re u₋ₕ, Im u₋ₕ, … without u₀.
+    let (terms, _) = coordinates.as_chunks_mut();
+    let harmonics = terms.len() / 2;
+    for m in FIRST..harmonics {
+        let (high, low) = (harmonics + m, harmonics + 1 - m);
+        [terms[high], terms[low]] = change(terms[high], terms[low], m as f64 + 1.0, 1.0 - m as f64);
     }
-}
-
-fn pairs(coordinates: &[f64]) -> core::ops::Range<usize> {
-    FIRST..coordinates.len() / 4
-}
-
-/// Where Re u₁₊ₘ and Re u₁₋ₘ stand among Re u₋ₕ, Im u₋ₕ, … without u₀.
-fn places(coordinates: &[f64], m: usize) -> (usize, usize) {
-    let harmonics = coordinates.len() / 4;
-    (2 * (harmonics + m), 2 * (harmonics + 1 - m))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coordinates::terms;
     use crate::descriptors::Descriptors;
     use crate::outline::{distance, edges};
+    use crate::statistics::terms;
 
     #[test]
     fn there_and_back() {
         for harmonics in [1, 3, 4, 5, 12] {
-            let before: Vec<f64> = (0..4 * harmonics).map(|k| libm::sin(count_as_f64(k * k))).collect();
+            let before: Vec<f64> = (0..4 * harmonics).map(|k| libm::sin((k * k) as f64)).collect();
             let mut after = before.clone();
             to_steps(&mut after);
             assert_eq!(after == before, harmonics < 4);

@@ -4,8 +4,7 @@
 //! side of the window. Polarity turns these lines into the points 2 q / |q|², and the cell's corners into the sides of
 //! their convex hull. The hull is found by gift wrapping, of many cells side by side.
 
-use crate::build::build;
-use crate::diagram::Diagram;
+use crate::diagram::{Diagram, build};
 use crate::error::Error;
 use crate::geometry::{Point, bounds, dot, length, sub};
 use crate::window::Window;
@@ -42,7 +41,7 @@ pub(crate) fn relaxed_diagram(sites: Vec<Point>, window: &Window, passes: usize)
 }
 
 /// The sites after some passes. None if there is a cell that this way cannot settle: one with very many sides.
-fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option<Vec<Point>> {
+pub(crate) fn relaxed(sites: &[Point], window: &Window, passes: usize) -> Option<Vec<Point>> {
     let mut sites = sites.to_vec();
     for _ in 0..passes {
         Grid::new(&sites, window).centroids(&mut sites)?;
@@ -55,7 +54,6 @@ struct Grid<'a> {
     window: &'a Window,
     origin: Point,
     side: f64,
-    /// Columns and rows.
     size: [usize; 2],
     /// Where the sites of each square begin, row by row, and the end.
     starts: Vec<usize>,

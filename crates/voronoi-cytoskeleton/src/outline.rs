@@ -28,9 +28,6 @@ type Chords = [f32; CHORDS];
 /// Far more than single precision errs by, as a share of the lengths at hand.
 const SLACK: f64 = 1e-5;
 
-/// Where there is nothing, in sizes of the outline.
-const FAR: f32 = 1e15;
-
 /// Segments from a to b = a + d.
 #[derive(Debug)]
 struct Block {
@@ -90,7 +87,6 @@ impl Outline {
         self.heights(&[point])[0]
     }
 
-    /// The heights of some points.
     pub(crate) fn heights(&self, points: &[Point]) -> Vec<f64> {
         let mut heights = vec![0.0; points.len()];
         measure(self, points, &mut heights);
@@ -211,7 +207,7 @@ impl Group {
             low: [f32::INFINITY; CHORDS],
             high: [f32::NEG_INFINITY; CHORDS],
         };
-        group.start[0][chains.len()..].fill(FAR);
+        group.start[0][chains.len()..].fill(1e15);
         for (i, chain) in chains.iter().enumerate() {
             let chain = chain.map(|point| sub(point, centre).map(|way| way / size));
             let chord = sub(chain[LANES], chain[0]);
@@ -237,7 +233,6 @@ impl Group {
         group
     }
 
-    /// Distances of a point from the chords.
     #[inline(always)]
     fn distances(&self, point: [f32; 2]) -> Chords {
         let mut distances = [0.0; CHORDS];

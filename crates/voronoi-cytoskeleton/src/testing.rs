@@ -26,7 +26,6 @@ pub(crate) fn pentagon() -> Window {
     Window::convex(&[[0.0, 0.0], [10.0, -2.0], [14.0, 6.0], [6.0, 12.0], [-1.0, 8.0]]).unwrap()
 }
 
-/// Points drawn in a window.
 pub(crate) fn draws(window: &Window, count: usize, seed: u64) -> Vec<Point> {
     let mut rng = rng(seed);
     (0..count).map(|_| window.draw(&mut rng)).collect()

@@ -1,7 +1,7 @@
-use crate::build::build;
+use crate::diagram::build;
 use crate::error::{Error, require};
 use crate::geometry::{Point, bounds, dot, length, sub};
-use crate::lloyd::relaxed_diagram;
+use crate::lloyd::{relaxed, relaxed_diagram};
 use crate::river::{DEGREE, Net};
 use crate::window::Window;
 use portable_numerics::random::uniform;
@@ -17,9 +17,7 @@ pub struct Torus {
     sites: usize,
     /// In and, by rounding, about the unit square.
     vertices: Vec<Point>,
-    /// The neighbours of each vertex.
     ways: Vec<[u32; DEGREE]>,
-    /// The length of the longest edge.
     longest: f64,
 }
 
@@ -39,7 +37,9 @@ impl Torus {
         let margin = MARGIN / (sites as f64).sqrt();
         let window = Window::rectangle([-margin; 2], [1.0 + margin; 2])?;
         for _ in 0..lloyd_passes {
-            let copies = relaxed_diagram(repeated(&places, margin).0, &window, 1)?.sites;
+            let (copies, _) = repeated(&places, margin);
+            let fast = relaxed(&copies, &window, 1);
+            let copies = fast.map_or_else(|| Ok(relaxed_diagram(copies, &window, 1)?.sites), Ok)?;
             places = copies[..sites].iter().map(|place| place.map(|c| c - c.floor())).collect();
         }
         let (copies, originals) = repeated(&places, margin);
@@ -116,10 +116,9 @@ impl Torus {
             })
             .collect();
 
-        const NONE: u32 = u32::MAX;
         // There are two vertices to a site.
-        let next = |chosen: &[usize]| u32::try_from(chosen.len()).unwrap_or(NONE);
-        let mut numbers = vec![NONE; places.len()];
+        let next = |chosen: &[usize]| u32::try_from(chosen.len()).ok();
+        let mut numbers = vec![None; places.len()];
         let mut chosen = Vec::with_capacity(3 * sites);
         for (vertex, &[x, y]) in places.iter().enumerate() {
             if x.abs() < half[0] && y.abs() < half[1] {
@@ -132,11 +131,11 @@ impl Torus {
         for number in 0..inner {
             ways.push(self.ways[chosen[number]].map(|way| {
                 let way = way as usize;
-                if numbers[way] == NONE {
+                if numbers[way].is_none() {
                     numbers[way] = next(&chosen);
                     chosen.push(way);
                 }
-                Some(numbers[way])
+                numbers[way]
             }));
         }
         ways.resize(chosen.len(), [None; DEGREE]);

@@ -10,13 +10,14 @@
 
 mod draws;
 mod splitmix;
-mod words;
 mod ziggurat;
 
-pub use draws::{Normals, below, between, chance, count, direction, normal, open_uniform, shuffle, uniform, unit};
+pub use draws::{
+    Normals, below, between, chance, count, direction, normal, normals_of_words, open_uniform, open_unit, shuffle,
+    uniform, unit,
+};
 pub use rand_core::Rng;
 pub use splitmix::SplitMix64;
-pub use words::{normals_of_words, open_unit};
 pub use ziggurat::Ziggurat;
 
 /// Raw moments of a sample within four standard errors of those of standard normal numbers.

@@ -16,19 +16,12 @@ fn either_order_of_corners_gives_the_same_window() {
 }
 
 #[test]
-fn around_holds_all_points() {
-    let points = [[3.0, 4.0], [-1.0, 9.0], [2.0, -2.0]];
-    let window = Window::around(&points).unwrap();
-    assert_eq!(window.area(), 4.0 * 11.0);
-    assert!(points.iter().all(|&point| window.contains(point)));
-}
-
-#[test]
 fn repeated_and_straight_corners_are_welcome() {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
     let window = Window::convex(&corners).unwrap();
-    assert_eq!(window.corners().len(), 5);
-    assert_eq!(window.area(), 2.0);
+    assert_eq!((window.corners().len(), window.area()), (5, 2.0));
+    let around = Window::around(&corners).unwrap();
+    assert!(around.area() == 2.0 && corners.iter().all(|&point| around.contains(point)));
 }
 
 #[test]
