@@ -91,7 +91,8 @@ mod tests {
     fn refusals_name_field_value_and_range() {
         let default = ColourParams::default;
         let halogen = |temperature_k| ColourParams { lamp: Lamp::Halogen { temperature_k }, ..default() };
-        let fields: [(&dyn Fn(f64) -> ColourParams, &[f64], &str); 3] = [
+        type Case<'a> = (&'a dyn Fn(f64) -> ColourParams, &'a [f64], &'a str);
+        let fields: [Case; 3] = [
             (
                 &|v| ColourParams { from_um: v, to_um: 0.6, ..default() },
                 &[0.0, 0.6, 0.7, f64::NAN],

@@ -29,7 +29,6 @@ fn field(depths_um: &[f64], stages_um: &[f64]) -> BrightField {
         padding: Padding::Periodic,
         depths_um: depths_um.to_vec(),
         stages_um: stages_um.to_vec(),
-        ..BrightFieldParams::default()
     };
     BrightField::new(&microscope(), &params).expect("the parameters are in order")
 }

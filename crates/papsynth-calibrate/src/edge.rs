@@ -157,7 +157,6 @@ fn sharp_edge(edge: &Edge, microscope: &MicroscopeParams, side: usize) -> Result
         padding: Padding::Periodic,
         depths_um: vec![0.0],
         stages_um: vec![0.0],
-        ..BrightFieldParams::default()
     };
     let field = BrightField::new(&Microscope::new(microscope)?, &params)?;
     #[expect(clippy::cast_possible_truncation, reason = "single precision images")]

@@ -62,7 +62,7 @@ pub(crate) fn study(args: &Study) -> Result<(), Failure> {
     };
     let stop = exit::watch()?;
     let folder = session.folder().display().to_string();
-    session.notes().iter().for_each(|note| exit::note(note));
+    session.notes().iter().for_each(exit::note);
     exit::print(&announcement(&session, &server))?;
     if args.open {
         open(&server.address());
@@ -114,7 +114,7 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
     if as_json {
         return exit::print(&format!("{}\n", serde_json::to_string_pretty(&pool).unwrap_or_default()));
     }
-    pool.notes.iter().for_each(|note| exit::note(note));
+    pool.notes.iter().for_each(exit::note);
     let rows = pool.subjects.iter().chain([&pool.random, &pool.pooled]);
     let means = [
         ("sensitivity", pool.mean_sensitivity),

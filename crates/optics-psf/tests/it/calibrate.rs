@@ -56,7 +56,6 @@ fn stack(condenser_na: f64, object: &[f32], depths: &[f64], stages: &[f64]) -> V
             padding: Padding::Periodic,
             depths_um: vec![depth],
             stages_um: stages.to_vec(),
-            ..BrightFieldParams::default()
         };
         let field = BrightField::new(&microscope, &params).unwrap();
         let mut specimen = field.specimen();

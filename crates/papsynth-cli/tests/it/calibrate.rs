@@ -55,7 +55,6 @@ fn bright_field(condenser_na: f64, stages_um: &[f64], object: impl Fn(f64, f64) 
         padding: Padding::Periodic,
         depths_um: vec![0.0],
         stages_um: stages_um.to_vec(),
-        ..BrightFieldParams::default()
     };
     let field = BrightField::new(&microscope, &params).unwrap();
     let mut specimen = field.specimen();

@@ -59,7 +59,7 @@ macro_rules! statistics {
             pub fn scalars(&self) -> Vec<Named> {
                 let mut all = Vec::new();
                 $(
-                    $(all.push(($name, self.$field));)?
+                    $(all.extend([($name, self.$field)]);)?
                     $(all.extend($names.into_iter().zip(self.$field));)?
                 )*
                 all
