@@ -419,7 +419,11 @@ mod tests {
                 let mut row = Row::default();
                 for c in 0..COLUMNS {
                     let value = uniform() + own + if c == 3 { shift } else { 0.0 };
-                    row.put(Family::Texture, format!("column {c}"), if (i + c).is_multiple_of(9) { f64::NAN } else { value });
+                    row.put(
+                        Family::Texture,
+                        format!("column {c}"),
+                        if (i + c).is_multiple_of(9) { f64::NAN } else { value },
+                    );
                 }
                 (row, [0.0; 2])
             };
