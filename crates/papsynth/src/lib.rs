@@ -9,6 +9,7 @@ mod debris;
 mod detect;
 mod engine;
 mod error;
+mod frame;
 mod fuse;
 pub mod key;
 #[cfg(feature = "learn")]
@@ -27,7 +28,8 @@ mod words;
 
 use portable_numerics::random;
 
-pub use engine::{Engine, Finished, Frame, Inputs, Plane, white_level};
+pub use engine::{Engine, Inputs};
 pub use error::{Cause, Error, Flaw};
+pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

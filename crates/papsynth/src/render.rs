@@ -4,16 +4,16 @@ use optics_psf::{Border, Gaussian, Scratch};
 use rand_core::Rng;
 
 use crate::detect::{Detector, Developing, sum_over};
-use crate::engine::{Engine, Finished, Plane};
 use crate::error::Cause;
+use crate::frame::{Finished, Plane};
 use crate::fuse;
 use crate::phantom::tile::lay;
-use crate::phantom::{self, Phantom, Piece};
+use crate::phantom::{self, Phantom, Piece, Studio};
 use crate::profile::{Stage, Watch};
 use crate::recipe::Restore;
 use crate::scene::{Body, Object, Scene, View};
 use crate::threads::{self, Threads};
-use crate::transmit::{Band, FocusAt, Light, LightPath, Slide};
+use crate::transmit::{Band, FocusAt, Lenses, Light, LightPath, Slide};
 use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, fronts, with_layers};
 
 /// Memory that one image leaves to the next: fresh memory costs more time than much of what is written there.
@@ -41,8 +41,13 @@ pub(crate) struct Rendering {
 }
 
 impl Rendering {
-    pub(crate) fn new(engine: &Engine, scene: Scene, threads: Threads, desk: &mut Desk) -> Result<Self, Cause> {
-        let (studio, lenses) = (&engine.studio, &engine.lenses);
+    pub(crate) fn new(
+        studio: &Studio,
+        lenses: &Lenses,
+        scene: Scene,
+        threads: Threads,
+        desk: &mut Desk,
+    ) -> Result<Self, Cause> {
         let watch = studio.watch.clone();
         let pools = studio.pools.make(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();

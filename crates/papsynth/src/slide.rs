@@ -273,7 +273,7 @@ impl<'a> Slide<'a> {
             })
         };
         self.engine.at_desk(|desk| {
-            let mut rendering = Rendering::new(self.engine, scene, threads, desk)?;
+            let mut rendering = Rendering::new(&self.engine.studio, &self.engine.lenses, scene, threads, desk)?;
             let mut planes = Vec::new();
             for index in 0..rendering.planes() {
                 let plane = rendering.plane(index, desk)?;

@@ -13,9 +13,9 @@ use optics_psf::{
 use portable_numerics::elementary::exp10_from;
 
 use super::canvas::{Canvas, Mixer, Window, add, clear};
+use super::light::{FocusAt, Light, Passage, Slide};
 use super::lights::{ColouredLight, Group, Lenses, groups};
 use super::overlap::Overlaps;
-use super::{FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
 use crate::phantom::tile::Tile;

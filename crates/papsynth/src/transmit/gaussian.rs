@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use optics_psf::{Gaussian, Method, Scratch};
 
 use super::canvas::{Window, add, blurred};
-use super::{FocusAt, Light, Passage, Slide};
+use super::light::{FocusAt, Light, Passage, Slide};
 use crate::detect::sum_over;
 use crate::error::Cause;
 use crate::phantom::piece::Piece;

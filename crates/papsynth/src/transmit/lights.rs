@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use optics_psf::{Microscope, MicroscopeParams, PatchImager, Zernike};
 
-use super::Slide;
 use super::canvas::Mixer;
+use super::light::Slide;
 use crate::error::Cause;
 use crate::recipe::Mixing;
 use crate::scene::{SceneLight, SceneMicroscope};

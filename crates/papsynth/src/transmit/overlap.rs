@@ -10,8 +10,8 @@ use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;
 use optics_psf::{Gaussian, Method, Scratch};
 
-use super::Slide;
 use super::canvas::{Window, add, blurred};
+use super::light::Slide;
 use crate::error::Cause;
 use crate::phantom::piece::Phantom;
 use crate::phantom::tile::{Tile, lay};
