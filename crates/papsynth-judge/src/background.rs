@@ -78,11 +78,10 @@ impl Background {
         } else {
             quantile(&mut spreads, 0.5)
         };
-        let place = |b: &Block| [2.0 * b.x / width as f64 - 1.0, 2.0 * b.y / height as f64 - 1.0];
         let mut surface = Surface([brightest, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let mut band = FIRST_BAND * brightest;
         for _ in 0..ROUNDS {
-            let rest = |b: &Block| b.level - surface.at(place(b));
+            let rest = |b: &Block| b.level - surface.at(b.place);
             let chosen: Vec<&Block> =
                 blocks.iter().filter(|b| b.spread <= even.max(1e-4) && rest(b).abs() < band).collect();
             if chosen.len() < 2 * TERMS {
@@ -90,7 +89,7 @@ impl Background {
             }
             let mut rests: Vec<f64> = chosen.iter().map(|b| rest(b).abs()).collect();
             band = (4.0 * median(&mut rests)).clamp(NARROWEST_BAND * brightest, band);
-            let points: Vec<([f64; 2], f64)> = chosen.iter().map(|b| (place(b), b.level)).collect();
+            let points: Vec<([f64; 2], f64)> = chosen.iter().map(|b| (b.place, b.level)).collect();
             surface = Surface::fit(&points, STIFFNESS * blocks.len() as f64);
         }
         Self { surface, width, height }
@@ -133,8 +132,8 @@ impl Background {
 }
 
 struct Block {
-    x: f64,
-    y: f64,
+    /// Of its middle, over −1..1.
+    place: [f64; 2],
     /// Median, a part of full scale.
     level: f64,
     /// Distance between the 10th and the 90th percentile.
@@ -153,8 +152,9 @@ fn blocks(grey: &[f32], width: usize, full_scale: f32) -> Vec<Block> {
             }
             values.sort_unstable_by(f32::total_cmp);
             let at = |q: f64| f64::from(values[nearest(q * (values.len() - 1) as f64)] / full_scale);
-            let half = BLOCK as f64 / 2.0;
-            blocks.push(Block { x: x as f64 + half, y: y as f64 + half, level: at(0.5), spread: at(0.9) - at(0.1) });
+            let middle = |from: usize, length: usize| 2.0 * (from as f64 + BLOCK as f64 / 2.0) / length as f64 - 1.0;
+            let place = [middle(x, width), middle(y, height)];
+            blocks.push(Block { place, level: at(0.5), spread: at(0.9) - at(0.1) });
         }
     }
     blocks

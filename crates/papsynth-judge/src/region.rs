@@ -350,12 +350,12 @@ mod tests {
             };
             let shape = region(120, 100, inside).shape();
             assert!((shape.area - a * b * std::f64::consts::PI).abs() < 15.0, "{shape:?}");
-            assert!(distance(shape.centre, [60.3, 49.9]) < 0.05 && shape.solidity > 0.975, "{shape:?}");
+            assert!(distance(shape.centre, [60.3, 49.9]) < 0.07, "{shape:?}");
             if a > b {
                 assert!((shape.eccentricity - 0.75_f64.sqrt()).abs() < 0.005, "{shape:?}");
                 assert!((shape.direction - 0.5).abs() < 0.01, "{shape:?}");
             } else {
-                assert!(shape.eccentricity < 0.1 && shape.circularity > 0.96, "{shape:?}");
+                assert!(shape.eccentricity < 0.1 && shape.solidity > 0.975 && shape.circularity > 0.96, "{shape:?}");
             }
         }
     }

@@ -2,10 +2,6 @@
 
 use portable_numerics::statistics;
 
-fn of_at_least(count: usize, values: &[f64], statistic: impl Fn(&[f64]) -> f64) -> f64 {
-    if values.len() < count { 0.0 } else { statistic(values) }
-}
-
 /// The values in order.
 pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
@@ -21,7 +17,7 @@ pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {
 
 /// As [`quantile`], of values in order.
 pub(crate) fn of_sorted(values: &[f64], q: f64) -> f64 {
-    of_at_least(1, values, |values| statistics::quantile_of_sorted(values, q))
+    if values.is_empty() { 0.0 } else { statistics::quantile_of_sorted(values, q) }
 }
 
 /// The middle value; 0 of none. Sorts the values.
@@ -31,12 +27,12 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
 
 /// Mean; 0 of none.
 pub(crate) fn mean(values: &[f64]) -> f64 {
-    of_at_least(1, values, statistics::mean)
+    if values.is_empty() { 0.0 } else { statistics::mean(values) }
 }
 
 /// Standard deviation of a sample; 0 of fewer than two.
 pub(crate) fn deviation(values: &[f64]) -> f64 {
-    of_at_least(2, values, statistics::deviation)
+    if values.len() < 2 { 0.0 } else { statistics::deviation(values) }
 }
 
 /// The area under the ROC curve: the probability that a score of `high` exceeds one of `low`, ties counted half; ½ if one is empty.

@@ -178,19 +178,7 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             off_centre,
         });
     }
-    if on(P::Scatter) {
-        r.background.scatter = about(get(P::Scatter), &setting.base.background.scatter);
-    }
     camera(&mut r, setting, &on, &or_base);
-    for (parameter, field) in [
-        (P::Across, &mut r.focus.fused_noise_across),
-        (P::Down, &mut r.focus.fused_noise_down),
-        (P::Depth, &mut r.slide.depth_um),
-    ] {
-        if on(parameter) {
-            *field = number(get(parameter));
-        }
-    }
     if either(P::Blur, P::BlurSpread) {
         *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
     }
@@ -206,12 +194,6 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             of_slide.into_iter().for_each(|slide| *slide = 1.0.into());
         }
     }
-    if on(P::Dome) {
-        r.nucleus.dome = within(get(P::Dome), 0.2);
-    }
-    if on(P::Rim) {
-        r.nucleus.rim = Number::uniform(0.0, rounded(2.0 * get(P::Rim)));
-    }
     if on(P::Structure) {
         let factor = get(P::Structure);
         let cytoplasm = &mut r.cytoplasm;
@@ -224,14 +206,22 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             *number = cut(times(number, factor), 0.0, most);
         }
     }
-    cells(&mut r, area, &base, &on, &or_base);
+    cells(&mut r, area, &on, &or_base);
+    // From the value and what the recipe to begin with has.
+    let mut single: Vec<(P, &mut Number, fn(f64, &Number) -> Number)> = vec![
+        (P::Scatter, &mut r.background.scatter, about),
+        (P::Across, &mut r.focus.fused_noise_across, |value, _| number(value)),
+        (P::Down, &mut r.focus.fused_noise_down, |value, _| number(value)),
+        (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
+        (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),
+        (P::Rim, &mut r.nucleus.rim, |value, _| Number::uniform(0.0, rounded(2.0 * value))),
+    ];
     if let Layout::Clusters(Clusters { radius_um, outside, .. }) = &mut r.layout {
-        if on(P::ClusterRadius) {
-            *radius_um = about(get(P::ClusterRadius), radius_um);
-        }
-        if on(P::Outside) {
-            *outside = number(get(P::Outside));
-        }
+        single.push((P::ClusterRadius, radius_um, about));
+        single.push((P::Outside, outside, |value, _| number(value)));
+    }
+    for (parameter, field, made) in single.into_iter().filter(|(parameter, ..)| on(*parameter)) {
+        *field = made(get(parameter), field);
     }
     let debris = &mut r.debris;
     for (parameter, count) in [
@@ -296,7 +286,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     camera.prnu = number(pattern.sqrt() / signal);
 }
 
-fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
+fn cells(r: &mut Recipe, area: f64, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
     let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
     let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
     let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
@@ -311,7 +301,7 @@ fn cells(r: &mut Recipe, area: f64, base: &Values, on: &impl Fn(P) -> bool, or_b
             };
             mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSpread)));
         } else {
-            mix.count = counted(times(&mix.count, base.get(P::Cells) * area / base_total.max(1e-9)));
+            mix.count = counted(times(&mix.count, scale));
         }
         if on(P::Size) {
             mix.size = number(or_base(P::Size));

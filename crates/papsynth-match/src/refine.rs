@@ -32,7 +32,7 @@ const LEAST_ERROR: f64 = 0.05;
 
 impl Forward {
     pub(crate) fn new(table: &Table) -> Self {
-        let scaler = Scaler::new(&table.statistics);
+        let scaler = Scaler::new(&table.statistics.iter().map(Vec::as_slice).collect::<Vec<_>>());
         let statistics: Vec<Vec<f64>> = table.statistics.iter().map(|r| scaler.scaled(r)).collect();
         let rows: Vec<Vec<f64>> = table.places.iter().map(|p| features(p)).collect();
         let features = Features::new(&rows);

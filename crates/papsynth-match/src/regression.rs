@@ -37,34 +37,31 @@ const FARTHEST: f64 = 4.0;
 const LEAST_MISS: f64 = 0.02;
 
 /// Brings statistics to one scale; what is unknown counts as the mean, and what lies beyond all rows as the farthest of them.
+///
+/// Of each, mean, standard deviation, least and largest value.
 #[derive(Debug, Clone)]
-pub(crate) struct Scaler {
-    means: Vec<f64>,
-    deviations: Vec<f64>,
-    ranges: Vec<[f64; 2]>,
-}
+pub(crate) struct Scaler(Vec<[f64; 4]>);
 
 impl Scaler {
-    pub(crate) fn new<R: AsRef<[f64]>>(rows: &[R]) -> Self {
-        let columns = rows.first().map_or(0, |r| r.as_ref().len());
-        let column = |c: usize| -> Vec<f64> { rows.iter().map(|r| r.as_ref()[c]).filter(|v| v.is_finite()).collect() };
-        let of = |f: fn(&[f64]) -> f64| {
-            (0..columns).map(|c| f(&column(c))).map(|v| if v.is_finite() { v } else { 0.0 }).collect()
+    pub(crate) fn new(rows: &[&[f64]]) -> Self {
+        let column = |c: usize| {
+            let known: Vec<f64> = rows.iter().map(|r| r[c]).filter(|v| v.is_finite()).collect();
+            let [mean, sd] = [mean(&known), deviation(&known)].map(|v| if v.is_finite() { v } else { 0.0 });
+            let [low, high] = reach(&known);
+            [mean, sd, low, high]
         };
-        let ranges = (0..columns).map(|c| reach(&column(c))).collect();
-        Self { means: of(mean), deviations: of(deviation), ranges }
+        Self((0..rows.first().map_or(0, |r| r.len())).map(column).collect())
     }
 
     pub(crate) fn scaled(&self, row: &[f64]) -> Vec<f64> {
-        let one = |(c, value): (usize, &f64)| {
-            let (sd, [low, high]) = (self.deviations[c], self.ranges[c]);
-            if value.is_finite() && sd > 0.0 {
-                ((value.clamp(low, high) - self.means[c]) / sd).clamp(-FARTHEST, FARTHEST)
+        let one = |(value, [mean, sd, low, high]): (&f64, &[f64; 4])| {
+            if value.is_finite() && *sd > 0.0 {
+                ((value.clamp(*low, *high) - mean) / sd).clamp(-FARTHEST, FARTHEST)
             } else {
                 0.0
             }
         };
-        row.iter().enumerate().map(one).collect()
+        row.iter().zip(&self.0).map(one).collect()
     }
 }
 

@@ -149,24 +149,17 @@ impl<'a> Plan<'a> {
         if stopped.into_inner() {
             return Err(Error::Stopped);
         }
-        let mut table = Table { places: Vec::new(), statistics: Vec::new(), names: Vec::new() };
-        let mut reason = String::new();
-        for result in made {
-            match result {
-                Ok((places, summary)) => {
-                    table.names = summary.names;
-                    table.statistics.push(summary.values);
-                    table.places.push(places);
-                }
-                Err(error) => reason = error.to_string(),
-            }
-        }
+        let reason = made.iter().rev().find_map(|row| row.as_ref().err()).map(ToString::to_string);
+        let rows: Vec<(Vec<f64>, Summary)> = made.into_iter().flatten().collect();
+        let made = rows.len();
         /// Ranges meet in corners where there is no room for so many cells; more than that is a mistake.
         const MOST_FAILED: f64 = 0.2;
-        if ((recipes - table.places.len()) as f64) > MOST_FAILED * recipes as f64 {
-            return Err(Error::Table { made: table.places.len(), asked: recipes, reason });
+        if (recipes - made) as f64 > MOST_FAILED * recipes as f64 {
+            return Err(Error::Table { made, asked: recipes, reason: reason.unwrap_or_default() });
         }
-        Ok(table)
+        let names = rows.last().map(|row| row.1.names.clone()).unwrap_or_default();
+        let (places, statistics) = rows.into_iter().map(|(places, summary)| (places, summary.values)).unzip();
+        Ok(Table { places, statistics, names })
     }
 }
 

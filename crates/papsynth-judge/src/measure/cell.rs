@@ -218,17 +218,14 @@ impl Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::Picture;
+    use crate::measure::ids;
     use crate::region::Region;
 
     const PIXEL_UM: f64 = 0.33;
 
     /// A field of one absorbance image.
     fn maps(a: impl Fn(f64, f64) -> f64) -> Maps {
-        let (width, height) = (260, 220);
-        let at = |i: usize| crate::number::single(240.0 * libm::pow(10.0, -a((i % width) as f64, (i / width) as f64)));
-        let grey = (0..width * height).map(at).collect();
-        Maps::new(&Picture { grey, width, ..Picture::default() })
+        Maps::drawn(260, 220, |x, y| 240.0 * libm::pow(10.0, -a(x, y)))
     }
 
     fn disc(maps: &Maps, x: f64, y: f64, radius: f64) -> Region {
@@ -236,12 +233,6 @@ mod tests {
             .map(|i| distance([(i % maps.width) as f64, (i / maps.width) as f64], [x, y]) < radius)
             .collect();
         components(&inside, maps.width).remove(0)
-    }
-
-    fn ids(maps: &Maps, nuclei: &[Region]) -> Vec<u32> {
-        let mut ids = vec![0; maps.absorbance.len()];
-        (1..).zip(nuclei).for_each(|(id, nucleus)| nucleus.pixels.iter().for_each(|p| ids[*p as usize] = id));
-        ids
     }
 
     #[test]

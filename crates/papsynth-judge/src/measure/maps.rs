@@ -160,18 +160,22 @@ fn sigma(slope: f64, wide_slope: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
+    impl Maps {
+        /// Of a light at each column and row.
+        pub(crate) fn drawn(width: usize, height: usize, light: impl Fn(f64, f64) -> f64) -> Self {
+            let at = |i: usize| crate::number::single(light((i % width) as f64, (i / width) as f64));
+            Self::new(&Picture { grey: (0..width * height).map(at).collect(), width, ..Picture::default() })
+        }
+    }
+
     #[test]
     fn the_blur_of_an_edge_is_found_whatever_its_direction() {
-        let (width, height) = (120, 100);
         for (sigma, turn) in [(0.8, 0.0), (1.0, 0.3), (1.5, 0.8), (2.0, 1.2), (3.0, 2.5)] {
             let (sin, cos) = (libm::sin(turn), libm::cos(turn));
-            let at = |i: usize| {
-                let d = ((i % width) as f64 - 60.0) * cos + ((i / width) as f64 - 50.0) * sin;
-                let a = 0.2 * (1.0 + libm::erf(d / (sigma * std::f64::consts::SQRT_2)));
-                crate::number::single(240.0 * libm::pow(10.0, -a))
-            };
-            let grey = (0..width * height).map(at).collect();
-            let maps = Maps::new(&Picture { grey, width, ..Picture::default() });
+            let maps = Maps::drawn(120, 100, |x, y| {
+                let d = (x - 60.0) * cos + (y - 50.0) * sin;
+                240.0 * libm::pow(10.0, -0.2 * (1.0 + libm::erf(d / (sigma * std::f64::consts::SQRT_2))))
+            });
             let mut sigmas: Vec<f64> = maps.edges.iter().map(|e| e.sigma).collect();
             assert!(sigmas.len() > 80, "{} places", sigmas.len());
             let found = crate::statistics::median(&mut sigmas);

@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::nuclei::{NucleiParams, nuclei};
 use crate::number::nearest;
 use crate::picture::{Known, Picture};
+use crate::region::Region;
 use crate::table::Table;
 use maps::Maps;
 
@@ -152,11 +153,7 @@ impl Gauge {
         let pixel_um = self.params.pixel_um;
         let maps = Maps::new(&picture);
         let regions = self.nuclei(&maps, &picture.nuclei);
-        // In every pixel the number of its nucleus from 1 on, or 0.
-        let mut ids = vec![0; maps.absorbance.len()];
-        for (id, region) in (1..).zip(&regions) {
-            region.pixels.iter().for_each(|p| ids[*p as usize] = id);
-        }
+        let ids = ids(&maps, &regions);
         let cells = cell::cells(&maps, &ids, &regions, pixel_um);
         let free = regions.iter().filter(|r| !r.at_border());
         let of_nuclei = free.map(|r| (nucleus::features(&maps, r, &ids, pixel_um), r.shape().centre));
@@ -182,7 +179,7 @@ impl Gauge {
         })
     }
 
-    fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<crate::region::Region> {
+    fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<Region> {
         let search = |known: &Known| nuclei(&maps.absorbance, maps.width, known, &self.params);
         match (self.params.nuclei_from, known) {
             (NucleiFrom::Masks, Known::Masks(_)) | (NucleiFrom::Points, Known::Points(_)) => search(known),
@@ -192,6 +189,15 @@ impl Gauge {
             _ => search(&Known::Nothing),
         }
     }
+}
+
+/// In every pixel the number of its region from 1 on, or 0.
+fn ids(maps: &Maps, regions: &[Region]) -> Vec<u32> {
+    let mut ids = vec![0; maps.absorbance.len()];
+    for (id, region) in (1..).zip(regions) {
+        region.pixels.iter().for_each(|p| ids[*p as usize] = id);
+    }
+    ids
 }
 
 /// The mean; NaN of nothing.

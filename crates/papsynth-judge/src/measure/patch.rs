@@ -285,16 +285,10 @@ fn classes() -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::Picture;
-
-    fn maps(width: usize, height: usize, light: impl Fn(usize, usize) -> f64) -> Maps {
-        let grey = (0..width * height).map(|i| crate::number::single(light(i % width, i / width))).collect();
-        Maps::new(&Picture { grey, width, ..Picture::default() })
-    }
 
     #[test]
     fn patterns_are_those_counted_pixel_by_pixel() {
-        let maps = maps(41, 37, |x, y| 120.0 + ((x * x * 7 + y * 13 + x * y) % 23) as f64);
+        let maps = Maps::drawn(41, 37, |x, y| 120.0 + (x * x * 7.0 + y * 13.0 + x * y) % 23.0);
         for (radius, sigma) in PATTERNS {
             let image = smoothed(&maps, sigma);
             let near = (radius * 7 + 5) / 10;
@@ -314,11 +308,12 @@ mod tests {
 
     #[test]
     fn stripes_are_coherent_and_dark_lines_are_ridges() {
-        let lines = |x: usize, y: usize| if (x + 2 * y) % 24 < 3 { 150.0 } else { 170.0 };
-        let spots = |x: usize, y: usize| if x % 16 < 4 && y % 16 < 4 { 150.0 } else { 170.0 };
+        let lines = |x: f64, y: f64| if (x + 2.0 * y) % 24.0 < 3.0 { 150.0 } else { 170.0 };
+        let spots = |x: f64, y: f64| if x % 16.0 < 4.0 && y % 16.0 < 4.0 { 150.0 } else { 170.0 };
         // A bright margin is the empty slide.
-        let field =
-            |of: fn(usize, usize) -> f64| patches(&maps(200, 200, move |x, y| if x < 40 { 240.0 } else { of(x, y) }));
+        let field = |of: fn(f64, f64) -> f64| {
+            patches(&Maps::drawn(200, 200, move |x, y| if x < 40.0 { 240.0 } else { of(x, y) }))
+        };
         let (lines, spots) = (field(lines), field(spots));
         assert_eq!((lines.len(), spots.len()), (1, 1));
         let value = |table: &Table, name: &str| table.column(name).next().unwrap();
@@ -328,7 +323,7 @@ mod tests {
 
     #[test]
     fn a_field_is_cut_into_patches_from_its_corner() {
-        let table = patches(&maps(430, 250, |x, y| 200.0 + (x % 7) as f64 + (y % 5) as f64));
+        let table = patches(&Maps::drawn(430, 250, |x, y| 200.0 + x % 7.0 + y % 5.0));
         assert_eq!(table.places, [[100.0, 100.0], [300.0, 100.0]]);
         let names: std::collections::BTreeSet<&str> = table.features.iter().map(|f| f.name.as_str()).collect();
         assert_eq!(names.len(), table.features.len());
