@@ -1,6 +1,5 @@
 //! `papsynth inspect`: what is in a data set.
 
-use std::fmt::Write;
 use std::ops::Range;
 
 use papsynth_dataset::{Identity, Overview, inspect};
@@ -34,10 +33,7 @@ const MOST: usize = 10;
 fn table(dir: &str, overview: &Overview) -> String {
     let identity = &overview.manifest.identity;
     let mut out = String::new();
-    let mut row = |name: &str, value: &str| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(out, "{name:<12}{value}");
-    };
+    let mut row = |name: &str, value: &str| out.push_str(&format!("{name:<12}{value}\n"));
     row("data set", dir);
     row("written by", &overview.manifest.writer);
     row("seed", &identity.seed.to_string());

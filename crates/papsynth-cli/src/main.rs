@@ -4,10 +4,8 @@
 mod args;
 #[cfg(feature = "calibrate")]
 mod calibrate;
-mod excerpt;
 mod exit;
 mod generate;
-mod init;
 mod inspect;
 #[cfg(feature = "judge")]
 mod judge;
@@ -16,10 +14,8 @@ mod learn;
 #[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
-mod place;
 mod plan;
 mod preview;
-mod profile;
 mod recipe_file;
 mod report;
 mod rerender;
@@ -34,11 +30,14 @@ mod text_file;
 mod web;
 mod words;
 
+use std::fs::OpenOptions;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
+use papsynth::recipe::{Preset, Recipe};
 
-use args::{Cli, Verb};
+use args::{Cli, Init, Verb};
 use exit::Failure;
 
 fn main() -> ExitCode {
@@ -52,7 +51,7 @@ fn main() -> ExitCode {
         }
     };
     let json = matches!(&cli.verb, Verb::Generate(args) if args.json);
-    match place::check(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
+    match args::check_addresses(&cli.verb, std::env::args_os()).and_then(|()| run(cli.verb)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             let code = failure.code();
@@ -69,7 +68,7 @@ fn main() -> ExitCode {
 
 fn run(verb: Verb) -> Result<(), Failure> {
     match verb {
-        Verb::Init(args) => init::run(&args),
+        Verb::Init(args) => init(&args),
         Verb::Generate(args) => generate::run(&args),
         Verb::Preview(args) => preview::run(&args),
         Verb::Render(args) => preview::render(*args),
@@ -97,7 +96,7 @@ fn run(verb: Verb) -> Result<(), Failure> {
         #[cfg(feature = "web")]
         Verb::View(args) => web::view(&args),
         Verb::Schema(_) => {
-            let schema = papsynth::recipe::Recipe::schema();
+            let schema = Recipe::schema();
             exit::print(&format!("{schema:#}\n"))
         }
         #[cfg(feature = "completions")]
@@ -116,5 +115,25 @@ fn run(verb: Verb) -> Result<(), Failure> {
         Verb::Learn(_) => Err(Failure::left_out("learn")),
         #[cfg(not(feature = "web"))]
         Verb::Study(_) | Verb::View(_) => Err(Failure::left_out("web")),
+    }
+}
+
+/// `papsynth init`: a recipe to start from.
+fn init(args: &Init) -> Result<(), Failure> {
+    if args.list {
+        let longest = Preset::ALL.iter().map(|preset| preset.name().len()).max().unwrap_or(0);
+        let lines = Preset::ALL.map(|preset| format!("{:<longest$}  {}\n", preset.name(), preset.summary()));
+        return exit::print(&lines.concat());
+    }
+    let text = args.preset.recipe().to_commented_toml();
+    match &args.out {
+        None => exit::print(&text),
+        // A recipe that someone wrote by hand is never replaced.
+        Some(path) => OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(path)
+            .and_then(|mut file| file.write_all(text.as_bytes()))
+            .map_err(|error| Failure::file("write", path, &error)),
     }
 }

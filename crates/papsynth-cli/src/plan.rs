@@ -1,7 +1,6 @@
 //! `papsynth plan`: what a data set will cost.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -79,10 +78,7 @@ fn table(args: &Plan, setup: &Setup, layout: &Layout, samples: &Samples) -> Stri
     let hours = |seconds: f64| seconds.max(0.0) * frames / 3600.0;
     let shards = args.frames.div_ceil(layout.frames_per_shard);
     let mut out = String::new();
-    let mut row = |name: &str, value: String| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(out, "{name:<14}{value}");
-    };
+    let mut row = |name: &str, value: String| out.push_str(&format!("{name:<14}{value}\n"));
     row("frames", format!("{} in {shards} shards of {} ({layout})", args.frames, layout.frames_per_shard));
     let [ms, low, high] = [mean, (mean - half).max(0.0), mean + half].map(|seconds| 1e3 * seconds);
     row("a frame", format!("{ms:.0} ms on one thread, {low:.0} to {high:.0} (95 %, {count} frames)"));

@@ -1,17 +1,19 @@
-//! Images and their truth as arrays.
+//! Images and their truth as arrays, and frames as pickle keeps them: their arrays, and what is known of each object, its masks
+//! as counts of pixels.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods};
 use papsynth::Plane;
-use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth};
-use papsynth_dataset::{Column, columns, rle, write_png};
+use papsynth::scene::{Kind, Tint};
+use papsynth::truth::{Bounds, Group, Mask, ObjectTruth, Part, Truth, UnknownTrait};
+use papsynth_dataset::{Column, Problem, columns, rle, write_png};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
 
-use crate::{error, pickled};
+use crate::error::{self, wrong};
 
 /// An image or focus stack, with everything that is known of it. Arrays are the frame's own, whoever asks for them: copy them before you change them.
 ///
@@ -256,7 +258,7 @@ impl Frame {
         let arrays = [&self.image, &self.stack, &self.noise_free].map(|array| array.clone_ref(py));
         let key = (self.seed, self.index, self.slide);
         let scale = (self.pixel_um, self.planes_um.clone(), self.bits, [width, height]);
-        let state = (pickled::VERSION, key, scale, arrays, py.detach(|| pickled::objects(&self.truth)));
+        let state = (PICKLED, key, scale, arrays, py.detach(|| pickled_objects(&self.truth)));
         Ok((py.import("papsynth._native")?.getattr("_restored")?, state))
     }
 
@@ -275,7 +277,7 @@ impl Frame {
 }
 
 /// Version; seed, index, slide; µm of a pixel, planes, bits, width and height; image, stack and light without noise; objects.
-type Pickled = (u32, (u64, u64, u64), (f64, Vec<f64>, u32, [usize; 2]), [Py<PyAny>; 3], Vec<pickled::Object>);
+type Pickled = (u32, (u64, u64, u64), (f64, Vec<f64>, u32, [usize; 2]), [Py<PyAny>; 3], Vec<PickledObject>);
 
 /// A frame that was pickled.
 #[pyfunction]
@@ -286,12 +288,11 @@ pub(crate) fn restored(
     key: (u64, u64, u64),
     scale: (f64, Vec<f64>, u32, [usize; 2]),
     arrays: [Py<PyAny>; 3],
-    objects: Vec<pickled::Object>,
+    objects: Vec<PickledObject>,
 ) -> PyResult<Frame> {
-    if version != pickled::VERSION {
-        const KNOWN: u32 = pickled::VERSION;
-        let message = format!("this frame was pickled in version {version} of its form; this papsynth reads {KNOWN}");
-        return Err(error::wrong(message));
+    if version != PICKLED {
+        let message = format!("this frame was pickled in version {version} of its form; this papsynth reads {PICKLED}");
+        return Err(wrong(message));
     }
     let ((seed, index, slide), (pixel_um, planes_um, bits, [width, height])) = (key, scale);
     let [image, stack, noise_free] = arrays;
@@ -301,9 +302,9 @@ pub(crate) fn restored(
     if of_image.get(..2) != Some(&[height, width][..])
         || of_stack.split_first() != Some((&planes_um.len(), &of_image[..]))
     {
-        return Err(pickled::damaged("its arrays are not as large as it says"));
+        return Err(damaged("its arrays are not as large as it says"));
     }
-    let truth = pickled::truth([width, height], planes_um.len(), objects)?;
+    let truth = restored_truth([width, height], planes_um.len(), objects)?;
     Ok(Frame { seed, index, slide, pixel_um, planes_um, bits, image, stack, noise_free, truth, kept: Kept::default() })
 }
 
@@ -329,4 +330,92 @@ fn array<T: Element>(py: Python<'_>, values: Vec<T>, shape: Vec<usize>) -> PyRes
 fn text(py: Python<'_>, values: Vec<String>) -> PyResult<Py<PyAny>> {
     let numpy = py.import("numpy")?;
     numpy.call_method1("array", (values, "U"))?.into_py_any(py)
+}
+
+/// Version of how frames are pickled: changes with everything below.
+const PICKLED: u32 = 1;
+
+/// Id, group, kind, class, Bethesda category, traits; cluster, place, depth, stain, tint, direction, area, whether it is truncated; its masks;
+/// defocus and detectability.
+type PickledObject = (
+    (u32, String, String, String, String, String),
+    (u32, [f64; 2], f64, f64, String, f64, f64, bool),
+    (String, String),
+    (Vec<f64>, Vec<f64>),
+);
+
+fn pickled_objects(truth: &Truth) -> Vec<PickledObject> {
+    let Truth { width, height, objects } = truth;
+    let object = |o: &ObjectTruth| {
+        let kind = o.kind.name().to_owned();
+        (
+            (o.id, o.group().name().to_owned(), kind, o.class.clone(), o.bethesda.clone(), o.traits.to_string()),
+            (
+                o.cluster,
+                o.centre_um,
+                o.depth_um,
+                o.stain,
+                o.tint_name().to_owned(),
+                o.rotation_deg,
+                o.area_um2,
+                o.truncated,
+            ),
+            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.front, *width, *height)),
+            (o.defocus_um.clone(), o.detectability.clone()),
+        )
+    };
+    objects.iter().map(object).collect()
+}
+
+/// The truth of a frame of so many planes.
+fn restored_truth([width, height]: [usize; 2], planes: usize, objects: Vec<PickledObject>) -> PyResult<Truth> {
+    let objects = objects.into_iter().map(|object| restored_object(object, [width, height], planes));
+    Ok(Truth { width, height, objects: objects.collect::<PyResult<_>>()? })
+}
+
+fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: usize) -> PyResult<ObjectTruth> {
+    let (
+        (id, group, kind, class, bethesda, traits),
+        (cluster, centre_um, depth_um, stain, tint, rotation_deg, area_um2, truncated),
+        (amodal, front),
+        (defocus_um, detectability),
+    ) = object;
+    let unknown = |what: &str, name: &str| damaged(&format!("object {id}: there is no {what} `{name}`"));
+    let mask = |counts: &str| {
+        rle::decode(counts, width, height).map_err(|error: Problem| damaged(&format!("object {id}: {error}")))
+    };
+    if [defocus_um.len(), detectability.len()] != [planes; 2] {
+        return Err(damaged(&format!("object {id}: it is not seen in {planes} planes")));
+    }
+    let part = match Group::ALL.into_iter().find(|one| one.name() == group) {
+        Some(Group::Cytoplasm) => Part::Cytoplasm,
+        Some(Group::Nucleus) => Part::Nucleus,
+        Some(Group::Debris) => Part::Whole,
+        None => return Err(unknown("group", &group)),
+    };
+    let named = (!tint.is_empty()).then(|| Tint::by_name(&tint).ok_or_else(|| unknown("tint", &tint)));
+    Ok(ObjectTruth {
+        id,
+        part,
+        kind: Kind::ALL.into_iter().find(|one| one.name() == kind).ok_or_else(|| unknown("kind", &kind))?,
+        class,
+        bethesda,
+        traits: traits.try_into().map_err(|error: UnknownTrait| damaged(&format!("object {id}: {error}")))?,
+        cluster,
+        centre_um,
+        depth_um,
+        stain,
+        tint: named.transpose()?,
+        rotation_deg,
+        area_um2,
+        truncated,
+        amodal: mask(&amodal)?,
+        front: mask(&front)?,
+        defocus_um,
+        detectability,
+    })
+}
+
+fn damaged(what: &str) -> PyErr {
+    wrong(format!("this is no frame that was pickled: {what}"))
 }

@@ -8,7 +8,6 @@ mod engine;
 mod error;
 mod frame;
 mod learn;
-mod pickled;
 mod pool;
 mod sets;
 mod techniques;

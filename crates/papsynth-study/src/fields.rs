@@ -188,13 +188,13 @@ mod tests {
             picture(&scratch.join(name), 1, [64, 64]);
         }
         fs::write(scratch.join("notes.txt"), "no picture").unwrap();
-        let fields = Root::new(scratch.path()).unwrap().fields().unwrap();
+        let fields = Root::new(&scratch).unwrap().fields().unwrap();
         assert_eq!(fields.iter().map(|f| f.name.as_str()).collect::<Vec<_>>(), ["f1.png", "f9.png", "f10.png"]);
         assert!(fields.iter().all(|f| f.frame.is_none()));
         // Pictures may lie in a folder of that name.
         let below = Scratch::new("fields-images");
         picture(&below.join("images/a.png"), 1, [64, 64]);
-        assert_eq!(Root::new(below.path()).unwrap().fields().unwrap()[0].name, "images/a.png");
+        assert_eq!(Root::new(&below).unwrap().fields().unwrap()[0].name, "images/a.png");
     }
 
     #[test]
@@ -203,7 +203,7 @@ mod tests {
         let error = |path: &Path| Root::new(path).and_then(|root| root.fields()).unwrap_err();
         assert!(error(&scratch.join("missing")).to_string().contains("missing"));
         assert!(!error(&scratch.join("missing")).is_io());
-        error(scratch.path());
+        error(&scratch);
         fs::write(scratch.join("file"), "").unwrap();
         assert!(error(&scratch.join("file")).to_string().contains("a folder of pictures"));
         fs::create_dir_all(scratch.join("set/shards")).unwrap();

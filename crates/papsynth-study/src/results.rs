@@ -224,22 +224,15 @@ fn exposures(saved: &Saved) -> Option<Exposures> {
 mod tests {
     use super::*;
     use crate::design::{Answer, Side};
-    use crate::saved::Exposure;
     use crate::session::Session;
-    use crate::support::{Scratch, study_folders};
+    use crate::support::{Scratch, go_on, study_folders};
 
     /// A subject who gives these answers, over and over, to so many of 2 + 6 trials.
     fn subject(scratch: &Scratch, name: &str, task: Task, answers: &[Answer], trials: usize) {
         let params = StudyParams { subject: name.to_owned(), task, trials: 6, patch_px: 48, ..StudyParams::default() };
         let [real, synthetic, out] = ["real", "synthetic", "out"].map(|folder| scratch.join(folder));
         let mut session = Session::open(&params, &real, &synthetic, &out).unwrap();
-        for answer in answers.iter().cycle().take(trials) {
-            let patch = session.state().patches[0].clone();
-            let exposure = Exposure { exposure_ms: 2000.0, frames: 120, longest_frame_ms: 17.0, pixel_ratio: 1.0 };
-            session.patch(&patch).unwrap();
-            session.shown(&patch, exposure).unwrap();
-            session.answer(&patch, *answer, 300.0).unwrap();
-        }
+        answers.iter().cycle().take(trials).for_each(|answer| go_on(&mut session, *answer));
     }
 
     #[test]

@@ -303,13 +303,11 @@ fn lock(out: &Path, folder: &Path) -> Result<File, Error> {
 mod tests {
     use super::*;
     use crate::saved::read_all;
-    use crate::support::{Scratch, study_folders};
+    use crate::support::{EXPOSURE, Scratch, go_on, study_folders};
 
     fn params() -> StudyParams {
         StudyParams { trials: 6, training: 2, patch_px: 48, ..StudyParams::default() }
     }
-
-    const EXPOSURE: Exposure = Exposure { exposure_ms: 2000.0, frames: 120, longest_frame_ms: 16.7, pixel_ratio: 1.0 };
 
     fn open(scratch: &Scratch, params: &StudyParams) -> Result<Session, Error> {
         Session::open(params, &scratch.join("real"), &scratch.join("synthetic"), &scratch.join("out"))
@@ -319,14 +317,6 @@ mod tests {
         let scratch = Scratch::new(name);
         study_folders(&scratch, 3, 3);
         scratch
-    }
-
-    /// Answers the trial under way.
-    fn go_on(session: &mut Session, answer: Answer) {
-        let name = session.state().patches[0].clone();
-        session.patch(&name).unwrap();
-        session.shown(&name, EXPOSURE).unwrap();
-        session.answer(&name, answer, 500.0).unwrap();
     }
 
     #[test]

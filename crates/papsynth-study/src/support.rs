@@ -1,11 +1,15 @@
 //! Pictures to test with.
 
 use std::fs;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use papsynth_dataset::write_png;
 
+use crate::design::Answer;
 use crate::plan::Folders;
+use crate::saved::Exposure;
+use crate::session::Session;
 
 /// A folder of this test alone, removed at its end.
 pub(crate) struct Scratch(PathBuf);
@@ -17,13 +21,13 @@ impl Scratch {
         fs::create_dir_all(&path).unwrap();
         Self(path)
     }
+}
 
-    pub(crate) fn path(&self) -> &Path {
+impl Deref for Scratch {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
         &self.0
-    }
-
-    pub(crate) fn join(&self, name: &str) -> PathBuf {
-        self.0.join(name)
     }
 }
 
@@ -55,8 +59,19 @@ pub(crate) fn exposed(path: &Path, number: u32, [width, height]: [u32; 2], glass
 pub(crate) fn study_folders(scratch: &Scratch, real: u32, synthetic: u32) -> Folders {
     for (side, count, glass, first) in [("real", real, 200, 0), ("synthetic", synthetic, 230, 100)] {
         for k in 0..count {
-            exposed(&scratch.join(&format!("{side}/f{k}.png")), first + k, [300, 240], glass, 8);
+            exposed(&scratch.join(format!("{side}/f{k}.png")), first + k, [300, 240], glass, 8);
         }
     }
     Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap()
+}
+
+pub(crate) const EXPOSURE: Exposure =
+    Exposure { exposure_ms: 2000.0, frames: 120, longest_frame_ms: 16.7, pixel_ratio: 1.0 };
+
+/// Answers the trial under way.
+pub(crate) fn go_on(session: &mut Session, answer: Answer) {
+    let name = session.state().patches[0].clone();
+    session.patch(&name).unwrap();
+    session.shown(&name, EXPOSURE).unwrap();
+    session.answer(&name, answer, 500.0).unwrap();
 }

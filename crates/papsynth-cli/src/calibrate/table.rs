@@ -1,15 +1,10 @@
 //! Measurements as tables.
 
-use std::fmt::Write;
-
 use papsynth_calibrate::{Bound, Camera, Condenser, Edge, Focus, Level, Saturation};
 
 pub(super) fn focus(record: &Focus, pixel_um: Option<f64>) -> String {
     let mut out = String::new();
-    // Writing to a string cannot fail.
-    let mut line = |text: String| {
-        let _ = writeln!(out, "{}", text.trim_end());
-    };
+    let mut line = |text: String| out.push_str(&format!("{}\n", text.trim_end()));
     line("blur against focus offset (Fig. 10)".to_owned());
     for nucleus in &record.nuclei {
         let [x, y, w, h] = nucleus.window;
@@ -58,24 +53,21 @@ pub(super) fn edge(record: &Edge, pixel_um: Option<f64>) -> String {
     let [x, y, w, h] = record.window;
     let (sigma, error) = (record.sigma_px, record.error_px);
     let turn = libm::atan2(record.normal[1], record.normal[0]).to_degrees();
-    // Writing to a string cannot fail.
-    let _ = writeln!(out, "edge");
-    let _ = writeln!(out, "  window {x},{y},{w},{h}: lighter towards {turn:.0} degrees (0 right, 90 down)");
+    let mut line = |text: String| out.push_str(&format!("{text}\n"));
+    line("edge".to_owned());
+    line(format!("  window {x},{y},{w},{h}: lighter towards {turn:.0} degrees (0 right, 90 down)"));
     let Edge { dark, light, difference, .. } = record;
-    let _ = writeln!(out, "levels        {dark:.4} dark, {light:.4} light, {difference:.4} left by the fit");
-    let _ = writeln!(out, "sigma_xy      {sigma:.3} +- {error:.3} px, the pixel's own width included");
+    line(format!("levels        {dark:.4} dark, {light:.4} light, {difference:.4} left by the fit"));
+    line(format!("sigma_xy      {sigma:.3} +- {error:.3} px, the pixel's own width included"));
     if let Some(pixel) = pixel_um {
-        let _ = writeln!(out, "              {:.4} +- {:.4} um", sigma * pixel, error * pixel);
+        line(format!("              {:.4} +- {:.4} um", sigma * pixel, error * pixel));
     }
     out
 }
 
 pub(super) fn camera(record: &Camera) -> String {
     let mut out = String::from("photon transfer (EMVA 1288)\n");
-    // Writing to a string cannot fail.
-    let mut line = |text: String| {
-        let _ = writeln!(out, "{}", text.trim_end());
-    };
+    let mut line = |text: String| out.push_str(&format!("{}\n", text.trim_end()));
     line(format!("{:>8}{:>12}{:>14}{:>12}  level", "frames", "mean dn", "variance dn2", "at highest"));
     for level in &record.levels {
         let Level { frames, mean_dn, variance_dn2, name, .. } = level;
