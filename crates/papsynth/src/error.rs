@@ -1,7 +1,5 @@
 //! What can go wrong.
 
-use std::fmt;
-
 /// Why an engine cannot be made, or an image not drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -345,6 +343,14 @@ impl From<optics_psf::Error> for Cause {
     }
 }
 
+/// Refuses a number that is not finite or lies outside a range.
+pub(crate) fn within(field: &str, value: f64, [low, high]: [f64; 2]) -> Result<(), Cause> {
+    if value.is_finite() && (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(Cause::OutOfRange { field: field.to_owned(), value, low, high })
+}
+
 /// Why the image of a nucleus cannot be learned from.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -380,18 +386,13 @@ pub enum Flaw {
 }
 
 /// Something wrong with a recipe.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field}: {message}")]
 pub struct Problem {
     /// The field, as a dotted path: `optics.sigma_xy_um`.
     pub field: String,
     /// What is wrong with it: the value, and what would be accepted.
     pub message: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.field, self.message)
-    }
 }
 
 fn count(problems: &[Problem]) -> String {

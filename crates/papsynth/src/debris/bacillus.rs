@@ -24,7 +24,7 @@ section! {
         /// Absorbance.
         absorbance: Number = Number::log_normal(0.09, 0.35), 0..=4;
         /// How late light comes through a bacillus; seen by bright-field optics alone.
-        phase_rad: Number (given f64 as phase_rad: "How late light comes through it, radians.") = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
+        phase_rad: Number (given f64) = Number::uniform(0.1, 0.25), -3..=3, "radians of phase";
     }
 }
 

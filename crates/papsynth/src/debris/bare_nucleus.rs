@@ -43,7 +43,6 @@ const RIM: f32 = 0.15;
 /// Size (standard deviation) of clumps of chromatin, µm.
 const CLUMP_UM: f64 = 0.35;
 
-/// Shreds round a nucleus.
 const SHREDS: usize = 7;
 
 impl BareNucleus {

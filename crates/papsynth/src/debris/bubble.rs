@@ -36,7 +36,7 @@ impl Bubble {
         let mut rng = site.stream("shape");
         // Surface tension keeps it round.
         let circle = wobbled_circle(self.radius_um, 0.004, 0.01, &mut rng);
-        let outline: Vec<Point> = circle.iter().map(|p| site.place(*p)).collect();
+        let outline = site.places(&circle);
         let mut painting = site.painting(&outline, 0.0);
         painting.coverage.cover(&outline);
         let radius = site.px(self.radius_um);

@@ -32,7 +32,6 @@ impl Cocci {
     }
 }
 
-/// Longest chain.
 const LONGEST_CHAIN: usize = 24;
 
 /// Cocci to a clump of a cloud, on average, and the width of a clump relative to its cloud.

@@ -4,9 +4,8 @@ use crate::key::Stream;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
-use crate::scene::numbers::FieldNumbers;
+use crate::scene::field::{FieldNumbers, View};
 use crate::scene::stain::FieldStain;
-use crate::scene::view::View;
 
 /// A field whose cells have their places.
 pub(crate) struct Field<'a> {
@@ -99,8 +98,7 @@ impl<'a, T> Ground<'a, T> {
         let Some(sieve) = &self.field.sieve else { return numbers.count((&path, number)) as u64 };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
         let wanted = numbers.draw((&path, number)).max(0.0) * sieve.share * more;
-        let further = random::chance(wanted - wanted.floor(), &mut numbers.key.stream("field", 1, &path));
-        wanted as u64 + u64::from(further)
+        numbers.whole(&path, wanted)
     }
 
     /// The stream of a purpose of one object of the kind.
@@ -127,12 +125,6 @@ impl<'a, T> Ground<'a, T> {
     pub(super) fn anywhere(&self, rng: &mut Stream) -> [f64; 2] {
         let [width, height] = self.field.view.size_um();
         [random::between(0.0, width, rng), random::between(0.0, height, rng)]
-    }
-
-    /// A place and depth on a cell or anywhere.
-    pub(super) fn spot(&self, on_cells: &Number, rng: &mut Stream) -> ([f64; 2], f64) {
-        let Cluster { centre_um, depth_um, .. } = self.cluster(on_cells, &Number::Fixed(0.0), rng);
-        (centre_um, depth_um - beneath_um(rng))
     }
 
     /// A cluster on a cell or anywhere.
@@ -178,9 +170,11 @@ impl<'a, T> Ground<'a, T> {
     ) {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
-            let (centre_um, depth_um) = self.spot(on_cells, &mut rng);
+            let spot = self.cluster(on_cells, &Number::Fixed(0.0), &mut rng);
+            // Mostly on top of the cell, sometimes beneath it.
+            let down_um = if random::chance(BENEATH, &mut rng) { 2.0 * ON_TOP_UM } else { 0.0 };
             let thing = draw(&mut rng);
-            let lie = Lie::any_way(centre_um, depth_um, &mut rng);
+            let lie = Lie::any_way(spot.centre_um, spot.depth_um - down_um, &mut rng);
             self.add(number, 0, lie, thing);
         }
     }
@@ -250,9 +244,4 @@ pub(super) fn member_number(cluster: u64, member: u64) -> u64 {
 pub(crate) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
     dx * dx + dy * dy < distance * distance
-}
-
-/// How far below the top of a cell something lies that is strewn with it: mostly not at all, sometimes beneath it.
-fn beneath_um(rng: &mut Stream) -> f64 {
-    if random::chance(BENEATH, rng) { 2.0 * ON_TOP_UM } else { 0.0 }
 }

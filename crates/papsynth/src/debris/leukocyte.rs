@@ -139,14 +139,7 @@ const PRESSED: [f64; 2] = [0.72, 1.0];
 impl Cluster {
     /// A place of the clump that is so far from all others, if one is found.
     fn free_place(&self, taken: &[[f64; 2]], apart_um: f64, rng: &mut Stream) -> [f64; 2] {
-        let mut place = self.place(rng);
-        for _ in 0..TRIES {
-            if !taken.iter().any(|other| near(*other, place, apart_um)) {
-                break;
-            }
-            place = self.place(rng);
-        }
-        place
+        apart(taken, apart_um, || self.place(rng))
     }
 
     /// A place that touches one which is taken, or stays apart from all of them.
@@ -157,20 +150,24 @@ impl Cluster {
         if !random::chance(touching, rng) {
             return self.free_place(taken, cell_um, rng);
         }
-        let beside = |rng: &mut Stream| {
+        apart(taken, PRESSED[0] * cell_um, || {
             let other = taken[random::below(taken.len(), rng)];
             let (angle, distance) = (random::direction(rng), cell_um * random::between(PRESSED[0], PRESSED[1], rng));
             [other[0] + distance * libm::cos(angle), other[1] + distance * libm::sin(angle)]
-        };
-        let mut place = beside(rng);
-        for _ in 0..TRIES {
-            if !taken.iter().any(|other| near(*other, place, PRESSED[0] * cell_um)) {
-                break;
-            }
-            place = beside(rng);
-        }
-        place
+        })
     }
+}
+
+/// The first of some places that is so far from all others, or the last that is tried.
+fn apart(taken: &[[f64; 2]], apart_um: f64, mut place: impl FnMut() -> [f64; 2]) -> [f64; 2] {
+    let mut tried = place();
+    for _ in 0..TRIES {
+        if !taken.iter().any(|other| near(*other, tried, apart_um)) {
+            break;
+        }
+        tried = place();
+    }
+    tried
 }
 
 impl Leukocyte {

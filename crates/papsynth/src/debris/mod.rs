@@ -168,6 +168,15 @@ macro_rules! kinds {
                 }
             }
 
+            /// The number that says how many there are of a kind; of cells none does.
+            #[cfg(test)]
+            fn count_mut(&mut self, kind: Kind) -> Option<&mut crate::recipe::Number> {
+                match kind {
+                    Kind::Cell => None,
+                    $(Kind::$Kind => Some(&mut self.$field.$count),)*
+                }
+            }
+
             /// Draws everything that lies on a slide with these cells, kind by kind.
             pub(crate) fn draw(&self, field: &Field<'_>) -> Vec<Strewn<Body>> {
                 let mut strewn = Vec::new();

@@ -25,7 +25,7 @@ section! {
         absorbance: Number = Number::log_normal(0.09, 0.6), 0..=4;
         /// How late light comes through a speck: the halo that changes sign with focus. Seen by bright-field optics
         /// alone.
-        phase_rad: Number (given f64 as phase_rad: "How late light comes through it, radians.") = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
+        phase_rad: Number (given f64) = Number::normal(0.25, 0.15), -3..=3, "radians of phase";
     }
 }
 

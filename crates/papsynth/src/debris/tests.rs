@@ -7,7 +7,7 @@ use super::*;
 use crate::key::Key;
 use crate::model::Model;
 use crate::phantom::pools::PoolMaker;
-use crate::recipe::{Number, Optics, Preset, Recipe};
+use crate::recipe::{Optics, Preset, Recipe};
 use crate::scene::{self, Object, Scene};
 use crate::truth::traits::Trait;
 
@@ -40,31 +40,19 @@ fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
     scene.objects.iter().filter_map(made).collect()
 }
 
-/// How many clusters or objects there are of each kind, and how many objects one is, where that is fixed here.
+/// Sets how many clusters or objects there are of a kind, of four members each; returns how many objects that makes.
 fn counted(debris: &mut Debris, kind: Kind, count: f64) -> usize {
-    let number = || Number::Fixed(count);
-    match kind {
-        Kind::Cell => return 0,
-        Kind::Leukocyte => (debris.leukocytes.clusters, debris.leukocytes.per_cluster) = (number(), 4.0.into()),
-        Kind::Bacillus => (debris.bacilli.clusters, debris.bacilli.per_cluster) = (number(), 4.0.into()),
-        Kind::Speckle => debris.speckles.count = number(),
-        Kind::OutOfFocus => debris.out_of_focus.count = number(),
-        Kind::Smudge => debris.smudges.count = number(),
-        Kind::Dirt => (debris.dirt.drifts, debris.dirt.per_drift) = (number(), 4.0.into()),
-        Kind::Coccus => debris.cocci.colonies = number(),
-        Kind::Candida => {
-            debris.candida.colonies = number();
-            (debris.candida.hyphae, debris.candida.yeasts) = (1.0.into(), 3.0.into());
-        }
-        Kind::Trichomonad => (debris.trichomonads.groups, debris.trichomonads.per_group) = (number(), 4.0.into()),
-        Kind::RedCell => (debris.red_cells.clusters, debris.red_cells.per_cluster) = (number(), 4.0.into()),
-        Kind::Mucus => debris.mucus.strands = number(),
-        Kind::BareNucleus => debris.bare_nuclei.count = number(),
-        Kind::Crystal => debris.crystals.count = number(),
-        Kind::Dust => debris.dust.count = number(),
-        Kind::Fibre => debris.fibres.count = number(),
-        Kind::Bubble => debris.bubbles.count = number(),
-        Kind::Scratch => debris.scratches.count = number(),
+    let Some(number) = debris.count_mut(kind) else { return 0 };
+    *number = count.into();
+    (debris.candida.hyphae, debris.candida.yeasts) = (1.0.into(), 3.0.into());
+    for members in [
+        &mut debris.leukocytes.per_cluster,
+        &mut debris.bacilli.per_cluster,
+        &mut debris.dirt.per_drift,
+        &mut debris.trichomonads.per_group,
+        &mut debris.red_cells.per_cluster,
+    ] {
+        *members = 4.0.into();
     }
     let clustered = matches!(
         kind,

@@ -52,7 +52,6 @@ pub struct LearnParams {
 
 /// Harmonics of a cell's outline: enough for its corners.
 const CYTOPLASM_HARMONICS: usize = 40;
-/// Harmonics of a nucleus's outline.
 const NUCLEUS_HARMONICS: usize = 10;
 /// Fewest outlines that a covariance can be taken from.
 const FEWEST: usize = 3;

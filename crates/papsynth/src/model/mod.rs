@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use fsd_shape::ShapeStatistics;
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Cause, Error};
+use crate::error::{Cause, Error, within};
 
 /// The version of models that this crate reads and writes.
 pub const MODEL_VERSION: u32 = 1;
@@ -130,8 +130,8 @@ impl Form {
         if let Some(elongation) = &self.elongation {
             elongation.check(&format!("{path}.elongation"), 0.0, 0.9)?;
         }
-        within(&format!("{path}.taper"), self.taper, -0.3, 0.3)?;
-        within(&format!("{path}.unevenness"), self.unevenness, 0.0, 3.0)
+        within(&format!("{path}.taper"), self.taper, [-0.3, 0.3])?;
+        within(&format!("{path}.unevenness"), self.unevenness, [0.0, 3.0])
     }
 }
 
@@ -300,25 +300,25 @@ impl CellClass {
         profile(&at("cytoplasm.rim_to_centre"), &cytoplasm.rim_to_centre)?;
         cytoplasm.form.check(&at("cytoplasm.form"))?;
         nucleus.form.check(&at("nucleus.form"))?;
-        within(&at("nucleus.nucleoli"), nucleus.nucleoli, 0.0, 10.0)?;
-        within(&at("cytoplasm.pliability"), cytoplasm.pliability, 0.0, 1.0)?;
+        within(&at("nucleus.nucleoli"), nucleus.nucleoli, [0.0, 10.0])?;
+        within(&at("cytoplasm.pliability"), cytoplasm.pliability, [0.0, 1.0])?;
         if let Some(halo) = &cytoplasm.halo {
-            within(&at("cytoplasm.halo.probability"), halo.probability, 0.0, 1.0)?;
+            within(&at("cytoplasm.halo.probability"), halo.probability, [0.0, 1.0])?;
             halo.radius.check(&at("cytoplasm.halo.radius"), 1.0, 10.0)?;
             halo.clearing.check(&at("cytoplasm.halo.clearing"), 0.0, 1.0)?;
             halo.rim.check(&at("cytoplasm.halo.rim"), 0.0, 4.0)?;
         }
         cytoplasm.shapes.check(&at("cytoplasm.shapes"))?;
         nucleus.radius_um.check(&at("nucleus.radius_um"), 0.2, 200.0)?;
-        within(&at("nucleus.size_correlation"), nucleus.size_correlation, -1.0, 1.0)?;
+        within(&at("nucleus.size_correlation"), nucleus.size_correlation, [-1.0, 1.0])?;
         nucleus.off_centre.check(&at("nucleus.off_centre"), 0.0, 1.0)?;
-        within(&at("nucleus.polarity"), nucleus.polarity, 0.0, 1.0)?;
+        within(&at("nucleus.polarity"), nucleus.polarity, [0.0, 1.0])?;
         nucleus.absorbance.check(&at("nucleus.absorbance"), 0.0, 4.0)?;
         let chromatin = &nucleus.chromatin;
-        within(&at("nucleus.chromatin.nu"), chromatin.nu, 0.05, 20.0)?;
-        within(&at("nucleus.chromatin.length_um"), chromatin.length_um, 0.01, 50.0)?;
+        within(&at("nucleus.chromatin.nu"), chromatin.nu, [0.05, 20.0])?;
+        within(&at("nucleus.chromatin.length_um"), chromatin.length_um, [0.01, 50.0])?;
         chromatin.sd.check(&at("nucleus.chromatin.sd"), 0.0, 4.0)?;
-        within(&at("nucleus.chromatin.skewness"), chromatin.skewness, -3.0, 3.0)?;
+        within(&at("nucleus.chromatin.skewness"), chromatin.skewness, [-3.0, 3.0])?;
         profile(&at("nucleus.chromatin.rim_to_centre"), &chromatin.rim_to_centre)?;
         nucleus.shapes.check(&at("nucleus.shapes"))?;
         for (index, donor) in nucleus.donors.iter().enumerate() {
@@ -342,7 +342,7 @@ impl Donor {
     fn check(&self, field: String) -> Result<(), Cause> {
         /// Widest donor: a nucleus of 100 µm at 0.05 µm a pixel, and then some.
         const WIDEST: usize = 4096;
-        within(&format!("{field}.pixel_um"), self.pixel_um, 0.05, 4.0)?;
+        within(&format!("{field}.pixel_um"), self.pixel_um, [0.05, 4.0])?;
         let pixels = self.absorbance_milli.len();
         if self.width == 0 || self.width > WIDEST || !pixels.is_multiple_of(self.width) {
             return Err(Cause::DonorSize { field, width: self.width, pixels });
@@ -356,23 +356,15 @@ impl Donor {
 
 impl LogNormal {
     fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
-        within(&format!("{path}.median"), self.median, low, high)?;
-        within(&format!("{path}.log_sd"), self.log_sd, 0.0, 3.0)
+        within(&format!("{path}.median"), self.median, [low, high])?;
+        within(&format!("{path}.log_sd"), self.log_sd, [0.0, 3.0])
     }
 }
 
 impl Normal {
     fn check(&self, path: &str, low: f64, high: f64) -> Result<(), Cause> {
-        within(&format!("{path}.mean"), self.mean, low, high)?;
-        within(&format!("{path}.sd"), self.sd, 0.0, high)
-    }
-}
-
-fn within(path: &str, value: f64, low: f64, high: f64) -> Result<(), Cause> {
-    if value.is_finite() && (low..=high).contains(&value) {
-        Ok(())
-    } else {
-        Err(Cause::OutOfRange { field: path.to_owned(), value, low, high })
+        within(&format!("{path}.mean"), self.mean, [low, high])?;
+        within(&format!("{path}.sd"), self.sd, [0.0, high])
     }
 }
 
@@ -380,5 +372,5 @@ fn profile(path: &str, values: &[f64]) -> Result<(), Cause> {
     if values.is_empty() {
         return Err(Cause::EmptyProfile(path.to_owned()));
     }
-    values.iter().try_for_each(|value| within(path, *value, 0.0, 100.0))
+    values.iter().try_for_each(|value| within(path, *value, [0.0, 100.0]))
 }

@@ -21,7 +21,7 @@ section! {
 section! {
     /// Focal planes. A plane is where the stage stands; what is in focus there lies deeper or higher by the ratio of the two
     /// indices of refraction, if the optics know them.
-    pub struct Focus {
+    pub struct Focus, drawn as pub(crate) DrawnFocus {
         /// Number of focal planes: 1 is an image, more are a focus stack.
         planes: Count = 1, 1..=1024;
         /// Travel of the stage between planes.

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
+use super::diagnose::{Schema, Section};
 use super::whole::Recipe;
 
-/// How long a comment's line may get.
 const COMMENT_WIDTH: usize = 110;
 
 impl Recipe {
@@ -16,14 +16,13 @@ impl Recipe {
     /// Never: every recipe can be written as JSON.
     #[must_use]
     pub fn to_commented_toml(&self) -> String {
-        let schema = Self::schema();
         let value = serde_json::to_value(self).expect("every recipe can be written as JSON");
         let mut out = String::from(
             "# A recipe of papsynth. Lengths are in micrometres, angles in degrees, absorbances decadic.\n\
              # Every number may be a distribution: { uniform = [low, high] }, { normal = [mean, sd] },\n\
              # { log_normal = [median, sd of the logarithm] } or { choice = [a, b, c] }, each with `min` and `max` if wished.\n\n",
         );
-        table(&mut out, "", &value, &schema, &schema);
+        table(&mut out, "", &value, Schema::new().root());
         out
     }
 
@@ -38,20 +37,35 @@ impl Recipe {
 }
 
 /// Prints the fields of a table, plain ones first, tables after them.
-fn table(out: &mut String, path: &str, value: &Value, schema: &Value, root: &Value) {
+fn table(out: &mut String, path: &str, value: &Value, section: Section<'_>) {
     let Some(fields) = value.as_object() else { return };
+    let kind = fields.get("kind").and_then(Value::as_str);
     let (tables, plain): (Vec<_>, Vec<_>) = fields.iter().partition(|(_, value)| is_toml_table(value));
     for (name, value) in plain {
-        comment(out, &describe(schema, name, value, fields, root));
+        match (name.as_str(), section.field(name, kind)) {
+            ("kind", _) => choices(out, section),
+            (_, Some(field)) => {
+                comment(out, field.meaning().unwrap_or_default());
+                choices(out, field);
+            }
+            (_, None) => {}
+        }
         out.push_str(&format!("{} = {}\n", key(name), toml_value(value)));
     }
     for (name, value) in tables {
+        let Some(field) = section.field(name, kind) else { continue };
         let inner = if path.is_empty() { key(name) } else { format!("{path}.{}", key(name)) };
         out.push('\n');
-        comment(out, &describe(schema, name, value, fields, root));
+        comment(out, field.meaning().unwrap_or_default());
         out.push_str(&format!("[{inner}]\n"));
-        let inner_schema = resolve(&property(schema, name, fields), root);
-        table(out, &inner, value, &inner_schema, root);
+        table(out, &inner, value, field);
+    }
+}
+
+/// The words that a field may be, or the kinds of a table.
+fn choices(out: &mut String, section: Section<'_>) {
+    for (word, meaning) in section.choices() {
+        comment(out, &format!("  {word}: {meaning}"));
     }
 }
 
@@ -81,52 +95,6 @@ pub fn toml_value(value: &Value) -> String {
         Value::String(text) => toml::Value::String(text.clone()).to_string(),
         other => other.to_string(),
     }
-}
-
-/// The schema of a field: of a struct, of a map's values, or of the variant that the table's `kind` chooses.
-fn property(schema: &Value, name: &str, fields: &serde_json::Map<String, Value>) -> Value {
-    let direct = |schema: &Value| schema.pointer(&format!("/properties/{name}")).cloned();
-    if let Some(found) = direct(schema) {
-        return found;
-    }
-    for variant in schema.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
-        let chosen = variant.pointer("/properties/kind/const") == fields.get("kind");
-        if let (true, Some(found)) = (chosen, direct(variant)) {
-            return found;
-        }
-    }
-    schema.get("additionalProperties").cloned().unwrap_or_default()
-}
-
-fn resolve(schema: &Value, root: &Value) -> Value {
-    let name = schema.get("$ref").and_then(Value::as_str).map(|r| r.trim_start_matches('#'));
-    name.and_then(|pointer| root.pointer(pointer)).cloned().unwrap_or_else(|| schema.clone())
-}
-
-/// The documentation of a field and, where it is one of a few words, those words.
-fn describe(
-    schema: &Value,
-    name: &str,
-    value: &Value,
-    fields: &serde_json::Map<String, Value>,
-    root: &Value,
-) -> String {
-    let text = |schema: &Value| schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
-    let found = property(schema, name, fields);
-    let mut words = if name == "kind" { String::new() } else { text(&found) };
-    let target = resolve(&found, root);
-    if value.is_string() {
-        let variants = if name == "kind" { schema } else { &target };
-        for variant in variants.get("oneOf").and_then(Value::as_array).into_iter().flatten() {
-            let tag = variant.get("const").or_else(|| variant.pointer("/properties/kind/const"));
-            if let Some(tag) = tag.and_then(Value::as_str) {
-                words.push_str(&format!("\n  {tag}: {}", text(variant)));
-            }
-        }
-    } else if words.is_empty() {
-        words = text(&target);
-    }
-    words
 }
 
 fn comment(out: &mut String, text: &str) {

@@ -90,7 +90,8 @@ pub(crate) fn within(path: &str, field: &str) -> String {
 /// named after the field's dotted path. With `drawn from rng as pub Name`, `one` draws them from one stream, field after
 /// field; dyes are left at zero there, and set by the caller. A field marked `(undrawn)` is left out, one marked `(last)`
 /// follows the others. `(Count as name: "Meaning.")` gives the drawn value a name of its own, `Chance` in place of `Count`
-/// says whether it happened. What is `(given Type as name: "Meaning.")`, and what is listed after `also`, the caller sets.
+/// says whether it happened. What is `(given Type)` or `(given Type as name: "Meaning.")`, and what is listed after `also`, the
+/// caller sets.
 macro_rules! section {
     ($(#[$meta:meta])* pub struct $Name:ident $(, drawn $(from $source:ident)? as $visible:vis $Drawn:ident)? {
         $($(#[$about:meta])* $field:ident: $Kind:ident $(($($mark:tt)*))? $(= $default:expr $(, $low:literal..=$high:literal $(, $unit:literal)?)?)?;)*
@@ -192,7 +193,10 @@ macro_rules! section {
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*] { $about:tt $field:ident $Kind:ident (last) $low:tt } $($rest:tt)*) => {
         section!(@drawn $Name $drawn [$($done)*] [$($last)* { $about $field $field $Kind $low }] $($rest)*);
     };
-    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident (given $Type:ident as $own:ident: $doc:literal) $low:tt } $($rest:tt)*) => {
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident (given $Type:tt) $low:tt } $($rest:tt)*) => {
+        section!(@drawn $Name $drawn [$($done)* { $about $field $field $Type given }] $last $($rest)*);
+    };
+    (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident (given $Type:tt as $own:ident: $doc:literal) $low:tt } $($rest:tt)*) => {
         section!(@drawn $Name $drawn [$($done)* { [#[doc = $doc]] $own $field $Type given }] $last $($rest)*);
     };
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident ($How:ident as $own:ident: $doc:literal) $low:tt } $($rest:tt)*) => {
@@ -201,7 +205,7 @@ macro_rules! section {
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] $last:tt { $about:tt $field:ident $Kind:ident () $low:tt } $($rest:tt)*) => {
         section!(@drawn $Name $drawn [$($done)* { $about $field $field $Kind $low }] $last $($rest)*);
     };
-    (@drawn $Name:ident ($source:tt $visible:vis $Drawn:ident) [$({ [$(#[$about:meta])*] $own:ident $field:ident $Kind:ident $low:tt })*] []) => {
+    (@drawn $Name:ident ($source:tt $visible:vis $Drawn:ident) [$({ [$(#[$about:meta])*] $own:ident $field:ident $Kind:tt $low:tt })*] []) => {
         #[doc = concat!("What is drawn from [`", stringify!($Name), "`](crate::recipe::", stringify!($Name), ").")]
         #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(deny_unknown_fields)]
@@ -212,7 +216,7 @@ macro_rules! section {
     (@drawn $Name:ident $drawn:tt [$($done:tt)*] [$($last:tt)*]) => {
         section!(@drawn $Name $drawn [$($done)* $($last)*] []);
     };
-    (@draw () $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:ident $low:tt })*) => {
+    (@draw () $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:tt $low:tt })*) => {
         impl $Name {
             /// Draws each number from the stream named after its place: `path` is that of the section.
             pub(crate) fn draw(&self, path: &str, stream: impl Fn(&str) -> $crate::key::Stream) -> $Drawn {
@@ -221,10 +225,10 @@ macro_rules! section {
             }
         }
     };
-    (@draw (rng) $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:ident $low:tt })*) => {
+    (@draw (rng) $Name:ident $Drawn:ident $({ $own:ident $field:ident $Kind:tt $low:tt })*) => {
         impl $Name {
             /// Draws the numbers of one object.
-            fn one(&self, rng: &mut $crate::key::Stream) -> $Drawn {
+            pub(crate) fn one(&self, rng: &mut $crate::key::Stream) -> $Drawn {
                 $Drawn { $($own: section!(@one (rng) $Kind $low self.$field, rng),)* }
             }
         }
@@ -234,8 +238,8 @@ macro_rules! section {
     (@value (rng) Count) => { usize };
     (@value (rng) Chance) => { bool };
     (@value (rng) DyeAmounts) => { dye_spectra::Amounts };
-    (@value $source:tt $Kind:ident) => { $Kind };
-    (@one (rng) $Kind:ident given $number:expr, $rng:expr) => { Default::default() };
+    (@value $source:tt $Kind:tt) => { $Kind };
+    (@one (rng) $Kind:tt given $number:expr, $rng:expr) => { Default::default() };
     (@one $source:tt Number $low:tt $number:expr, $rng:expr) => { $number.draw($rng) };
     (@one () Count ($low:literal) $number:expr, $rng:expr) => { ($number.draw_count($rng) as u32).max($low) };
     (@one (rng) Count ($low:literal) $number:expr, $rng:expr) => { $number.draw_count($rng).max($low) };

@@ -231,29 +231,29 @@ section! {
 
 section! {
     /// The cytoplasm of every cell.
-    pub struct Cytoplasm {
+    pub struct Cytoplasm, drawn from rng as pub CellDetail {
         /// How outlines vary about their mean.
-        shape: ShapeSpread = ShapeSpread::Correlated;
+        shape: ShapeSpread (undrawn) = ShapeSpread::Correlated;
         /// How the cytoplasm becomes a sheet.
-        sheet: Sheet = Sheet::Xpbd;
+        sheet: Sheet (undrawn) = Sheet::Xpbd;
         /// Area of the flat sheet relative to the cell's: more makes more wrinkles.
-        excess: Number = Number::uniform(1.04, 1.16), 1..=2;
+        excess: Number (given f64) = Number::uniform(1.04, 1.16), 1..=2;
         /// Parts that lie doubled back.
-        folds: Folds;
+        folds: Folds (undrawn);
         /// How nearly straight the sides of a cell run between its corners: 0 is not at all.
-        corners: Number = Number::uniform(0.10, 0.60), 0..=1;
+        corners: Number (given f64) = Number::uniform(0.10, 0.60), 0..=1;
         /// Notches in its rim.
-        notches: Number = Number::uniform(0.0, 14.0), 0..=20;
+        notches: Number (given usize) = Number::uniform(0.0, 14.0), 0..=20;
         /// Tongues that stand out of its rim.
-        tongues: Number = Number::uniform(0.0, 9.0), 0..=20;
+        tongues: Number (given usize) = Number::uniform(0.0, 9.0), 0..=20;
         /// Wrinkles of a cell: narrow creases in which the sheet lies doubled.
-        wrinkles: Number = Number::log_normal(7.0, 0.6), 0..=100;
+        wrinkles: Number (given usize) = Number::log_normal(7.0, 0.6), 0..=100;
         /// Thickness that a wrinkle adds at its crest, relative to the flat sheet.
-        wrinkle: Number = Number::log_normal(0.42, 0.42), 0..=5;
+        wrinkle: Number (given f64) = Number::log_normal(0.42, 0.42), 0..=5;
         /// Width of a wrinkle (standard deviation of its crest).
-        wrinkle_um: Number = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
+        wrinkle_um: Number (given f64) = Number::uniform(0.18, 0.5), 0.05..=5, "µm";
         /// How much denser and more granular the cytoplasm is round the nucleus than outside.
-        endoplasm: Number = Number::log_normal(0.08, 0.6), 0..=2;
+        endoplasm: Number (given f64) = Number::log_normal(0.08, 0.6), 0..=2;
         /// First level of detail: strength of low-frequency Gaussian noise, relative to the cytoplasm's absorbance.
         clouds: Number = Number::uniform(0.10, 0.34), 0..=2;
         /// Standard deviation of its smoothing.
@@ -267,19 +267,22 @@ section! {
         /// Fine grain of the cytoplasm, relative to its absorbance.
         grain: Number = Number::uniform(0.06, 0.18), 0..=2;
         /// Probability that a cell is peppered with granules.
-        granular: Number = 0.2, 0..=1;
+        granular: Number (undrawn) = 0.2, 0..=1;
         /// Granules of such a cell per 100 µm².
-        granules: Number = Number::log_normal(12.0, 0.6), 0..=1000;
+        granules: Number
+            (given f64 as granules: "Granules per 100 µm²; 0 if the cell has none.") = Number::log_normal(12.0, 0.6), 0..=1000;
         /// Roughness of the rim: the edge is frayed over about this distance.
         fray_um: Number = Number::log_normal(0.65, 0.45), 0..=5, "µm";
         /// Distance over which the sheet thins out towards its rim.
-        rim_um: Number = Number::log_normal(2.2, 0.36), 0..=10, "µm";
+        rim_um: Number (given f64) = Number::log_normal(2.2, 0.36), 0..=10, "µm";
         /// How much thicker the sheet is towards one side (standard deviation of the slope, relative to its thickness
         /// and the cell's radius).
-        wedge: Number = 0.18, 0..=1;
+        wedge: Number
+            (given [f64; 2] as wedge: "How much thicker to the right and below, relative to its thickness, a radius away.")
+            = 0.18, 0..=1;
         /// How late light comes through a flat sheet: thicker parts and folds in proportion. It shows as bright and
         /// dark rims that change places when the focus passes.
-        phase_rad: Number = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";
+        phase_rad: Number (undrawn) = Number::uniform(0.05, 0.15), -3..=3, "radians of phase";
     }
 }
 

@@ -3,6 +3,7 @@
 use dye_spectra::Amounts;
 use serde::{Deserialize, Serialize};
 
+pub use crate::recipe::specimen::CellDetail;
 use crate::words::words;
 
 /// An epithelial cell, its numbers drawn.
@@ -38,48 +39,6 @@ impl CellBody {
         const REACH: f64 = 1.9;
         REACH * self.radius_um
     }
-}
-
-/// Strengths of the detail of a cell's cytoplasm, relative to its absorbance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CellDetail {
-    /// Area of the flat sheet relative to the cell's.
-    pub excess: f64,
-    /// How nearly straight its sides run between its corners, 0 to 1.
-    pub corners: f64,
-    /// Notches in its rim.
-    pub notches: usize,
-    /// Tongues that stand out of it.
-    pub tongues: usize,
-    /// Wrinkles.
-    pub wrinkles: usize,
-    /// Thickness that they add, relative to the flat sheet.
-    pub wrinkle: f64,
-    /// Their width, µm.
-    pub wrinkle_um: f64,
-    /// How much denser and more granular the cytoplasm is round the nucleus.
-    pub endoplasm: f64,
-    /// Low-frequency Gaussian noise.
-    pub clouds: f64,
-    /// Its smoothing, µm.
-    pub clouds_um: f64,
-    /// Thresholded Brownian flecks.
-    pub flecks: f64,
-    /// Share of the cell the flecks leave free.
-    pub flecks_threshold: f64,
-    /// The cytoskeleton.
-    pub cytoskeleton: f64,
-    /// Fine grain.
-    pub grain: f64,
-    /// Granules per 100 µm²; 0 if the cell has none.
-    pub granules: f64,
-    /// Roughness of the rim, µm.
-    pub fray_um: f64,
-    /// Distance over which it thins out towards its rim, µm.
-    pub rim_um: f64,
-    /// By how much it is thicker to the right and below, relative to its thickness, a radius away.
-    pub wedge: [f64; 2],
 }
 
 /// The cleared space round the nucleus of a koilocyte.

@@ -11,12 +11,10 @@ use crate::recipe::{CellMix, Number, Recipe};
 
 use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::field::Object;
+use super::field::{FieldNumbers, Object, View};
 use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
-use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::view::View;
 use super::weight::WeightMap;
 use crate::debris::Body;
 
@@ -86,7 +84,7 @@ impl Drawn {
         let own = |purpose: &str| key.stream("cell", number, purpose);
         let mut rng = own("body");
         let any_deg = random::between(0.0, 360.0, &mut rng);
-        let body = draw_body(recipe, kind.name, kind.class, kind.mix, stain, &mut rng, own);
+        let body = draw_body(recipe, kind, stain, &mut rng, own);
         let stacking_um = recipe.slide.stacking_um.draw(&mut rng) * random::normal(&mut rng);
         Self { body, any_deg, stacking_um }
     }
@@ -124,16 +122,13 @@ fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
 
 fn draw_body(
     recipe: &Recipe,
-    name: &str,
-    class: &CellClass,
-    mix: &CellMix,
+    Class { name, mix, class }: Class<'_>,
     stain: &FieldStain<'_>,
     rng: &mut Stream,
     own: impl Fn(&str) -> Stream,
 ) -> CellBody {
     let size = mix.size.draw(rng);
-    let cytoplasm = &class.cytoplasm;
-    let nucleus = &class.nucleus;
+    let (cytoplasm, nucleus) = (&class.cytoplasm, &class.nucleus);
     // Radii of cell and nucleus vary together: a bivariate normal of their logarithms.
     let first = random::normal(rng);
     let second = random::normal(rng);
@@ -237,16 +232,10 @@ fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn
         wrinkle: own(named!(recipe.cytoplasm.wrinkle)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
-        clouds: cytoplasm.clouds.draw(rng),
-        clouds_um: cytoplasm.clouds_um.draw(rng),
-        flecks: cytoplasm.flecks.draw(rng),
-        flecks_threshold: cytoplasm.flecks_threshold.draw(rng),
-        cytoskeleton: cytoplasm.cytoskeleton.draw(rng),
-        grain: cytoplasm.grain.draw(rng),
         granules: if granular { granules } else { 0.0 },
-        fray_um: cytoplasm.fray_um.draw(rng),
         rim_um: own(named!(recipe.cytoplasm.rim_um)),
         wedge,
+        ..cytoplasm.one(rng)
     }
 }
 

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::field::{Object, Scene};
 use crate::debris::{Body, NucleusForm};
-use crate::error::{Cause, Error};
+use crate::error::{Cause, Error, within};
 
 /// Most objects, planes and pixels of a scene.
 const MOST_OBJECTS: usize = 1 << 20;
@@ -89,11 +89,11 @@ fn read(text: &str) -> Result<Scene, Cause> {
         return Err(Cause::NoObjects);
     };
     value["objects"] = Value::Array(Vec::new());
-    within(&value, "", "")?;
+    numbers(&value, "", "")?;
     let mut scene: Scene = serde_json::from_value(value)?;
-    at_most("objects", objects.len(), MOST_OBJECTS)?;
-    at_most("planes_um", scene.planes_um.len(), MOST_PLANES)?;
-    at_most("view", scene.view.width * scene.view.height, MOST_PIXELS)?;
+    within("objects", objects.len().max(1) as f64, [1.0, MOST_OBJECTS as f64])?;
+    within("planes_um", scene.planes_um.len() as f64, [1.0, MOST_PLANES as f64])?;
+    within("view", (scene.view.width * scene.view.height) as f64, [1.0, MOST_PIXELS as f64])?;
     if scene.frame.is_some() {
         return Err(Cause::SlideScene);
     }
@@ -108,7 +108,7 @@ fn read(text: &str) -> Result<Scene, Cause> {
 }
 
 fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>) -> Result<Object, Cause> {
-    within(&value, "", "")?;
+    numbers(&value, "", "")?;
     let object: Object = serde_json::from_value(value)?;
     if object.plot.is_some() {
         return Err(Cause::SlideScene);
@@ -127,25 +127,12 @@ fn object(value: Value, pixel_um: f64, farthest_um: f64, ids: &mut BTreeSet<u32>
     if let Body::Leukocyte(cell) = &object.body
         && cell.form == NucleusForm::Lobed
     {
-        for (field, value, low, high) in
-            [("cell_um", cell.cell_um, 0.1, 100.0), ("lobes", cell.lobes as f64, 1.0, 16.0)]
-        {
-            if value < low {
-                return Err(Cause::OutOfRange { field: format!("body.{field}"), value, low, high });
-            }
-        }
+        within("body.cell_um", cell.cell_um, [0.1, 100.0])?;
+        within("body.lobes", cell.lobes as f64, [1.0, 16.0])?;
     }
     let most_um = MOST_REACHES * farthest_um;
-    match object.centre_um.into_iter().find(|at| at.abs() > most_um) {
-        Some(value) => Err(Cause::OutOfRange { field: "centre_um".to_owned(), value, low: -most_um, high: most_um }),
-        None => Ok(object),
-    }
-}
-
-fn at_most(field: &str, found: usize, most: usize) -> Result<(), Cause> {
-    let out =
-        |field: &str| Cause::OutOfRange { field: field.to_owned(), value: found as f64, low: 1.0, high: most as f64 };
-    if found > most || (found == 0 && field != "objects") { Err(out(field)) } else { Ok(()) }
+    object.centre_um.into_iter().try_for_each(|at| within("centre_um", at, [-most_um, most_um]))?;
+    Ok(object)
 }
 
 /// The range of a number.
@@ -157,17 +144,15 @@ fn range(path: &str, name: &str) -> Option<&'static (&'static str, f64, f64)> {
 }
 
 /// Compares every number with the range of its field, and says where a text or a truth value stands in place of a number.
-fn within(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
+fn numbers(value: &Value, path: &str, name: &str) -> Result<(), Cause> {
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(name, value)| {
             let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-            within(value, &path, name)
+            numbers(value, &path, name)
         }),
-        Value::Array(values) => values.iter().try_for_each(|value| within(value, path, name)),
+        Value::Array(values) => values.iter().try_for_each(|value| numbers(value, path, name)),
         Value::Number(number) => match (range(path, name), number.as_f64()) {
-            (Some((_, low, high)), Some(value)) if !(*low..=*high).contains(&value) => {
-                Err(Cause::OutOfRange { field: path.to_owned(), value, low: *low, high: *high })
-            }
+            (Some((_, low, high)), Some(value)) => within(path, value, [*low, *high]),
             _ => Ok(()),
         },
         Value::String(_) | Value::Bool(_) if range(path, name).is_some() => {

@@ -1,5 +1,7 @@
 //! From recipe and key to a scene. No pixel is touched here.
 
+use crate::debris::ground::{CellPlace, Field, Sieve, Strewn};
+use crate::debris::{Body, Debris};
 use crate::error::{Cause, Error};
 use crate::key::Key;
 use crate::model::Model;
@@ -8,12 +10,9 @@ use crate::recipe::section::named;
 use crate::recipe::{Illumination, Light, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
-use super::field::Scene;
+use super::field::{FieldNumbers, Object, Scene, View};
 use super::imaging::{Fusion, Restoration, SceneBackground, SceneIllumination, SceneLight, SceneOptics};
-use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::strew::strew;
-use super::view::View;
 use super::weight::WeightMap;
 
 /// Draws what lies on the slide and how it is imaged.
@@ -42,6 +41,40 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
     Ok(Scene { objects, slide: slide_of(recipe, key), ..empty(recipe, view, &field, &stain) })
 }
 
+/// Gives the cells of a field their coats, and adds everything that lies among them. `sieve` says what of it lies on a part
+/// of a slide.
+pub(super) fn strew(
+    debris: &Debris,
+    view: View,
+    numbers: &FieldNumbers,
+    stain: &FieldStain<'_>,
+    sieve: Option<Sieve<'_>>,
+    objects: &mut Vec<Object>,
+) {
+    debris.clue_cells.draw(numbers, objects.iter_mut().map(|cell| (cell.number, &mut cell.coat)));
+    let place = |object: &Object| match &object.body {
+        Body::Cell(body) => {
+            let (centre_um, depth_um) = (object.centre_um, object.depth_um);
+            Some(CellPlace { centre_um, depth_um, radius_um: body.radius_um })
+        }
+        _ => None,
+    };
+    let cells = objects.iter().filter_map(place).collect();
+    let strewn = debris.draw(&Field { view, numbers, stain, cells, sieve });
+    objects.extend(strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| Object {
+        id: 0,
+        number,
+        cluster,
+        plot: None,
+        centre_um: lie.centre_um,
+        depth_um: lie.depth_um,
+        rotation_deg: lie.rotation_deg,
+        bethesda: String::new(),
+        coat: None,
+        body: thing,
+    }));
+}
+
 /// The number of the slide that an image shows.
 fn slide_of(recipe: &Recipe, key: Key) -> u64 {
     key.index / recipe.slide.fields.max(1) as u64
@@ -49,12 +82,13 @@ fn slide_of(recipe: &Recipe, key: Key) -> u64 {
 
 /// The view without anything on it: how it is imaged.
 pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &FieldStain<'_>) -> Scene {
+    let (planes_um, fusion) = planes(recipe, field);
     Scene {
         key: field.key,
         slide: 0,
         view,
-        planes_um: planes(recipe, field),
-        fusion: fusion(recipe, field),
+        planes_um,
+        fusion,
         background: background(recipe, field),
         light: light(recipe, field),
         optics: optics(recipe, field),
@@ -69,7 +103,6 @@ pub(super) fn empty(recipe: &Recipe, view: View, field: &FieldNumbers, stain: &F
     }
 }
 
-/// Size of a pixel in the object.
 pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     let magnification = field.draw(named!(recipe.field.magnification));
     if magnification <= 0.0 {
@@ -79,34 +112,22 @@ pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
     field.draw(named!(recipe.camera.pixel_um)) * binning as f64 / magnification
 }
 
-/// Number of planes, travel to the middle one, travel between them.
-fn stack(recipe: &Recipe, field: &FieldNumbers) -> (usize, f64, f64) {
-    let count = field.count(named!(recipe.focus.planes)).max(1);
-    let step = field.draw(named!(recipe.focus.step_um));
-    (count, field.draw(named!(recipe.focus.centre_um)), step)
-}
-
-fn planes(recipe: &Recipe, field: &FieldNumbers) -> Vec<f64> {
-    let (count, centre, step) = stack(recipe, field);
-    if recipe.focus.picture == Picture::Extended {
-        return vec![centre];
+/// Travel of the stage to each plane; of planes that are fused to the middle one, and how they are fused.
+fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
+    let focus = recipe.focus.draw("focus", |path| field.stream(path));
+    let middle = f64::from(focus.planes - 1) / 2.0;
+    if focus.picture == Picture::Planes {
+        let travel = |plane| focus.centre_um + (f64::from(plane) - middle) * focus.step_um;
+        return ((0..focus.planes).map(travel).collect(), None);
     }
-    let middle = (count - 1) as f64 / 2.0;
-    (0..count).map(|plane| centre + (plane as f64 - middle) * step).collect()
-}
-
-fn fusion(recipe: &Recipe, field: &FieldNumbers) -> Option<Fusion> {
-    let (planes, centre, step_um) = stack(recipe, field);
-    (recipe.focus.picture == Picture::Extended).then(|| Fusion {
-        first_um: centre - (planes - 1) as f64 / 2.0 * step_um,
-        step_um,
-        planes,
-        noise_correlation: [
-            field.draw(named!(recipe.focus.fused_noise_across)),
-            field.draw(named!(recipe.focus.fused_noise_down)),
-        ],
-        noise_skew: field.draw(named!(recipe.focus.fused_noise_skew)),
-    })
+    let fusion = Fusion {
+        first_um: focus.centre_um - middle * focus.step_um,
+        step_um: focus.step_um,
+        planes: focus.planes as usize,
+        noise_correlation: [focus.fused_noise_across, focus.fused_noise_down],
+        noise_skew: focus.fused_noise_skew,
+    };
+    (vec![focus.centre_um], Some(fusion))
 }
 
 fn light(recipe: &Recipe, field: &FieldNumbers) -> SceneLight {

@@ -7,8 +7,7 @@ use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{Labels, Layout};
 
-use super::numbers::FieldNumbers;
-use super::view::View;
+use super::field::{FieldNumbers, View};
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.
@@ -24,7 +23,6 @@ const MOST_TRIES: f64 = 1e9;
 /// random sequential adsorption jams at 0.547 (Feder 1980, doi:10.1016/0022-5193(80)90358-6).
 const JAMMED: f64 = 0.547;
 
-/// The weight map of a layout.
 pub(super) fn weight_map(
     layout: &Layout,
     given: Option<&WeightMap>,

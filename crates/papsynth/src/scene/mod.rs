@@ -6,18 +6,14 @@
 pub(crate) mod cell;
 mod cells;
 mod check;
-mod deposit;
 mod depth;
 mod draw;
 pub(crate) mod field;
 mod groups;
 pub(crate) mod imaging;
 mod layout;
-pub(crate) mod numbers;
 mod plots;
 pub(crate) mod stain;
-mod strew;
-pub(crate) mod view;
 mod weight;
 
 pub use crate::debris::{
@@ -28,9 +24,8 @@ pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;
 pub use cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Tint};
 pub use draw::draw;
-pub use field::{Object, Plot, Scene, SlideFrame};
+pub use field::{Object, Plot, Scene, SlideFrame, View};
 pub use imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneIllumination, SceneLight, SceneOptics};
 pub(crate) use layout::check_layout;
 pub(crate) use plots::{BEYOND, PLOT_PX, Population};
-pub use view::View;
 pub use weight::WeightMap;

@@ -12,21 +12,18 @@ use perlin_bg::{Fractal, FractalParams};
 use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
-use super::deposit::{DENSEST, Deposit};
-use super::draw::{empty, pixel_um};
-use super::field::{Object, Plot, Scene};
+use super::draw::{empty, pixel_um, strew};
+use super::field::{FieldNumbers, Object, Plot, Scene, View};
 use super::groups::Groups;
-use super::numbers::FieldNumbers;
 use super::stain::FieldStain;
-use super::strew::strew;
-use super::view::View;
 use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
 use crate::random;
+use crate::recipe::scan::SceneDeposit;
 use crate::recipe::section::named;
-use crate::recipe::{Clusters as ClusterLayout, GroupForm, Layout, Number, Recipe};
+use crate::recipe::{Clusters as ClusterLayout, Deposit as DepositSection, GroupForm, Layout, Number, Recipe};
 
 /// Side of a plot in pixels.
 pub(crate) const PLOT_PX: i64 = 1024;
@@ -54,22 +51,20 @@ pub(crate) struct Population {
     deposit: Deposit,
     scatter: Scatter,
     relief: Relief,
-    sown: Memory<Vec<Object>>,
-    plots: Memory<Vec<Object>>,
+    sown: Memory,
+    plots: Memory,
 }
 
-/// Where the layout lets cells lie.
+/// Where the layout lets cells lie: anywhere, or in clusters.
 #[derive(Debug)]
-enum Scatter {
-    Anywhere,
-    Clusters {
-        layout: ClusterLayout,
-        outside: f64,
-        /// Plots that a cluster reaches beyond its own.
-        reach: i64,
-        /// Mean weight.
-        mean: f64,
-    },
+struct Scatter {
+    clusters: Option<ClusterLayout>,
+    /// Weight of the places outside all clusters.
+    outside: f64,
+    /// Plots that a cluster reaches beyond its own.
+    reach: i64,
+    /// Mean weight.
+    mean: f64,
 }
 
 /// A cluster's middle and radius, µm.
@@ -83,22 +78,15 @@ struct Relief {
     scale_um: f64,
 }
 
-/// What was worked out last.
-#[derive(Debug)]
-struct Memory<T> {
-    /// By row and column.
-    known: Mutex<BTreeMap<[i64; 2], Arc<T>>>,
+/// Objects of the plots that were worked out last, by row and column.
+#[derive(Debug, Default)]
+struct Memory {
+    known: Mutex<BTreeMap<[i64; 2], Arc<Vec<Object>>>>,
 }
 
-impl<T> Default for Memory<T> {
-    fn default() -> Self {
-        Self { known: Mutex::default() }
-    }
-}
-
-impl<T> Memory<T> {
+impl Memory {
     /// What was made of a plot, or is made now: the same, however often.
-    fn get<E>(&self, at: [i64; 2], make: impl FnOnce() -> Result<T, E>) -> Result<Arc<T>, E> {
+    fn get<E>(&self, at: [i64; 2], make: impl FnOnce() -> Result<Vec<Object>, E>) -> Result<Arc<Vec<Object>>, E> {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(found) = known().get(&[at[1], at[0]]) {
             return Ok(Arc::clone(found));
@@ -133,7 +121,7 @@ impl Population {
             share: (PLOT_PX * PLOT_PX) as f64 / field_px,
             spacing_um: slide.draw(named!(recipe.slide.spacing_um)),
             deposit: Deposit::draw(&recipe.scan.deposit, &slide),
-            scatter: Scatter::Anywhere,
+            scatter: Scatter { clusters: None, outside: 1.0, reach: 0, mean: 1.0 },
             relief: Relief::new(
                 slide.draw(named!(recipe.slide.depth_um)),
                 slide.draw(named!(recipe.slide.relief_um)),
@@ -142,7 +130,7 @@ impl Population {
             sown: Memory::default(),
             plots: Memory::default(),
         };
-        population.scatter = population.scatter(&slide)?;
+        population.scatter(&slide)?;
         Ok((population, scene))
     }
 
@@ -156,17 +144,16 @@ impl Population {
     }
 
     /// How the layout lets cells lie on a slide.
-    fn scatter(&self, slide: &FieldNumbers) -> Result<Scatter, Cause> {
+    fn scatter(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
         /// Most plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
         /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
         const PLACES: i64 = 96;
         const ACROSS: i64 = 12;
-        let Layout::Clusters(layout) = &self.recipe.layout else {
-            return match self.recipe.layout {
-                Layout::Uniform {} => Ok(Scatter::Anywhere),
-                _ => Err(Cause::LayoutOfField),
-            };
+        let layout = match &self.recipe.layout {
+            Layout::Uniform {} => return Ok(()),
+            Layout::Clusters(layout) => layout,
+            _ => return Err(Cause::LayoutOfField),
         };
         let largest = layout.radius_um.bounds()[1];
         let reach = random::count((CLUSTER_REACH * largest / self.side_um()).ceil()) as i64;
@@ -174,12 +161,12 @@ impl Population {
             return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
         let outside = slide.draw(named!("layout", layout.outside));
-        let mut scatter = Scatter::Clusters { layout: layout.clone(), outside, reach, mean: 1.0 };
+        self.scatter = Scatter { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
         // The mean over a part of the slide that does not depend on the slide's size.
         let mut sum = 0.0;
         for row in 0..ACROSS {
             for column in 0..ACROSS {
-                let clusters = self.clusters(&scatter, [column, row]);
+                let clusters = self.clusters([column, row]);
                 let places = PLACES / ACROSS;
                 for place in 0..places * places {
                     let local = [place % places, place / places].map(|at| (at as f64 + 0.5) / places as f64);
@@ -189,23 +176,19 @@ impl Population {
                 }
             }
         }
-        if let Scatter::Clusters { mean, .. } = &mut scatter {
-            *mean = sum / (PLACES * PLACES) as f64;
-        }
-        Ok(scatter)
+        self.scatter.mean = sum / (PLACES * PLACES) as f64;
+        Ok(())
     }
 
     /// The clusters that reach into a plot.
-    fn clusters(&self, scatter: &Scatter, at: [i64; 2]) -> Vec<Cluster> {
-        let Scatter::Clusters { layout, reach, .. } = scatter else { return Vec::new() };
+    fn clusters(&self, at: [i64; 2]) -> Vec<Cluster> {
+        let Scatter { clusters: Some(layout), reach, .. } = &self.scatter else { return Vec::new() };
         let mut clusters = Vec::new();
         for row in at[1] - reach..=at[1] + reach {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let count = named!("layout", layout.count);
-                let wanted = field.draw(count) * self.share;
-                let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, count.0));
-                for cluster in 0..wanted as u64 + u64::from(further) {
+                for cluster in 0..field.whole(count.0, field.draw(count) * self.share) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
                     let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
@@ -221,11 +204,8 @@ impl Population {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
-        let clusters = self.clusters(&self.scatter, at);
-        let (outside, mean) = match self.scatter {
-            Scatter::Anywhere => (1.0, 1.0),
-            Scatter::Clusters { outside, mean, .. } => (outside, mean),
-        };
+        let clusters = self.clusters(at);
+        let Scatter { outside, mean, .. } = self.scatter;
         let side_um = self.side_um();
         let global = |place: [f64; 2]| [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
         let stays = |place: [f64; 2]| weight(&clusters, outside, place) * self.deposit.density(place) / DENSEST;
@@ -239,8 +219,7 @@ impl Population {
             let alone = mix.group.form == GroupForm::Alone;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
             let wanted = field.draw((&path, &mix.count)) * self.share * DENSEST / mean / size;
-            let further = random::chance(wanted - wanted.floor(), &mut field.key.stream("field", 1, &path));
-            for _ in 0..wanted as u64 + u64::from(further) {
+            for _ in 0..field.whole(&path, wanted) {
                 let mut rng = field.key.stream("cell", tried, "origin");
                 let origin = [0, 1].map(|_| random::between(0.0, side_um, &mut rng));
                 let number = tried;
@@ -360,5 +339,45 @@ impl Relief {
     /// Depth at a place of the slide, µm.
     fn at(&self, [x, y]: [f64; 2]) -> f64 {
         self.scale_um * f64::from(self.noise.at(x / self.cell_um, y / self.cell_um))
+    }
+}
+
+/// Densest patch, relative to the mean.
+const DENSEST: f64 = 2.5;
+
+/// The round deposit of a slide, its numbers drawn.
+#[derive(Debug)]
+struct Deposit {
+    drawn: SceneDeposit,
+    patches: Fractal,
+}
+
+impl Deposit {
+    fn draw(section: &DepositSection, slide: &FieldNumbers) -> Self {
+        let key = slide.key.stream("slide", 0, "scan.deposit.patches").next_u64();
+        let params = FractalParams { octaves: 3, ..FractalParams::default() };
+        Self {
+            drawn: section.draw("scan.deposit", |path| slide.stream(path)),
+            patches: Fractal::new(&params, key).expect("three octaves of noise are valid"),
+        }
+    }
+
+    /// Its middle, µm.
+    fn centre_um(&self) -> [f64; 2] {
+        [self.drawn.x_um, self.drawn.y_um]
+    }
+
+    /// Density at a place of the slide, µm, relative to the mean within the deposit; at most [`DENSEST`].
+    fn density(&self, [x, y]: [f64; 2]) -> f64 {
+        /// Standard deviation of the noise.
+        const SPREAD: f64 = 0.27;
+        let SceneDeposit { x_um, y_um, radius_um, edge_um, unevenness, patch_um, outside } = self.drawn;
+        let (dx, dy) = (x - x_um, y - y_um);
+        let inside = (radius_um - (dx * dx + dy * dy).sqrt()) / edge_um;
+        let share = (0.5 + 0.5 * inside).clamp(0.0, 1.0);
+        let share = share * share * (3.0 - 2.0 * share);
+        let noise = f64::from(self.patches.at(x / patch_um, y / patch_um)) / SPREAD;
+        let uneven = libm::exp(unevenness * (noise - 0.5 * unevenness)).min(DENSEST);
+        uneven * (outside + (1.0 - outside) * share)
     }
 }

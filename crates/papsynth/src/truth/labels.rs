@@ -13,14 +13,6 @@ pub struct LabelMap {
     pub ids: Vec<u32>,
 }
 
-impl LabelMap {
-    /// Whether every id fits into 16 bits.
-    #[must_use]
-    pub fn fits_16_bits(&self) -> bool {
-        self.ids.iter().all(|&id| id <= u32::from(u16::MAX))
-    }
-}
-
 /// Cuts from each mask what is visible of it.
 ///
 /// `objects` are `(id, depth, mask)`; the nearer to the objective, the larger the depth. Of two at the same depth the

@@ -31,13 +31,11 @@ type Node<'t> = Spanned<DeValue<'t>>;
 /// # Errors
 /// All faults that are found, in the order of the text: at least one.
 pub fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
-    let syntax = |error: toml::de::Error| {
-        vec![Fault { path: Vec::new(), span: error.span(), message: one_line(error.message()), help: None }]
-    };
-    let table = DeTable::parse(text).map_err(syntax)?;
+    let whole = |span, message| vec![Fault { path: Vec::new(), span, message, help: None }];
+    let table = DeTable::parse(text).map_err(|error| whole(error.span(), one_line(error.message())))?;
     if table.get_ref().is_empty() {
-        let message = "it holds no setting; expected a recipe, such as `papsynth init` prints".to_owned();
-        return Err(vec![Fault { path: Vec::new(), span: Some(0..0), message, help: None }]);
+        let message = "it holds no setting; expected a recipe, such as `papsynth init` prints";
+        return Err(whole(Some(0..0), message.to_owned()));
     }
     version(table.get_ref())?;
     let schema = Schema::new();
@@ -54,16 +52,13 @@ pub fn read(text: &str) -> Result<Recipe, Vec<Fault>> {
 /// Classes of cells that a recipe names and a model lacks.
 #[must_use]
 pub fn unknown_classes(recipe: &Recipe, model: &Model) -> Vec<Fault> {
-    let known = || model.classes.keys().map(String::as_str);
+    let known: Vec<&str> = model.classes.keys().map(String::as_str).collect();
     let unknown = recipe.cells.keys().filter(|class| !model.classes.contains_key(*class));
-    let fault = |class: &String| {
-        let hint = nearest(class, known()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
-        Fault {
-            path: vec!["cells".to_owned(), class.clone()],
-            span: None,
-            message: format!("cells.{class}: the model has no such class"),
-            help: Some(format!("{hint}The model knows {}", quoted(known()))),
-        }
+    let fault = |class: &String| Fault {
+        path: vec!["cells".to_owned(), class.clone()],
+        span: None,
+        message: format!("cells.{class}: the model has no such class"),
+        help: Some(format!("{}The model knows {}", meant(class, &known), quoted(known.iter().copied()))),
     };
     unknown.map(fault).collect()
 }
@@ -75,17 +70,9 @@ pub fn find(text: &str, path: &[String]) -> Option<Range<usize>> {
     let mut found = None;
     for name in path {
         let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref() == name) else { break };
-        match value.get_ref() {
-            DeValue::Table(inner) if !is_inline(text, value) => {
-                found = Some(key.span());
-                table = inner;
-            }
-            DeValue::Table(inner) => {
-                found = Some(value.span());
-                table = inner;
-            }
-            _ => return Some(value.span()),
-        }
+        let DeValue::Table(inner) = value.get_ref() else { return Some(value.span()) };
+        found = Some(if is_inline(text, value) { value.span() } else { key.span() });
+        table = inner;
     }
     found
 }
@@ -123,7 +110,9 @@ struct Check<'c> {
 }
 
 impl Check<'_> {
-    fn fault(&mut self, path: &[String], span: Range<usize>, message: String, help: Option<String>) {
+    /// A fault of a field: its path stands before the message.
+    fn fault(&mut self, path: &[String], span: Range<usize>, message: &str, help: Option<String>) {
+        let message = format!("{}: {message}", path.join("."));
         self.faults.push(Fault { path: path.to_vec(), span: Some(span), message, help });
     }
 
@@ -140,8 +129,7 @@ impl Check<'_> {
                     // Looking for what was meant takes a millisecond: of thousands of strange fields nobody reads more than the first.
                     let is_told = self.faults.len() < MOST_HELPED;
                     let help = is_told.then(|| self.unknown_help(name, section.keys(kind.as_deref())));
-                    let message = format!("{}: there is no such field", path.join("."));
-                    self.fault(path, key.span(), message, help);
+                    self.fault(path, key.span(), "there is no such field", help);
                 }
                 Some(inner) => self.value(value, inner, path),
             }
@@ -153,29 +141,23 @@ impl Check<'_> {
     fn kind(&mut self, table: &DeTable<'_>, section: Section<'_>, path: &[String]) -> Result<Option<String>, ()> {
         let kinds = section.kinds();
         let Some(node) = table.get("kind").filter(|_| !kinds.is_empty()) else { return Ok(None) };
-        let DeValue::String(kind) = node.get_ref() else {
-            let message = format!("{}.kind: {} is {}", path.join("."), self.shown(node), type_of(node.get_ref()));
-            self.fault(path, node.span(), message, Some(format!("expected one of {}", quoted(kinds))));
-            return Err(());
+        let (message, help) = match node.get_ref() {
+            DeValue::String(kind) if kinds.contains(&kind.as_ref()) => return Ok(Some(kind.to_string())),
+            DeValue::String(kind) => (format!("`{kind}` is not known"), choice_help(kind, &kinds)),
+            _ => (self.type_message(node), format!("expected one of {}", quoted(kinds))),
         };
-        if kinds.contains(&kind.as_ref()) {
-            return Ok(Some(kind.to_string()));
-        }
-        let message = format!("{}.kind: `{kind}` is not known", path.join("."));
-        self.fault(path, node.span(), message, Some(choice_help(kind, &kinds)));
+        let message = format!("{}.kind: {message}", path.join("."));
+        self.faults.push(Fault { path: path.to_vec(), span: Some(node.span()), message, help: Some(help) });
         Err(())
     }
 
     fn value(&mut self, node: &Node<'_>, section: Section<'_>, path: &mut Vec<String>) {
         let types = section.types();
-        let own = json_type(node.get_ref());
+        let (own, _) = type_of(node.get_ref());
         let fits = types.is_empty() || types.contains(&own) || own == "integer" && types.contains(&"number");
         let words = section.words();
         match node.get_ref() {
-            _ if !fits => {
-                let message = format!("{}: {} is {}", path.join("."), self.shown(node), type_of(node.get_ref()));
-                self.fault(path, node.span(), message, Some(help_for(section)));
-            }
+            _ if !fits => self.fault(path, node.span(), &self.type_message(node), Some(help_for(section))),
             DeValue::Table(inner) if section.is_number() && is_inline(self.text, node) => {
                 let before = self.faults.len();
                 self.table(inner, section, path);
@@ -185,8 +167,8 @@ impl Check<'_> {
             }
             DeValue::Table(inner) if section.is_table() => self.table(inner, section, path),
             DeValue::String(word) if !words.is_empty() && !words.contains(&word.as_ref()) => {
-                let message = format!("{}: `{}` is not known", path.join("."), shorten(word));
-                self.fault(path, node.span(), message, Some(choice_help(word, &words)));
+                let message = format!("`{}` is not known", shorten(word));
+                self.fault(path, node.span(), &message, Some(choice_help(word, &words)));
             }
             _ => {}
         }
@@ -206,17 +188,16 @@ impl Check<'_> {
             let start = node.span().start;
             start + span.start - BEFORE.len()..start + span.end - BEFORE.len()
         });
-        self.fault(path, inner, format!("{}: {}", path.join("."), one_line(error.message())), Some(help_for(section)));
+        self.fault(path, inner, &one_line(error.message()), Some(help_for(section)));
     }
 
     fn unknown_help(&self, name: &str, keys: Vec<&str>) -> String {
         let homes = self.schema.homes_of(name);
-        let hint = match (nearest(name, keys.iter().copied()), homes.first()) {
-            (Some(key), _) => format!("did you mean `{key}`? "),
-            (None, Some(_)) => {
+        let hint = match meant(name, &keys) {
+            none if none.is_empty() && !homes.is_empty() => {
                 format!("it belongs into {}. ", quoted(homes.iter().map(String::as_str)))
             }
-            (None, None) => String::new(),
+            hint => hint,
         };
         match keys.len() {
             0 => format!("{hint}No field is known here"),
@@ -224,12 +205,13 @@ impl Check<'_> {
         }
     }
 
-    /// A value as it was written, or its beginning.
-    fn shown(&self, node: &Node<'_>) -> String {
+    /// A value as it was written, or its beginning, and what it is.
+    fn type_message(&self, node: &Node<'_>) -> String {
         let written = self.text.get(node.span()).unwrap_or_default();
+        let (_, what) = type_of(node.get_ref());
         match (written.trim().is_empty() || written.starts_with('['), node.get_ref()) {
-            (true, DeValue::Table(_)) => "it".to_owned(),
-            _ => shorten(written),
+            (true, DeValue::Table(_)) => format!("it is {what}"),
+            _ => format!("{} is {what}", shorten(written)),
         }
     }
 }
@@ -281,32 +263,25 @@ fn help_for(section: Section<'_>) -> String {
 }
 
 fn choice_help(word: &str, choices: &[&str]) -> String {
-    let hint = nearest(word, choices.iter().copied()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
-    format!("{hint}Expected one of {}", quoted(choices.iter().copied()))
+    format!("{}Expected one of {}", meant(word, choices), quoted(choices.iter().copied()))
 }
 
-fn json_type(value: &DeValue<'_>) -> &'static str {
+/// What may have been meant by a misspelt word, if any is near.
+fn meant(word: &str, choices: &[&str]) -> String {
+    nearest(word, choices.iter().copied()).map_or_else(String::new, |near| format!("did you mean `{near}`? "))
+}
+
+/// The type of a value in the schema, and in words.
+fn type_of(value: &DeValue<'_>) -> (&'static str, &'static str) {
     match value {
-        DeValue::Integer(_) => "integer",
-        DeValue::Float(_) => "number",
-        DeValue::Boolean(_) => "boolean",
-        DeValue::Array(_) => "array",
-        DeValue::Table(_) => "object",
-        DeValue::String(_) => "string",
+        DeValue::Integer(_) => ("integer", "a whole number"),
+        DeValue::Float(_) => ("number", "a number"),
+        DeValue::Boolean(_) => ("boolean", "a truth value"),
+        DeValue::Array(_) => ("array", "a list"),
+        DeValue::Table(_) => ("object", "a table"),
+        DeValue::String(_) => ("string", "a text"),
         // No field is one.
-        DeValue::Datetime(_) => "date",
-    }
-}
-
-fn type_of(value: &DeValue<'_>) -> &'static str {
-    match value {
-        DeValue::Integer(_) => "a whole number",
-        DeValue::Float(_) => "a number",
-        DeValue::Boolean(_) => "a truth value",
-        DeValue::Array(_) => "a list",
-        DeValue::Table(_) => "a table",
-        DeValue::String(_) => "a text",
-        DeValue::Datetime(_) => "a date",
+        DeValue::Datetime(_) => ("date", "a date"),
     }
 }
 
@@ -353,12 +328,6 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_recipe_is_read() {
-        let recipe = read("version = 1\n[field]\nwidth_px = 96\n").unwrap();
-        assert_eq!(recipe.field.width_px, 96.0.into());
-    }
-
-    #[test]
     fn misspelt_keys_get_the_nearest_name() {
         let (message, at, help) = fault("[field]\nwidht_px = 96\n");
         assert_eq!((message.as_str(), at.as_str()), ("field.widht_px: there is no such field", "widht_px"));
@@ -367,7 +336,10 @@ mod tests {
         assert_eq!(at, "optic");
         assert!(help.contains("did you mean `optics`?"), "{help}");
         let (_, _, help) = fault("[field]\nsigma_xy_um = 1\n");
-        assert!(help.contains("belongs into `optics`"), "{help}");
+        assert!(help.starts_with("it belongs into `optics`. Known here: `height_px`, `magnification`"), "{help}");
+        // Any class is a key of `cells`.
+        let (message, ..) = fault("[cells.whatever]\ncount = 3\nnumber = 4\n");
+        assert_eq!(message, "cells.whatever.number: there is no such field");
         let (message, _, help) = fault("field = { width_px = { unifrom = [1, 2] } }");
         assert!(message.starts_with("field.width_px.unifrom"), "{message}");
         assert!(help.contains("did you mean `uniform`?"), "{help}");
@@ -402,6 +374,7 @@ mod tests {
         assert!(help.contains("did you mean `swath`?"), "{help}");
         let (message, ..) = fault("[layout]\nkind = \"uniform\"\nradius_um = 3\n");
         assert!(message.starts_with("layout.radius_um: "), "{message}");
+        assert!(fault("[layout]\nkind = \"swath\"\ncount = 3\n").2.ends_with("here: `kind`, `outside`, `width_um`"));
         assert!(fault("[layout]\nkind = 7\n").0.starts_with("layout.kind: 7 is a whole number"));
         assert!(fault("[layout]\ncount = 7\n").0.contains("layout: "));
         assert!(fault("[layout]\nkind = \"labels\"\nsmooth_um = 7\n").0.contains("missing field `path`"));

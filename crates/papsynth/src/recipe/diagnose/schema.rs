@@ -127,6 +127,14 @@ impl<'s> Section<'s> {
         single.chain(lists).filter_map(Value::as_str).collect()
     }
 
+    /// The words that it may be, or the kinds of table, each with what it means.
+    pub fn choices(self) -> impl Iterator<Item = (&'s str, &'s str)> {
+        self.alternatives().filter_map(|a| {
+            let word = a.named.get("const").or_else(|| a.named.pointer("/properties/kind/const"))?;
+            Some((word.as_str()?, a.meaning().unwrap_or_default()))
+        })
+    }
+
     /// The JSON types it may have; empty if it does not say.
     pub fn types(self) -> Vec<&'s str> {
         self.alternatives().filter_map(|a| a.named.get("type")?.as_str()).collect()
@@ -167,47 +175,4 @@ impl<'s> Section<'s> {
 /// Names in backticks, separated by commas.
 pub fn quoted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     names.into_iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn path(dotted: &str) -> Vec<String> {
-        dotted.split('.').map(str::to_owned).collect()
-    }
-
-    #[test]
-    fn sections_know_their_keys() {
-        let schema = Schema::new();
-        let field = schema.at(&path("field")).unwrap();
-        assert_eq!(field.keys(None), ["height_px", "magnification", "pixel_um", "width_px"]);
-        assert!(schema.at(&path("field.width")).is_none());
-        // Any class is a key of `cells`.
-        assert!(schema.at(&path("cells.whatever.count")).unwrap().is_number());
-        assert!(schema.at(&path("cells.whatever.number")).is_none());
-    }
-
-    #[test]
-    fn a_kind_chooses_among_alternatives() {
-        let schema = Schema::new();
-        let layout = schema.at(&path("layout")).unwrap();
-        assert_eq!(layout.keys(Some("swath")), ["kind", "outside", "width_um"]);
-        assert!(layout.field("count", Some("clusters")).is_some());
-        assert!(layout.field("count", Some("swath")).is_none());
-        assert!(layout.kinds().contains(&"uniform"));
-    }
-
-    #[test]
-    fn meanings_and_words_are_found() {
-        let schema = Schema::new();
-        let sheet = schema.at(&path("cytoplasm.sheet")).unwrap();
-        assert!(sheet.words().contains(&"xpbd"), "{:?}", sheet.words());
-        assert_eq!(sheet.types(), ["string"; 3]);
-        let width = schema.at(&path("field.width_px")).unwrap();
-        assert!(width.meaning().unwrap().contains("16 to 32768"));
-        assert!(width.expected().starts_with("a number"));
-        assert_eq!(schema.homes_of("sigma_xy_um"), ["optics"]);
-        assert_eq!(schema.homes_of("nowhere"), [""; 0]);
-    }
 }
