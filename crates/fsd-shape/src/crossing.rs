@@ -6,7 +6,7 @@ use crate::outline::{Point, cross, edges, sub};
 ///
 /// True if two edges that are not neighbours share a point, or if two neighbours fold back onto each other. Repeated points
 /// are taken as one; fewer than three different points, or a coordinate that is not finite, make no simple outline and give true.
-/// Takes about n log n time on outlines that do not run to and fro along their longer side.
+/// Takes about n log n time, and up to n² where many edges span the same stretch of the longer side.
 ///
 /// ```
 /// use fsd_shape::self_intersects;
