@@ -1,6 +1,6 @@
 //! Blooming: charge that a full pixel cannot hold, on its way. Whole electrons, so that none is lost to rounding.
 
-use crate::Exposure;
+use crate::exposure::Exposure;
 
 /// Leaves no pixel with more than `well` electrons. Saturated pixels are not counted yet.
 pub(crate) fn spread(charge: &mut [u32], width: usize, well: u32, vertical: f64, anti_blooming: f64) -> Exposure {

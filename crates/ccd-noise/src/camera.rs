@@ -2,6 +2,7 @@ use rand_core::Rng;
 
 use crate::bloom::spread;
 use crate::chain::{Chain, Marker, expose_row, gather_row, mean_row, read_row};
+use crate::exposure::{Exposure, SaturatedRun};
 use crate::field::{NoiseField, rows, whole_rows};
 use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
@@ -24,28 +25,6 @@ use crate::{Blooming, CameraParams, Error, PhotonNoise};
 pub struct Camera {
     params: CameraParams,
     chain: Chain,
-}
-
-/// Pixels side by side that are saturated: full, or their converter at its highest level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct SaturatedRun {
-    /// The row of the frame.
-    pub y: u32,
-    /// The first of them.
-    pub x0: u32,
-    /// The first after them.
-    pub x1: u32,
-}
-
-/// What became of a whole frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Exposure {
-    /// Saturated pixels: full, or their converter at its highest level.
-    pub saturated: usize,
-    /// Electrons that the anti-blooming drains took. 0 where blooming is off: what is clipped then is not counted.
-    pub drained_e: u64,
-    /// Electrons that bloomed over the border of the frame.
-    pub escaped_e: u64,
 }
 
 /// Variance of rounding to whole grey levels.

@@ -3,10 +3,11 @@
 use portable_numerics::elementary::exp_f32;
 use portable_numerics::random::SplitMix64;
 
+use crate::exposure::SaturatedRun;
 use crate::field::{blocks, padded};
 use crate::hash::{BLOCK, Block, RowWords, Stream};
 use crate::poisson::{at_least_nothing, poisson};
-use crate::{CameraParams, PhotonNoise, ReadNoise, SaturatedRun};
+use crate::{CameraParams, PhotonNoise, ReadNoise};
 
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chain {

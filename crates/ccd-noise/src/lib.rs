@@ -6,6 +6,7 @@ pub mod calibrate;
 mod camera;
 mod chain;
 mod error;
+mod exposure;
 mod field;
 mod hash;
 mod jpeg;
@@ -13,8 +14,9 @@ mod params;
 mod poisson;
 
 pub use binning::Binning;
-pub use camera::{Camera, Exposure, SaturatedRun};
+pub use camera::Camera;
 pub use error::Error;
+pub use exposure::{Exposure, SaturatedRun};
 pub use field::NoiseField;
 pub use jpeg::{Jpeg, JpegParams, Subsampling};
 pub use params::{Blooming, CameraParams, PhotonNoise, ReadNoise};

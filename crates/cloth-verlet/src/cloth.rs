@@ -133,8 +133,8 @@ fn solve<const L: usize>(batch: &mut Batch<L>, topology: &Topology, params: &Clo
 mod tests {
     use super::*;
     use crate::Rest;
-    use crate::mesh::cross;
     use crate::outline::{distance, moments, sides};
+    use crate::sheet::cross;
     use crate::testing::{angular, rng, wavy};
 
     fn few() -> ClothParams {

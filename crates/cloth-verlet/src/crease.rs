@@ -349,7 +349,7 @@ mod tests {
                 .triangles()
                 .iter()
                 .map(|t| t.map(|v| sheet.vertices()[v as usize]).map(|v| [v[0], v[1]]))
-                .map(|[a, b, c]| crate::mesh::cross(a, b, c).abs() / 2.0)
+                .map(|[a, b, c]| crate::sheet::cross(a, b, c).abs() / 2.0)
                 .sum();
             assert!((areas / shadow - 1.0).abs() < 1e-9, "{areas} {shadow}");
             // Where the sheet is thick there is a piece, and the other way round.

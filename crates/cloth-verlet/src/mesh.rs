@@ -1,6 +1,6 @@
 //! The disc that every sheet is cut from: one triangulation for all, so that sheets can be solved side by side.
 
-use crate::sheet::edges;
+use crate::sheet::{cross, edges};
 use crate::{Error, Point};
 use multiversion::multiversion;
 use spade::{DelaunayTriangulation, Triangulation};
@@ -183,11 +183,6 @@ fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
             points[rim..].iter().map(weight).collect()
         })
         .collect()
-}
-
-/// Twice the signed area of a triangle.
-pub(crate) fn cross(a: Point, b: Point, c: Point) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
 
 #[cfg(test)]

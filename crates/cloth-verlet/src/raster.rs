@@ -1,6 +1,6 @@
 //! The picture of a sheet: its thickness along z, exact in area and in volume.
 
-use crate::mesh::cross;
+use crate::sheet::cross;
 use crate::sheet::{Edge, OUTSIDE};
 use crate::{Point, Sheet, Vertex};
 use multiversion::multiversion;

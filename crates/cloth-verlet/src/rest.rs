@@ -1,8 +1,9 @@
 //! The flat sheet before it is pressed, and the outline's way from there to its shape.
 
 use crate::batch::Start;
-use crate::mesh::{Disc, cross};
+use crate::mesh::Disc;
 use crate::outline::{Outline, moments};
+use crate::sheet::cross;
 use crate::{ClothParams, Point, Rest, Rng, Solver};
 use portable_numerics::random::uniform;
 use std::f64::consts::{PI, TAU};

@@ -1,4 +1,3 @@
-use crate::mesh::cross;
 use crate::outline::distance;
 use crate::{Point, Vertex};
 use std::collections::BTreeMap;
@@ -167,6 +166,11 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
         }
     }
     edges
+}
+
+/// Twice the signed area of a triangle.
+pub(crate) fn cross(a: Point, b: Point, c: Point) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
 
 #[cfg(test)]

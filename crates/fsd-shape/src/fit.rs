@@ -5,7 +5,7 @@ use portable_numerics::statistics::{deviation, mean};
 
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, resample, signed_area};
-use crate::roughness::Fine;
+use crate::roughness::{Fine, dot};
 use crate::sample::Bend;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics, add_scaled};
 use crate::steps::to_steps;
@@ -236,10 +236,6 @@ fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
         .collect();
     axes.sort_by(|a, b| b.variance.total_cmp(&a.variance));
     axes
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {

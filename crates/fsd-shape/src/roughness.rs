@@ -3,7 +3,6 @@
 use portable_numerics::statistics::deviation;
 
 use crate::descriptors::Descriptors;
-use crate::fit::dot;
 use crate::model::LEAST_FOR_LOCAL;
 use crate::statistics::{ShapeStatistics, finest_coarse, order, terms};
 
@@ -104,4 +103,8 @@ fn trigamma(x: f64) -> f64 {
     }
     let y = 1.0 / (x * x);
     sum + 1.0 / x + y / 2.0 + y / x * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -22,7 +22,7 @@ pub enum Error {
     )]
     Window {
         /// Which window.
-        window: crate::calibrate::Window,
+        window: crate::window::Window,
         /// Width of the image.
         width: usize,
         /// Height of the image.

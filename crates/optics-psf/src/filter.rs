@@ -5,7 +5,7 @@ use num_complex::Complex32;
 
 use crate::Microscope;
 use crate::lane_plane::{LANES, Lanes};
-use crate::transfer::{SIDED_SAMPLES, Transfer, corners};
+use crate::transfer::{SIDED_SAMPLES, Transfer, corners, fade};
 
 /// Up to this distance from focus, and from that one on, µm of mountant: the correction of the in-focus form is whole, and
 /// gone. It gains little at 1 µm and nothing from 2 µm on, where the camera's lattice may serve.
@@ -261,12 +261,6 @@ pub(crate) fn incoherence(ratio: f64) -> f64 {
     let r = ratio.min(1.0);
     let cube = r * r * r;
     cube * cube * r
-}
-
-/// From 1 where t is 0 to 0 where it is 1.
-pub(crate) fn fade(t: f64) -> f64 {
-    let t = t.clamp(0.0, 1.0);
-    1.0 - t * t * (3.0 - 2.0 * t)
 }
 
 /// The spectrum of a disc, 2 J₁(q)/q.

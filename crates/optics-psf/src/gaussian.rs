@@ -3,6 +3,7 @@ use crate::error::{Error, require, within};
 use crate::fir::{self, Source};
 use crate::kernel::{Kernel, LOST_TAIL};
 use crate::pyramid::{self, Pyramid};
+use crate::scratch::Scratch;
 
 /// How a blur is computed. The kernel that is meant is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -172,26 +173,6 @@ impl Gaussian {
             Some(pyramid) => pyramid.blur(source, margin, dst, scratch),
             None => fir::blur(source, &self.kernel.half, margin, -margin.cast_signed(), dst, scratch),
         }
-    }
-}
-
-/// Working memory of the blurs: give the same one to every call and nothing is allocated once it
-/// has grown to the largest image.
-#[derive(Debug, Clone, Default)]
-pub struct Scratch {
-    /// The columns that are being blurred, with the rows above and below them.
-    pub(crate) strip: Vec<f32>,
-    /// One row, with what lies left and right of it.
-    pub(crate) line: Vec<f32>,
-    /// The image halved 1, 2 … times; the first is the coarsest one, blurred.
-    pub(crate) levels: Vec<Vec<f32>>,
-}
-
-impl Scratch {
-    /// Empty memory.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
     }
 }
 

@@ -1,6 +1,6 @@
 use core::f64::consts::TAU;
 
-use crate::{MicroscopeParams, Zernike};
+use crate::params::{MicroscopeParams, Zernike};
 
 /// Refractive index of cover glasses at the sodium line (ISO 8255 asks for 1.5255 ± 0.0015; that
 /// and the mountant's 1.515 are the same to within 1 % of the effect).

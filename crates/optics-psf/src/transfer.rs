@@ -3,9 +3,9 @@ use std::sync::Arc;
 
 use multiversion::multiversion;
 
-use crate::Microscope;
-use crate::filter::fade;
+use crate::error::Error;
 use crate::lens::Lens;
+use crate::microscope::{Microscope, distance};
 use crate::pupil::Pupil;
 
 /// Samples from frequency 0 to the cutoff: linear interpolation errs by less than 6e-4.
@@ -32,6 +32,22 @@ pub struct Transfer {
     pub(crate) step: f64,
     /// (H_A, H_P), complex, at multiples of the step: one row of frequencies, or one for each direction around the circle.
     pub(crate) table: Vec<[[f64; 2]; 2]>,
+}
+
+impl Microscope {
+    /// How the microscope transfers detail: see [`Transfer`].
+    ///
+    /// `depth_um` is the depth of the detail about the focal plane of the stage at rest, in the mountant, positive
+    /// towards the objective; `stage_um` how far the stage was then lowered from the objective, in the immersion medium.
+    /// Both blur, and they are not the same: to focus on what lies d nearer to the objective, the stage is lowered by
+    /// about d / `mount_index` if the lens is dry.
+    ///
+    /// # Errors
+    ///
+    /// If a number is not finite or beyond ±1000 µm.
+    pub fn transfer(&self, depth_um: f64, stage_um: f64) -> Result<Transfer, Error> {
+        Ok(Transfer::new(self, distance("depth_um", depth_um)?, distance("stage_um", stage_um)?))
+    }
 }
 
 impl Transfer {
@@ -287,6 +303,12 @@ pub(crate) fn corners([x, y]: [f64; 2]) -> Option<[(usize, f64); 4]> {
         (place(k + 1, i), u * (1.0 - t)),
         (place(k + 1, i + 1), u * t),
     ])
+}
+
+/// From 1 where t is 0 to 0 where it is 1.
+pub(crate) fn fade(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    1.0 - t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

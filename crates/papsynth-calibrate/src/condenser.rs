@@ -6,9 +6,9 @@ use portable_numerics::statistics::median;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::Instrument;
 use crate::error::Error;
-use crate::focus::{Nucleus, standard_error};
+use crate::instrument::Instrument;
+use crate::nucleus::{Nucleus, standard_error};
 
 /// Nuclei from which the condenser is sought, planes on each side that are compared, and the blur of the last of them:
 /// each nucleus takes as long as all the rest, and more no longer help.

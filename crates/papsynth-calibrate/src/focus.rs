@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 
 use optics_psf::Error as Optics;
 use optics_psf::calibrate::{self, FocusCurve, Line, Window};
-use portable_numerics::statistics::{deviation, quantile};
+use portable_numerics::statistics::quantile;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::Instrument;
 use crate::condenser::Condenser;
 use crate::error::Error;
 use crate::find;
+use crate::instrument::Instrument;
+use crate::nucleus::{Nucleus, standard_error};
 
 /// σ at which the search of [`calibrate::focus`] ends, px, less a step of it: what reaches it may be wider.
 const WIDEST_PX: f64 = 15.8;
@@ -41,26 +42,6 @@ pub struct FocusParams {
     pub step_um: Option<f64>,
     /// The microscope, where the size of its pixels is known. With it and `step_um` the condenser's aperture is sought.
     pub instrument: Option<Instrument>,
-}
-
-/// One nucleus of a focus stack.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Nucleus {
-    /// Left, top, width, height, pixels.
-    pub window: [usize; 4],
-    /// Its plane in focus, counted from 0.
-    pub focused: usize,
-    /// σ in each plane, pixels.
-    pub sigma_px: Vec<f64>,
-}
-
-impl Nucleus {
-    /// σ in each plane, with the number of planes from focus.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (i64, f64)> {
-        let focused = self.focused.cast_signed() as i64;
-        self.sigma_px.iter().zip(0_i64..).map(move |(sigma, plane)| (plane - focused, *sigma))
-    }
 }
 
 /// σ against focus offset.
@@ -236,9 +217,4 @@ fn medians(nuclei: &[Nucleus]) -> Vec<Offset> {
         offsets.iter_mut().for_each(|o| o.fitted = common.contains(&o.planes));
     }
     offsets
-}
-
-/// The standard error of a mean; of one number alone nothing is known, and it is 0.
-pub(crate) fn standard_error(values: &[f64]) -> f64 {
-    if values.len() < 2 { 0.0 } else { deviation(values) / (values.len() as f64).sqrt() }
 }

@@ -5,6 +5,7 @@ mod args;
 #[cfg(feature = "calibrate")]
 mod calibrate;
 mod exit;
+mod findings;
 mod generate;
 mod inspect;
 #[cfg(feature = "judge")]

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::path::Path;
 
-use papsynth_dataset::{Check, Dataset, Finding, Home, Mend, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Home, shards_to_make};
 
 use crate::args::{Clean, Merge, Status, Verify, check_of};
 use crate::exit::{self, Failure};
+use crate::findings::{judge, print_findings};
 use crate::words::{counted, runs};
 
 pub(crate) fn run(args: &Status) -> Result<(), Failure> {
@@ -119,39 +119,6 @@ pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
         exit::note(format!("{stay}: at work, another user's, or of a name that is no UTF-8"));
     }
     Ok(())
-}
-
-/// Findings that are printed in full; the rest is counted.
-const MOST_FINDINGS: usize = 50;
-
-pub(crate) fn print_findings(findings: &[Finding]) -> Result<(), Failure> {
-    let mut text = String::new();
-    for finding in findings.iter().take(MOST_FINDINGS) {
-        text.push_str(&format!("{}: {}\n", finding.path, finding.message));
-    }
-    if findings.len() > MOST_FINDINGS {
-        text.push_str(&format!("and {} more\n", findings.len() - MOST_FINDINGS));
-    }
-    exit::print(&text)
-}
-
-/// Nothing found is good; else there is something to do.
-pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
-    if findings.is_empty() {
-        return Ok(());
-    }
-    let things = counted(findings.len() as u64, "thing is", "things are");
-    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
-    let mends: Vec<&str> = [
-        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
-        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
-        (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
-    ]
-    .into_iter()
-    .filter(|(mend, _)| wants(*mend))
-    .map(|(_, words)| words)
-    .collect();
-    Err(Failure::wrong(format!("{}: {things} wrong", dir.display()), mends.join("; ")))
 }
 
 #[cfg(test)]

@@ -5,12 +5,11 @@ use std::fmt::Write;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
+use crate::crops::Sheet;
 use crate::judge::{Beside, Curve, Report, Spread, Test, Verdict};
-use crate::measure::{Field, PATCH_PX};
 use crate::moments::Moments;
-use crate::number::{nearest, whole};
+use crate::number::nearest;
 use crate::svg::{COLOURS, Plot, escape, short};
-use crate::table::Table;
 use crate::two_sample::TwoSample;
 
 /// Giveaways that are listed.
@@ -228,67 +227,6 @@ fn drawn(curve: &Curve) -> String {
         plot.line(points(spreads, |s| s.p50).into_iter(), colour);
     }
     plot.finish()
-}
-
-/// How many are shown of each kind.
-const SHOWN: usize = 20;
-
-/// Side of the picture of a nucleus, pixels.
-const NUCLEUS_PX: usize = 64;
-
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sheet {
-    /// "nuclei" or "patches".
-    pub(crate) of: &'static str,
-    pub(crate) title: &'static str,
-    pub(crate) crops: Vec<Crop>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Crop {
-    pub(crate) field: String,
-    /// How synthetic it looked, 0 to 1.
-    pub(crate) score: f64,
-    pub(crate) grey: Vec<u8>,
-    pub(crate) width: usize,
-}
-
-/// A name, the table of it, and the side of its picture.
-type Kind = (&'static str, fn(&Field) -> &Table, usize);
-
-pub(crate) fn sheets(real: &[Field], synthetic: &[Field], tests: &[Test<TwoSample>]) -> Vec<Sheet> {
-    let kinds: [Kind; 2] = [("nuclei", |f| &f.nuclei, NUCLEUS_PX), ("patches", |f| &f.patches, PATCH_PX)];
-    let mut sheets = Vec::new();
-    for (of, table, side) in kinds {
-        let Some(test) = tests.iter().find(|test| test.name == of) else { continue };
-        for (fields, scores, titles) in [
-            (synthetic, &test.result.scores[1], ["Synthetic, most convincing", "Synthetic, least convincing"]),
-            (real, &test.result.scores[0], ["Real, most plainly real", "Real, taken for synthetic"]),
-        ] {
-            let places = fields.iter().flat_map(|f| table(f).places.iter().map(move |p| (f, *p)));
-            let mut all: Vec<(f64, (&Field, [f64; 2]))> = scores.iter().copied().zip(places).collect();
-            all.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let shown = SHOWN.min(all.len());
-            for (title, part) in titles.into_iter().zip([&all[..shown], &all[all.len() - shown..]]) {
-                let crops = part.iter().filter_map(|(score, (field, place))| cut(field, *place, side, *score));
-                sheets.push(Sheet { of, title, crops: crops.collect() });
-            }
-        }
-    }
-    sheets
-}
-
-/// The square around a place, moved into the field where it would reach beyond.
-fn cut(field: &Field, [x, y]: [f64; 2], side: usize, score: f64) -> Option<Crop> {
-    if field.thumbnail.is_empty() {
-        return None;
-    }
-    let (wide, high) = (side.min(field.width), side.min(field.height));
-    let left = whole(x - wide as f64 / 2.0 + 0.5).min(field.width - wide);
-    let top = whole(y - high as f64 / 2.0 + 0.5).min(field.height - high);
-    let rows = field.thumbnail.chunks_exact(field.width).skip(top).take(high);
-    let grey = rows.flat_map(|row| row[left..left + wide].iter().copied()).collect();
-    Some(Crop { field: field.name.clone(), score, grey, width: wide })
 }
 
 fn png(grey: &[u8], width: usize) -> Vec<u8> {

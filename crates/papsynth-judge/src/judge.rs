@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
+use crate::crops::{Sheet, sheets};
 use crate::error::Error;
-use crate::html::{Sheet, sheets};
 use crate::measure::{Field, GaugeParams, HISTOGRAM, HISTOGRAM_FROM, HISTOGRAM_STEP, PROFILE, Statistics, frequencies};
 use crate::moments::{self, Moments};
 use crate::statistics::{of_sorted, quantile, sorted};
@@ -154,7 +154,8 @@ impl Judge {
         let moments = self.moments(real, synthetic, &mut notes);
         let mut verdicts = two_sample.iter().map(|t| t.verdict).chain(moments.iter().map(|t| t.verdict));
         let verdict = Verdict::of(verdicts.any(|v| v == Verdict::ToldApart));
-        let crops = sheets(real, synthetic, &two_sample);
+        let crops =
+            sheets(real, synthetic, |of| two_sample.iter().find(|test| test.name == of).map(|test| &test.result));
         let names = |fields: &[Field]| fields.iter().map(|f| f.name.clone()).collect();
         Ok(Report {
             judge_report: VERSION,

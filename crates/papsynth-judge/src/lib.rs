@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod background;
+mod crops;
 mod error;
 #[doc(hidden)]
 pub mod filter;

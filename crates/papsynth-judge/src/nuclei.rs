@@ -1,7 +1,6 @@
 //! Nuclei: where they are, pixel by pixel.
 
 use crate::filter::blur;
-use crate::measure::GaugeParams;
 use crate::number::whole;
 use crate::picture::Known;
 use crate::region::{Region, components, flood};
@@ -50,13 +49,19 @@ const MARK_UM: f64 = 4.0;
 const AROUND_UM: [f64; 2] = [0.8, 2.5];
 
 /// The nuclei of a picture, by their centres from top to bottom. No two have a pixel in common.
-pub(crate) fn nuclei(absorbance: &[f32], width: usize, known: &Known, params: &GaugeParams) -> Vec<Region> {
+pub(crate) fn nuclei(
+    absorbance: &[f32],
+    width: usize,
+    pixel_um: f64,
+    known: &Known,
+    params: &NucleiParams,
+) -> Vec<Region> {
     let mut regions = match known {
         Known::Masks(labels) => masks(labels, width),
-        Known::Nothing => found(absorbance, width, None, params),
-        Known::Points(points) => found(absorbance, width, Some(points), params),
+        Known::Nothing => found(absorbance, width, pixel_um, None, params),
+        Known::Points(points) => found(absorbance, width, pixel_um, Some(points), params),
     };
-    regions.retain(|r| r.pixels.len() as f64 * params.pixel_um * params.pixel_um >= params.nuclei.smallest_um2);
+    regions.retain(|r| r.pixels.len() as f64 * pixel_um * pixel_um >= params.smallest_um2);
     regions.sort_by_key(|r| r.pixels.iter().min().copied());
     regions
 }
@@ -73,8 +78,13 @@ fn masks(labels: &[u32], width: usize) -> Vec<Region> {
     largest.into_values().collect()
 }
 
-fn found(absorbance: &[f32], width: usize, points: Option<&[[f64; 2]]>, params: &GaugeParams) -> Vec<Region> {
-    let GaugeParams { pixel_um, nuclei: ref params, .. } = *params;
+fn found(
+    absorbance: &[f32],
+    width: usize,
+    pixel_um: f64,
+    points: Option<&[[f64; 2]]>,
+    params: &NucleiParams,
+) -> Vec<Region> {
     let smooth = blur(absorbance, width, (SMOOTH_UM / pixel_um).max(0.5));
     let px2 = pixel_um * pixel_um;
     let (smallest, largest) = (params.smallest_um2 / px2, params.largest_um2 / px2);
@@ -153,6 +163,8 @@ mod tests {
     use super::*;
     use crate::region::distance;
 
+    const PIXEL_UM: f64 = 0.33;
+
     /// Discs of a radius and absorbance on something pale, with rims of 1.2 pixels.
     fn image(discs: &[([f64; 2], f64, f64)]) -> Vec<f32> {
         let at = |i: usize| {
@@ -166,14 +178,14 @@ mod tests {
     }
 
     fn areas(image: &[f32], known: &Known) -> Vec<usize> {
-        nuclei(image, 200, known, &GaugeParams::default()).iter().map(|r| r.pixels.len()).collect()
+        nuclei(image, 200, PIXEL_UM, known, &NucleiParams::default()).iter().map(|r| r.pixels.len()).collect()
     }
 
     #[test]
     fn a_disc_is_found_to_the_middle_of_its_rim() {
         for radius in [8.0, 12.0, 20.0] {
             let image = image(&[([80.2, 70.7], radius, 0.3)]);
-            let found = nuclei(&image, 200, &Known::Nothing, &GaugeParams::default());
+            let found = nuclei(&image, 200, PIXEL_UM, &Known::Nothing, &NucleiParams::default());
             assert_eq!(found.len(), 1);
             let shape = found[0].shape();
             let wanted = std::f64::consts::PI * radius * radius;

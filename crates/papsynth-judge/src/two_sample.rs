@@ -63,7 +63,8 @@ impl TwoSample {
     /// Median AUC between random halves of the real fields; none if there were too few fields to halve.
     #[must_use]
     pub fn null_median(&self) -> Option<f64> {
-        crate::judge::Spread::of(self.null.iter().copied()).p50
+        let known = sorted(self.null.iter().copied().filter(|v| v.is_finite()));
+        (!known.is_empty()).then(|| of_sorted(&known, 0.5))
     }
 }
 

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::noise::{Empty, pattern};
 use crate::parameter::Parameter;
 use crate::recipe::{LEVELS, Spreads};
-use crate::regression::Estimate;
+use crate::regression::{Estimate, reach};
 use crate::view::View;
 use portable_numerics::statistics::{deviation, mean, quantile};
 
@@ -179,11 +179,6 @@ pub fn measure(fields: &[Picture], pixel_um: f64) -> Result<Measured, Error> {
         noise: or_default(deviation(&noise), usual.noise),
     };
     Ok(Measured { size_px, bits: bits(fields), extended, nuclei_from, estimates, spreads })
-}
-
-/// The least and the largest value.
-pub(crate) fn reach(values: &[f64]) -> [f64; 2] {
-    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
 fn light(field: &Picture, view: &View) -> Result<Light, Error> {

@@ -208,7 +208,8 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     }
     cells(&mut r, area, &on, &or_base);
     // From the value and what the recipe to begin with has.
-    let mut single: Vec<(P, &mut Number, fn(f64, &Number) -> Number)> = vec![
+    type Spread = fn(f64, &Number) -> Number;
+    let mut single: Vec<(P, &mut Number, Spread)> = vec![
         (P::Scatter, &mut r.background.scatter, about),
         (P::Across, &mut r.focus.fused_noise_across, |value, _| number(value)),
         (P::Down, &mut r.focus.fused_noise_down, |value, _| number(value)),

@@ -10,7 +10,6 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::measured::reach;
 use portable_numerics::statistics::{deviation, mean};
 
 /// A value with its 95 % interval.
@@ -332,6 +331,11 @@ impl Ridge {
     pub(crate) fn predict(&self, row: &[f64]) -> f64 {
         self.mean + self.factors.iter().zip(row).map(|(f, x)| f * x).sum::<f64>()
     }
+}
+
+/// The least and the largest value.
+pub(crate) fn reach(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(*v), high.max(*v)])
 }
 
 #[cfg(test)]

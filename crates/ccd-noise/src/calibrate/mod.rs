@@ -2,25 +2,12 @@
 
 mod level;
 
-pub use level::{Level, Light};
+pub use level::{Level, Light, Shading};
 
 use crate::camera::ROUNDING;
 use crate::error::{Error, require, within};
 use crate::{CameraParams, ReadNoise};
 use level::measure;
-
-/// Whether flats are taken to be lit evenly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shading {
-    /// They are: all that differs between pixels is the camera's. EMVA 1288 demands it of the laboratory.
-    Kept,
-    /// They are not, as through a microscope: from each pixel the mean of a square around it is taken away before
-    /// their spread is measured. Pixels nearer to the border than half a side are left out.
-    Removed {
-        /// Side of the square in pixels, odd, from 3 to below the width and height of the frames.
-        side_px: usize,
-    },
-}
 
 /// How flat frames are judged.
 #[derive(Debug, Clone, PartialEq)]

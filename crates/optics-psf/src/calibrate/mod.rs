@@ -8,25 +8,13 @@
 
 mod edge;
 
+pub use crate::window::Window;
 pub use edge::{EdgeFit, edge};
 
 use crate::error::require;
 use crate::grid::fast_length;
 use crate::lane_plane::{LANES, LanePlane, LanePlans, LaneScratch, LaneSupport, Lanes};
 use crate::{Border, Error, Gaussian, Microscope, MicroscopeParams, Scratch};
-
-/// Part of an image, in pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
-    /// First column.
-    pub left: usize,
-    /// First row.
-    pub top: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
 
 /// Smallest side of a window, pixels: less has no statistics.
 const LEAST_SIDE: usize = 8;

@@ -10,10 +10,10 @@ use papsynth_dataset::{Check, Share};
 
 use crate::args::{SlideFinalize, SlideMake, check_of};
 use crate::exit::{self, Failure};
+use crate::findings::{judge, print_findings};
 use crate::memory;
 use crate::report::Bar;
 use crate::setup::Setup;
-use crate::status::{judge, print_findings};
 use crate::words::counted;
 
 pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {

@@ -335,9 +335,11 @@ impl Folder {
                 }
                 // A link is nobody's work, and what it leads to is none of ours.
                 let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
-                let is_free = || File::options().write(true).open(entry.path()).is_ok_and(|f| f.try_lock().is_ok());
-                let abandoned = is_link || is_free();
-                let is_gone = abandoned && fs::remove_file(entry.path()).is_ok();
+                let open =
+                    || File::options().write(true).open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
+                // Held until the file is gone, so that nobody begins to work on it in between.
+                let lock = if is_link { None } else { open() };
+                let is_gone = (is_link || lock.is_some()) && fs::remove_file(entry.path()).is_ok();
                 removed += u64::from(is_gone);
                 // Gone by another's hand is as good.
                 stayed += u64::from(!is_gone && entry.path().symlink_metadata().is_ok());

@@ -1,6 +1,6 @@
 //! A file that is being written: whole under its name, or not at all.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -53,23 +53,30 @@ pub(crate) struct Pending {
 impl Pending {
     /// Opens a file that will have this path once it is committed, and this name in the folder.
     pub(super) fn open(path: PathBuf, name: &str, remote: Option<Arc<Remote>>) -> Result<Self, Error> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
-        // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
-        let unique = RandomState::new().hash_one(&path);
-        let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
-        let open = || {
-            fault::point()?;
-            File::options().read(true).write(true).create_new(true).open(&temporary)
-        };
-        let file = open().or_else(|e| match e.kind() {
-            io::ErrorKind::NotFound => fs::create_dir_all(folder).and_then(|()| open()),
-            _ => Err(e),
-        });
-        let file = file.map_err(Error::io("write", &path))?;
-        // Says that somebody is at work on it; see `sweep`. File systems without locks do without.
-        let _ = file.try_lock();
-        Ok(Self { file, temporary, path, name: name.to_owned(), committed: false, remote })
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        loop {
+            // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
+            let unique = RandomState::new().hash_one(&path);
+            let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
+            let open = || {
+                fault::point()?;
+                File::options().read(true).write(true).create_new(true).open(&temporary)
+            };
+            let file = open().or_else(|e| match e.kind() {
+                io::ErrorKind::NotFound => fs::create_dir_all(&folder).and_then(|()| open()),
+                _ => Err(e),
+            });
+            let file = file.map_err(Error::io("write", &path))?;
+            // The lock keeps `Folder::sweep` of another process away. If that was faster, the file is lost and another one is
+            // made. File systems without locks do without.
+            let is_locked_by_other = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+            let is_gone = || temporary.symlink_metadata().is_err_and(|e| e.kind() == io::ErrorKind::NotFound);
+            if !is_locked_by_other && !is_gone() {
+                let name = name.to_owned();
+                return Ok(Self { file, temporary, path, name, committed: false, remote });
+            }
+        }
     }
 
     pub(crate) fn path(&self) -> &Path {

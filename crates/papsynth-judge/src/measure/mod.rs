@@ -180,7 +180,8 @@ impl Gauge {
     }
 
     fn nuclei(&self, maps: &Maps, known: &Known) -> Vec<Region> {
-        let search = |known: &Known| nuclei(&maps.absorbance, maps.width, known, &self.params);
+        let search =
+            |known: &Known| nuclei(&maps.absorbance, maps.width, self.params.pixel_um, known, &self.params.nuclei);
         match (self.params.nuclei_from, known) {
             (NucleiFrom::Masks, Known::Masks(_)) | (NucleiFrom::Points, Known::Points(_)) => search(known),
             (NucleiFrom::Points, Known::Masks(_)) => {

@@ -4,7 +4,7 @@
 //! cell's row in the truth has the trait `clue`.
 
 use super::prelude::*;
-use crate::scene::field::FieldNumbers;
+use crate::scene::view::FieldNumbers;
 
 section! {
     /// Clue cells: cells covered with coccobacilli, and cells with patches of them.

@@ -4,8 +4,8 @@ use crate::key::Stream;
 use crate::random;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
-use crate::scene::field::{FieldNumbers, View};
 use crate::scene::stain::FieldStain;
+use crate::scene::view::{FieldNumbers, View};
 
 /// A field whose cells have their places.
 pub(crate) struct Field<'a> {

@@ -5,8 +5,8 @@ use crate::key::{Key, Stream};
 use crate::phantom::pools::Pools;
 use crate::phantom::tile::Point;
 use crate::phantom::wobble::placed;
-use crate::scene::field::View;
 use crate::scene::imaging::SceneDyes;
+use crate::scene::view::View;
 
 /// Where an object lies, and what its phantom may use.
 pub(crate) struct Site<'a> {

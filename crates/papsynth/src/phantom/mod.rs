@@ -4,6 +4,7 @@
 
 mod cell;
 mod chromatin;
+mod making;
 mod nucleus;
 pub(crate) mod piece;
 pub(crate) mod pools;
@@ -16,7 +17,7 @@ use crate::error::Cause;
 use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene, View};
 
-use cell::Cell;
+use making::Cell;
 pub(crate) use piece::{Phantom, Piece};
 pub(crate) use pools::Pools;
 pub(crate) use studio::Studio;

@@ -2,8 +2,8 @@
 
 use optics_psf::{Border, Gaussian, Method};
 
-use super::cell::Cell;
 use super::chromatin::standardise;
+use super::making::Cell;
 use super::piece::Piece;
 use super::studio::ClassStudio;
 use super::tile::{Point, Tile, area, grown};

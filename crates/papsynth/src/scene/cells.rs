@@ -11,10 +11,11 @@ use crate::recipe::{CellMix, Number, Recipe};
 
 use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::field::{FieldNumbers, Object, View};
+use super::field::Object;
 use super::groups::{Groups, Place};
 use super::layout::{Places, weight_map};
 use super::stain::FieldStain;
+use super::view::{FieldNumbers, View};
 use super::weight::WeightMap;
 use crate::debris::Body;
 

@@ -10,9 +10,10 @@ use crate::recipe::section::named;
 use crate::recipe::{Illumination, Light, Optics, Picture, Recipe};
 
 use super::cells::draw_cells;
-use super::field::{FieldNumbers, Object, Scene, View};
+use super::field::{Object, Scene};
 use super::imaging::{Fusion, Restoration, SceneBackground, SceneIllumination, SceneLight, SceneOptics};
 use super::stain::FieldStain;
+use super::view::{FieldNumbers, View};
 use super::weight::WeightMap;
 
 /// Draws what lies on the slide and how it is imaged.

@@ -7,7 +7,7 @@ use crate::random;
 use crate::recipe::section::named;
 use crate::recipe::{Labels, Layout};
 
-use super::field::{FieldNumbers, View};
+use super::view::{FieldNumbers, View};
 use super::weight::{Sampler, WeightMap};
 
 /// Size of a pixel of a weight map, µm: far below the size of a cell.

@@ -14,6 +14,7 @@ pub(crate) mod imaging;
 mod layout;
 mod plots;
 pub(crate) mod stain;
+pub(crate) mod view;
 mod weight;
 
 pub use crate::debris::{
@@ -24,8 +25,9 @@ pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;
 pub use cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody, Tint};
 pub use draw::draw;
-pub use field::{Object, Plot, Scene, SlideFrame, View};
+pub use field::{Object, Plot, Scene, SlideFrame};
 pub use imaging::{Fusion, Restoration, SceneBackground, SceneDyes, SceneIllumination, SceneLight, SceneOptics};
 pub(crate) use layout::check_layout;
 pub(crate) use plots::{BEYOND, PLOT_PX, Population};
+pub use view::View;
 pub use weight::WeightMap;

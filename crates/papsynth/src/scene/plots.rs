@@ -13,9 +13,10 @@ use rand_core::Rng;
 
 use super::cells::{Class, Drawn};
 use super::draw::{empty, pixel_um, strew};
-use super::field::{FieldNumbers, Object, Plot, Scene, View};
+use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
+use super::view::{FieldNumbers, View};
 use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;

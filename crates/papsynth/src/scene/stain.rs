@@ -11,8 +11,8 @@ use crate::recipe::section::named;
 use crate::recipe::specimen::{Stain, TintMix};
 
 use super::cell::Tint;
-use super::field::FieldNumbers;
 use super::imaging::SceneDyes;
+use super::view::FieldNumbers;
 
 /// The stain of a field.
 pub(crate) struct FieldStain<'a> {

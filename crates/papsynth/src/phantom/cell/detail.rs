@@ -3,9 +3,9 @@
 use multiversion::multiversion;
 use voronoi_cytoskeleton::{LineParams, draw_into};
 
-use super::Cell;
 use crate::error::Cause;
 use crate::key::Stream;
+use crate::phantom::making::Cell;
 use crate::phantom::pools::{Look, SIDE, Texels};
 use crate::phantom::tile::{Point, Tile, grown};
 use crate::phantom::wobble::wobbled_circle;

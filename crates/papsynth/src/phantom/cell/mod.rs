@@ -9,14 +9,13 @@ mod wrinkles;
 use crate::error::Cause;
 use crate::key::Stream;
 use crate::phantom::chromatin::interpolate;
+use crate::phantom::making::Cell;
 use crate::phantom::nucleus;
 use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom, Piece};
-use crate::phantom::pools::Pools;
 use crate::phantom::studio::{ClassStudio, Studio};
 use crate::phantom::tile::{Point, Tile, area};
 use crate::profile::Stage;
 use crate::scene::cell::{CellBody, Fold, FoldForm};
-use crate::scene::field::{Object, Scene};
 use crate::truth::part::Part;
 use crate::truth::traits::Trait;
 
@@ -28,27 +27,6 @@ const SKEW: f64 = 0.45;
 
 /// Distance between the points of a roughened rim, µm.
 const RIM_STEP_UM: f64 = 0.375;
-
-/// A cell that is being made, and what it is made with.
-#[derive(Clone, Copy)]
-pub(super) struct Cell<'a> {
-    pub(super) studio: &'a Studio,
-    pub(super) scene: &'a Scene,
-    pub(super) pools: &'a Pools<'a>,
-    pub(super) object: &'a Object,
-    pub(super) body: &'a CellBody,
-}
-
-impl Cell<'_> {
-    pub(super) fn stream(&self, purpose: &str) -> Stream {
-        self.scene.stream("cell", self.object, purpose)
-    }
-
-    /// Size of a pixel of its sheet.
-    fn pixel_um(&self) -> f64 {
-        self.scene.sheet_grid().pixel_um
-    }
-}
 
 /// Makes cells, sixteen sheets at a time.
 pub(super) fn make(studio: &Studio, cells: &[Cell<'_>]) -> Result<Vec<Phantom>, Cause> {

@@ -5,8 +5,8 @@ use core::ops::Range;
 use multiversion::multiversion;
 use portable_numerics::elementary::exp_f32;
 
-use super::Cell;
 use crate::key::Stream;
+use crate::phantom::making::Cell;
 use crate::phantom::tile::{Point, Tile};
 use crate::random;
 
