@@ -13,7 +13,7 @@ use crate::table::Table;
 pub(crate) const DESCRIPTORS: [&str; 6] =
     ["log moment 2", "log moment 3", "log moment 4", "log moment 5", "log moment 6", "entropy, bits"];
 
-/// The [`DESCRIPTORS`] of how often each grey level 0 to 255 occurs, as parts of 1; what lies between two counts to the nearer.
+/// The [`DESCRIPTORS`] (Eqs. 17 to 19) of grey levels 0 to 255; what lies between two levels counts to the nearer.
 pub(crate) fn descriptors(grey: impl Iterator<Item = f32>) -> [f64; DESCRIPTORS.len()] {
     const LEVELS: usize = 256;
     let mut parts = [0.0; LEVELS];

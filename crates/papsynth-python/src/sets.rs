@@ -21,7 +21,7 @@ const MOST_FRAMES: u64 = 1_000_000_000;
 
 /// What `papsynth.generate` does, where what is given is described: numbers of frames that were "kept" and "made".
 #[pyfunction]
-#[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, threads=1, verify=false, progress=None))]
+#[pyo3(signature = (engine, out, frames, seed=0, *, shard=(0, 1), formats=None, frames_per_shard=None, scenes=false, threads=1, verify=false, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn generate<'py>(
     py: Python<'py>,
@@ -32,6 +32,7 @@ pub(crate) fn generate<'py>(
     shard: (u64, u64),
     formats: Option<Vec<String>>,
     frames_per_shard: Option<u64>,
+    scenes: bool,
     threads: usize,
     verify: bool,
     progress: Option<Bound<'py, PyAny>>,
@@ -46,7 +47,7 @@ pub(crate) fn generate<'py>(
             return Err(wrong(format!("{name}: 0; expected 1 or more")));
         }
     }
-    let layout = layout(formats, frames_per_shard)?;
+    let layout = Layout { scenes, ..layout(formats, frames_per_shard)? };
     let info = DatasetInfo {
         recipe: made_by.engine.recipe(),
         model: &made_by.model,

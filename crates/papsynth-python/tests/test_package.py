@@ -108,6 +108,12 @@ def has_parquet():
     return "--no-parquet" in subprocess.run([PROGRAM, "generate", "--help"], capture_output=True, text=True, check=True).stdout
 
 
+def test_scenes_of_a_data_set_give_its_frames_again(tmp_path):
+    papsynth.generate(SMALL, tmp_path / "set", 2, seed=7, scenes=True)
+    again = papsynth.render(SMALL, scene=tmp_path / "set/scenes/000001.json")
+    assert np.array_equal(again.image, papsynth.render(SMALL, seed=7, index=1).image)
+
+
 def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
     seen = []
     first = papsynth.generate(SMALL, tmp_path / "set", 4, shard=(0, 2), progress=seen.append)

@@ -78,6 +78,7 @@ def generate(
     shard: tuple[int, int] = (0, 1),
     formats: list[str] | None = None,
     frames_per_shard: int | None = None,
+    scenes: bool = False,
     threads: int = 1,
     verify: bool = False,
     progress: Callable[[int], object] | None = None,

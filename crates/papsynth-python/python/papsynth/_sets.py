@@ -78,6 +78,7 @@ def generate(
     shard: tuple[int, int] = (0, 1),
     formats: str | Sequence[str] | None = None,
     frames_per_shard: int | None = None,
+    scenes: bool = False,
     threads: int = 1,
     verify: bool = False,
     model: Any = None,
@@ -103,6 +104,8 @@ def generate(
         Such as ``"folder"`` (the default) or ``"webdataset"``.
     frames_per_shard : int, optional
         Frames that are written and made again together.
+    scenes : bool
+        Whether the scene of each frame is written too, as ``scenes/NNNNNN.json``, which `papsynth.render` reads.
     threads : int
         Frames that are made side by side.
     verify : bool
@@ -135,6 +138,7 @@ def generate(
         shard=tuple(shard),
         formats=_list(formats),
         frames_per_shard=frames_per_shard,
+        scenes=scenes,
         threads=threads,
         verify=verify,
         progress=progress,

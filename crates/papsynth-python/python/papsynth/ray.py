@@ -52,7 +52,7 @@ def generate(
     progress : callable, optional
         Called with the number of shards that are written whole, and of all, from commit records: what was there before counts.
     **options
-        As of `papsynth.generate`: formats, frames_per_shard, threads, verify, model.
+        As of `papsynth.generate`: formats, frames_per_shard, scenes, threads, verify, model.
 
     Returns
     -------
