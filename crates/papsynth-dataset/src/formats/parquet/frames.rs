@@ -29,8 +29,11 @@ const fn head(name: &'static str, kind: Kind) -> Head {
     Head::new(name, kind).or_null()
 }
 
+type FrameColumn = (Head, fn(&Field) -> Cell);
+type ObjectColumn = (Head, fn(&Object) -> Cell);
+
 /// What is known of a frame but its pixels: the first columns.
-const FRAME: [(Head, fn(&Field) -> Cell); 8] = [
+const FRAME: [FrameColumn; 8] = [
     (head("index", Kind::Whole), |field| Cell::Whole(field.frame.index)),
     (head("slide", Kind::Whole), |field| Cell::Whole(field.frame.slide)),
     (head("width", Kind::Whole), |field| Cell::Whole(field.frame.width as u64)),
@@ -48,7 +51,7 @@ struct Object<'a> {
     category: u64,
 }
 
-const OBJECT: [(Head, fn(&Object) -> Cell); 18] = [
+const OBJECT: [ObjectColumn; 18] = [
     (head("id", Kind::Id), |o| Cell::Id(o.truth.id)),
     (head("part", Kind::Text), |o| Cell::text(part(o.truth.part))),
     (head(CLASS, Kind::Whole), |o| Cell::Whole(o.category)),
