@@ -16,10 +16,22 @@ pub enum Error {
     },
     /// A data set or slide cannot be read, or a folder holds nothing that is shown.
     #[error(transparent)]
-    Dataset(#[from] papsynth_dataset::Error),
+    Dataset(Box<papsynth_dataset::Error>),
     /// A study cannot be kept on the disk.
     #[error(transparent)]
-    Study(#[from] papsynth_study::Error),
+    Study(Box<papsynth_study::Error>),
+}
+
+impl From<papsynth_dataset::Error> for Error {
+    fn from(error: papsynth_dataset::Error) -> Self {
+        Self::Dataset(Box::new(error))
+    }
+}
+
+impl From<papsynth_study::Error> for Error {
+    fn from(error: papsynth_study::Error) -> Self {
+        Self::Study(Box::new(error))
+    }
 }
 
 impl Error {
