@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
-/// Usage, recipe or input: trying again will not help. As shells use it for usage.
+/// Usage, recipe or input: trying again will not help. Shells use 2 for usage.
 pub(crate) const INPUT: u8 = 2;
 
 /// Input/output: trying again may help. `EX_IOERR` of sysexits.h.
@@ -69,7 +69,7 @@ pub(crate) struct Failure {
 }
 
 impl Failure {
-    /// Whether the system failed, so that trying again may help.
+    /// A failure with this complaint; `is_io` if the system failed, so that trying again may help.
     pub(crate) fn new(is_io: bool, complaint: Complaint) -> Self {
         Self { code: if is_io { IO } else { INPUT }, complaint: Box::new(complaint) }
     }

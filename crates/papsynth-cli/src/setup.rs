@@ -73,7 +73,7 @@ impl Setup {
     }
 }
 
-/// All of some frames, each made on a thread of its own.
+/// A run of all these frames, `at_once` of them side by side, each made by one thread.
 pub(crate) fn run_of(frames: Range<u64>, at_once: usize, stop: &AtomicBool) -> Run<'_> {
     let (share, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
     Run { frames, share, at_once, threads, check, stop, profile: None }

@@ -116,7 +116,7 @@ pub struct StudyParams {
     pub grey: Grey,
     /// Size of a real pixel, µm, 0.01 to 100; nothing if it is not known. Default nothing (ours).
     pub real_pixel_um: Option<f64>,
-    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if nobody or the data set knows it. Default nothing (ours).
+    /// Size of a synthetic pixel, µm, 0.01 to 100; nothing if it is unknown or the data set tells it. Default nothing (ours).
     pub synthetic_pixel_um: Option<f64>,
 }
 

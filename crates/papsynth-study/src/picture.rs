@@ -113,7 +113,7 @@ impl Picture {
         Self { width, levels }
     }
 
-    /// Levels of a rectangle, every so many-th of either way.
+    /// Levels of a rectangle, every `stride`-th along both axes.
     fn sample(&self, [x, y]: [usize; 2], [width, height]: [usize; 2], stride: usize) -> Vec<f32> {
         let rows = self.levels.chunks_exact(self.width.max(1)).skip(y).take(height).step_by(stride);
         rows.flat_map(|row| row[x..x + width].iter().copied().step_by(stride)).collect()

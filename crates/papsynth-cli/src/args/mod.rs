@@ -136,7 +136,8 @@ pub(crate) struct Completions {
     pub(crate) shell: clap_complete::Shell,
 }
 
-/// A subcommand that this program was built without.
+// A subcommand that this program was built without. What follows is its help.
+/// Not in this build.
 #[derive(Debug, Args)]
 #[allow(dead_code, reason = "a program with all features lacks none")]
 pub(crate) struct LeftOut {

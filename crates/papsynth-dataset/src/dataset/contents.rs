@@ -1,5 +1,5 @@
-//! Whether a shard is whole: its files are as its record says, and they say the same, what no hash tells of a file that was written wrong, or changed by somebody who mended
-//! the hashes.
+//! Whether a shard is whole: its files are as its record says, and they agree with each other. The second is what no hash
+//! tells, of a file that was written wrong, or changed by somebody who mended the hashes.
 //!
 //! Everything follows from the complete masks in the COCO document: which pixels lie in front, boxes and areas, the table, the
 //! record's summary, and every label image, layer and outline of every format. Images must be the same in all formats, and as large and deep as

@@ -106,6 +106,7 @@ impl Dataset {
                 }
                 let stops = run.stop.load(Ordering::Relaxed);
                 let made = if stops { Ok(STOPPED) } else { self.make(engine, shard, run, report) };
+                let gave_up = made.as_ref().is_ok_and(|made| made.stopped);
                 let mut outcome = locked(&outcome);
                 match (&mut *outcome, made) {
                     (Ok(sum), Ok(made)) => {
@@ -114,6 +115,10 @@ impl Dataset {
                     }
                     (Ok(_), Err(error)) => *outcome = Err(error),
                     (Err(_), _) => {}
+                }
+                // There may be more shards than could be gone through.
+                if gave_up {
+                    return;
                 }
             }
         };

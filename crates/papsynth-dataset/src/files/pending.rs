@@ -33,6 +33,9 @@ impl FileRecord {
 
 const TEMPORARY_ENDING: &str = ".tmp";
 
+/// Temporary files that are made for one file, until one is neither locked nor removed by another process.
+const MOST_ATTEMPTS: u32 = 16;
+
 /// Whether a file of this name is one that was never finished.
 pub(crate) fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(TEMPORARY_ENDING)
@@ -55,7 +58,9 @@ impl Pending {
     pub(super) fn open(path: PathBuf, name: &str, remote: Option<Arc<Remote>>) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let file_name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut attempts = 0;
         loop {
+            attempts += 1;
             // A number that no other process has: it keeps two writers of the same file apart and reaches no output.
             let unique = RandomState::new().hash_one(&path);
             let temporary = folder.join(format!(".{file_name}.{unique:016x}{TEMPORARY_ENDING}"));
@@ -72,7 +77,7 @@ impl Pending {
             // made. File systems without locks do without.
             let is_locked_by_other = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
             let is_gone = || temporary.symlink_metadata().is_err_and(|e| e.kind() == io::ErrorKind::NotFound);
-            if !is_locked_by_other && !is_gone() {
+            if attempts == MOST_ATTEMPTS || (!is_locked_by_other && !is_gone()) {
                 let name = name.to_owned();
                 return Ok(Self { file, temporary, path, name, committed: false, remote });
             }

@@ -16,7 +16,7 @@ use crate::write::{Page, PageWriter, Pages, Pixels, compressed, fits_16_bits, is
 /// The µ of µm, as XML that is ASCII: readers of TIFF expect no other.
 const MICROMETRE: &str = "&#181;m";
 
-/// The description of a frame, one page a plane in the order of the frame.
+/// The description of a frame, one page a plane, in the order of `planes_um`.
 pub(super) fn description(frame: &FrameSummary) -> String {
     let planes = &frame.planes_um;
     let step = match planes.as_slice() {
