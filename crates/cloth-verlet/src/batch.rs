@@ -136,7 +136,7 @@ impl<const L: usize> Batch<L> {
             let s = substep as f64 / all;
             self.tie(topology.rim, single(s * s * (3.0 - 2.0 * s)));
             advance(&mut self.now[topology.rim..], &mut self.before[topology.rim..], keep, gravity);
-            // The first set of pairs lies within the rim, which moves as it is told.
+            // The first set holds the edges of the rim, whose positions are prescribed.
             for set in 1..3 {
                 project(&mut self.now, &topology.edges[set], &self.edges[set], stretch[set - 1]);
             }

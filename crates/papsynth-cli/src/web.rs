@@ -70,7 +70,7 @@ pub(crate) fn study(args: &Study) -> Result<(), Failure> {
     let mut all_answered = session.is_finished();
     serve_study(server, session, stop, |session| {
         all_answered = true;
-        // Whoever closed the pipe reads the page or the files.
+        // Standard output may be closed: the page and the files hold the results too.
         let results = results(&session.summary());
         let _ = exit::print(&format!("\n{results}\nIn {folder}: trials.csv, summary.json. Ctrl-C ends.\n"));
     })?;

@@ -77,11 +77,11 @@ impl Regression {
     #[must_use]
     pub fn new(statistics: &[Vec<f64>], places: &[Vec<f64>]) -> Self {
         let (n, columns) = (statistics.len(), places.first().map_or(0, Vec::len));
-        // The last fold is none: it leaves nothing out.
+        // Fit number FOLDS leaves no row out.
         let without =
             |fold: usize| Told::new(statistics, places, &(0..n).filter(|i| i % FOLDS != fold).collect::<Vec<_>>());
         let mut fits: Vec<Told> = (0..=FOLDS).into_par_iter().map(without).collect();
-        // What each row is told by the others.
+        // Out of fold: each row is predicted by the fit that left it out.
         let summaries: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].summary(&statistics[row])).collect();
         let values: Vec<Vec<f64>> = (0..n).map(|row| fits[row % FOLDS].values(&summaries[row])).collect();
         let told = fits.swap_remove(FOLDS);

@@ -37,7 +37,7 @@ macro_rules! named {
 }
 
 named! {
-    /// What is asked of each trial.
+    /// The question of each trial.
     Task {
         /// One patch: real or synthetic? The paper's.
         YesNo = "yes-no",

@@ -337,7 +337,7 @@ impl Folder {
                 let is_link = entry.file_type().is_ok_and(|kind| kind.is_symlink());
                 let open =
                     || File::options().write(true).open(entry.path()).ok().filter(|file| file.try_lock().is_ok());
-                // Held until the file is gone, so that nobody begins to work on it in between.
+                // The lock is held until the file is removed, so that no other process can take the file in between.
                 let lock = if is_link { None } else { open() };
                 let is_gone = (is_link || lock.is_some()) && fs::remove_file(entry.path()).is_ok();
                 removed += u64::from(is_gone);

@@ -35,7 +35,7 @@ const CONNECTIONS: usize = 32;
 /// Longest head of a request, bytes.
 const LONGEST_HEAD: usize = 16 * 1024;
 
-/// The page may load and ask nothing but its own server, and nobody may put it in a frame.
+/// Content security policy: the page loads from its own server only, and no other page may embed it.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
