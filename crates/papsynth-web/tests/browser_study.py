@@ -123,7 +123,7 @@ def check_results(folder, given, keys, showings, exposure_ms):
 
 
 def yes_no(program, browser, real, synthetic, folder):
-    words = [real, synthetic, "--out", folder / "out", "--subject", "ann", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
+    words = [real, synthetic, "--out", folder / "out", "--subject", "01", "--trials", 10, "--exposure-ms", EXPOSURE_MS]
     study = serve_study(program, words)
     address, given, showings = study.address, [], []
     browser.open(address)
@@ -194,7 +194,7 @@ def yes_no(program, browser, real, synthetic, folder):
     summary, _ = check_results(subject, given, ("real", "synthetic"), showings, EXPOSURE_MS)
     shown = browser.run("[...document.querySelectorAll('#row tbody tr')].map(r => [...r.cells].map(c => c.firstChild.textContent))")
     counts = summary["row"]["counts"]
-    assert shown[0][:5] == ["ann", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
+    assert shown[0][:5] == ["01", *(str(counts[name]) for name in ("tp", "fp", "tn", "fn"))], shown
     assert shown[1][0] == "x"
     names = [path.name for side in (real, synthetic) for path in Path(side).rglob("*.png")] + [str(real), str(synthetic)]
     check_secrets(browser, address, names)
@@ -258,7 +258,7 @@ def main():
     finally:
         browser.close()
     pooled = subprocess.run([program, "study", "--results", folder / "out"], check=True, capture_output=True, text=True).stdout
-    assert "ann" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
+    assert "01" in pooled and "pooled" in pooled and "384 trials" in pooled, pooled
     print(f"the study passed in {Path(chromium).name}; screenshots are in {folder}")
 
 

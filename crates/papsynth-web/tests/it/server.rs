@@ -20,7 +20,7 @@ impl Site for Echo {
                 Ok(numbers) => Reply::json(&numbers),
                 Err(error) => error,
             },
-            (_, "/echo") => Reply::method("POST"),
+            (_, "/echo") => Reply::wrong_method("POST"),
             ("GET", "/panic") => panic!("a site may fail"),
             _ => Reply::error(404, "nothing"),
         }
