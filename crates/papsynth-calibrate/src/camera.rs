@@ -157,7 +157,7 @@ impl Flats {
         let Calibration { gain_dn_per_e, offset_dn, dark_noise_e, dsnu_e, prnu, .. } = found;
         let saturation = match found.saturation {
             calibrate::Saturation::Reached { dn, e } => Saturation { reached: true, dn, e },
-            calibrate::Saturation::Above { dn, e } => Saturation { reached: false, dn, e },
+            calibrate::Saturation::NotReached { dn, e } => Saturation { reached: false, dn, e },
         };
         Ok(Camera {
             bits: self.bits,

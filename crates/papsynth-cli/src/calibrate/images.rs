@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ccd_noise::Error::{NoDark, Saturated};
-use optics_psf::Error::NoFocusInside;
+use optics_psf::Error::FocusAtStackEnd;
 use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt};
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
@@ -30,7 +30,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
             Error::NoNucleus => {
                 "give planes alone, no masks among them, or name the window of a nucleus with --window X,Y,W,H, in pixels"
             }
-            Error::Window { source: NoFocusInside { .. }, .. } => {
+            Error::Window { source: FocusAtStackEnd { .. }, .. } => {
                 "take the planes from below focus to above it, in the order of their numbers, and nothing else: \
                  no mask and no extended focus"
             }
