@@ -3,7 +3,7 @@
 
 use std::error::Error;
 
-use ccd_noise::calibrate::{CalibrationParams, Light, PhotonTransfer, Shading};
+use ccd_noise::calibrate::{CalibrationParams, LightLevel, PhotonTransfer, Shading};
 use ccd_noise::{Camera, CameraParams};
 use image::{GrayImage, Luma};
 
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let measure = CalibrationParams { bit_depth: 12, shading: Shading::Kept, ..CalibrationParams::default() };
     let mut transfer = PhotonTransfer::new(&measure)?;
-    let mut level = |electrons: f64, light: Light, key: u64| -> Result<_, ccd_noise::Error> {
+    let mut level = |electrons: f64, light: LightLevel, key: u64| -> Result<_, ccd_noise::Error> {
         let scene = vec![single(electrons); PIXELS];
         let frames: Vec<Vec<u16>> = (key..key + FRAMES)
             .map(|key| {
@@ -55,10 +55,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
         transfer.add(&frames, WIDTH, light).cloned()
     };
-    let dark = level(0.0, Light::Dark, 0)?;
+    let dark = level(0.0, LightLevel::Dark, 0)?;
     let signals = (0..LEVELS).map(|step| libm::exp10(f64::from(step) * 3.56 / f64::from(LEVELS - 1)));
     for (i, signal) in (1..).zip(signals.chain(CLIPPED)) {
-        let flat = level(signal / params.gain_dn_per_e, Light::Unknown, FRAMES * i)?;
+        let flat = level(signal / params.gain_dn_per_e, LightLevel::Unknown, FRAMES * i)?;
         let signal = flat.mean_dn - dark.mean_dn;
         let (noise, pattern) = (flat.variance_dn2, flat.spatial_dn2.max(0.0));
         disc(&mut plot, place(signal, (noise + pattern).sqrt()), 0.0, 3.6);

@@ -21,7 +21,7 @@ pub struct BrightFieldParams {
     /// Depths of the slabs relative to the focal plane with the stage at rest, in µm, positive towards the objective,
     /// −1000 to 1000 (see [`Microscope::transfer`]). Default one slab at 0, ours.
     pub depths_um: Vec<f64>,
-    /// Stage positions of the images, in µm, −1000 to 1000. Default one at 0, ours.
+    /// Stage positions of the images, in µm, positive when lowered, −1000 to 1000. Default one at 0, ours.
     pub stages_um: Vec<f64>,
 }
 

@@ -17,7 +17,7 @@ pub enum Shading {
 
 /// Amount of light of the frames of a level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Light {
+pub enum LightLevel {
     /// Dark frames: closed shutter, same exposure time as the other levels.
     Dark,
     /// An unknown amount of light.
@@ -32,7 +32,7 @@ pub enum Light {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// Amount of light.
-    pub light: Light,
+    pub light: LightLevel,
     /// Number of frames.
     pub frames: usize,
     /// Mean grey level.
@@ -53,7 +53,7 @@ pub(super) fn measure(
     frames: &[&[u16]],
     width: usize,
     highest: u16,
-    light: Light,
+    light: LightLevel,
     shading: Shading,
 ) -> Result<Level, Error> {
     let (count, pixels) = (frames.len() as f64, frames[0].len() as f64);

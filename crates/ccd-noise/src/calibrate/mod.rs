@@ -2,7 +2,7 @@
 
 mod level;
 
-pub use level::{Level, Light, Shading};
+pub use level::{Level, LightLevel, Shading};
 
 use crate::camera::ROUNDING;
 use crate::error::{Error, require, within};
@@ -120,12 +120,12 @@ impl PhotonTransfer {
     ///
     /// If there are fewer than two frames, frames differ in size, values exceed the bit depth, or dark frames are
     /// clipped at 0.
-    pub fn add(&mut self, frames: &[&[u16]], width: usize, light: Light) -> Result<&Level, Error> {
+    pub fn add(&mut self, frames: &[&[u16]], width: usize, light: LightLevel) -> Result<&Level, Error> {
         if frames.len() < 2 {
             return Err(Error::TooFew { what: "frames in this level", found: frames.len(), needed: 2 });
         }
-        if let Light::Photons(amount) | Light::Relative(amount) = light {
-            require("light", amount, amount > 0.0, "above 0 (use Light::Dark for dark frames)")?;
+        if let LightLevel::Photons(amount) | LightLevel::Relative(amount) = light {
+            require("light", amount, amount > 0.0, "above 0 (use LightLevel::Dark for dark frames)")?;
         }
         let size = |frame: &[u16]| [width, frame.len().checked_div(width).unwrap_or(0)];
         let expected = self.size.unwrap_or_else(|| size(frames[0]));
@@ -140,7 +140,7 @@ impl PhotonTransfer {
             require("shading.side_px", side_px as f64, smaller, "less than the width and height of the frames")?;
         }
         let level = measure(frames, width, self.highest(), light, self.params.shading)?;
-        if light == Light::Dark && level.at_zero > DARK_CLIPPED {
+        if light == LightLevel::Dark && level.at_zero > DARK_CLIPPED {
             return Err(Error::DarkClipped { fraction: level.at_zero });
         }
         self.size = Some(expected);
@@ -154,9 +154,9 @@ impl PhotonTransfer {
     ///
     /// If there is no dark level, no other level, no unsaturated level, or no increase of mean and variance with light.
     pub fn calibration(&self) -> Result<Calibration, Error> {
-        let dark = self.levels.iter().filter(|level| level.light == Light::Dark).max_by_key(|level| level.frames);
+        let dark = self.levels.iter().filter(|level| level.light == LightLevel::Dark).max_by_key(|level| level.frames);
         let dark = dark.ok_or(Error::NoDark)?;
-        let mut flats: Vec<&Level> = self.levels.iter().filter(|level| level.light != Light::Dark).collect();
+        let mut flats: Vec<&Level> = self.levels.iter().filter(|level| level.light != LightLevel::Dark).collect();
         flats.sort_by(|a, b| a.mean_dn.total_cmp(&b.mean_dn));
         let Some(brightest) = flats.last() else {
             return Err(Error::TooFew { what: "levels with light", found: 0, needed: 1 });
@@ -220,17 +220,17 @@ fn prnu(flats: &[&Level], dark: &Level, half: f64) -> f64 {
 
 /// Returns the linearity error if every level has an amount of light in the same unit.
 fn linearity_error(flats: &[&Level], dark: &Level) -> Option<f64> {
-    let relative = |light| if let Light::Relative(amount) = light { Some(amount) } else { None };
+    let relative = |light| if let LightLevel::Relative(amount) = light { Some(amount) } else { None };
     let points = amounts(flats, dark, photons).or_else(|| amounts(flats, dark, relative))?;
     largest_deviation(&points)
 }
 
-fn photons(light: Light) -> Option<f64> {
-    if let Light::Photons(amount) = light { Some(amount) } else { None }
+fn photons(light: LightLevel) -> Option<f64> {
+    if let LightLevel::Photons(amount) = light { Some(amount) } else { None }
 }
 
 /// Returns (amount of light, mean above dark) of each level, or `None` if an amount is missing.
-fn amounts(flats: &[&Level], dark: &Level, amount: impl Fn(Light) -> Option<f64>) -> Option<Vec<(f64, f64)>> {
+fn amounts(flats: &[&Level], dark: &Level, amount: impl Fn(LightLevel) -> Option<f64>) -> Option<Vec<(f64, f64)>> {
     flats.iter().map(|level| Some((amount(level.light)?, level.mean_dn - dark.mean_dn))).collect()
 }
 

@@ -1,6 +1,6 @@
 //! Tests of the linear camera of EMVA 1288, and of photon transfer on simulated frames.
 
-use ccd_noise::calibrate::{Calibration, CalibrationParams, Light, PhotonTransfer, Saturation, Shading};
+use ccd_noise::calibrate::{Calibration, CalibrationParams, LightLevel, PhotonTransfer, Saturation, Shading};
 use ccd_noise::{Binning, Blooming, Camera, CameraParams, Error, PhotonNoise, ReadNoise, SaturatedRun};
 
 const KEY: u64 = 0x00e1_ec72_0000_1288;
@@ -43,7 +43,9 @@ fn measure(params: &CameraParams, shading: Shading, flats: u32, brightest: f64, 
         key += 1000;
         let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
         let photons = electrons / params.quantum_efficiency;
-        transfer.add(&frames, WIDTH, if fraction > 0.0 { Light::Photons(photons) } else { Light::Dark }).unwrap();
+        transfer
+            .add(&frames, WIDTH, if fraction > 0.0 { LightLevel::Photons(photons) } else { LightLevel::Dark })
+            .unwrap();
     };
     add(0.0, frames);
     for level in 1..=flats {
@@ -112,7 +114,7 @@ fn relative_light_gives_linearity_only() {
         for step in 0..5_u32 {
             let time = f64::from(step);
             let frames = [0, 1].map(|i| flat(&camera, 3e3 * time * (1.0 - bend * time), u64::from(2 * step + i)));
-            let light = if step > 0 { Light::Relative(time) } else { Light::Dark };
+            let light = if step > 0 { LightLevel::Relative(time) } else { LightLevel::Dark };
             transfer.add(&[&frames[0], &frames[1]], WIDTH, light).unwrap();
         }
         let found = transfer.calibration().unwrap();
@@ -140,7 +142,7 @@ fn shading_is_not_counted_as_prnu() {
     for (shading, least, most) in [(Shading::Removed { side_px: 11 }, 0.97, 1.03), (Shading::Kept, 5.0, 20.0)] {
         let params = CalibrationParams { bit_depth: 12, shading, ..CalibrationParams::default() };
         let mut transfer = PhotonTransfer::new(&params).unwrap();
-        for (fraction, kind, keys) in [(0.0, Light::Dark, 0..16), (1.0, Light::Unknown, 16..32)] {
+        for (fraction, kind, keys) in [(0.0, LightLevel::Dark, 0..16), (1.0, LightLevel::Unknown, 16..32)] {
             let light: Vec<f32> = light.iter().map(|e| fraction * e).collect();
             let frames: Vec<Vec<u16>> = keys
                 .map(|key| {
@@ -169,42 +171,42 @@ fn unusable_frames_are_rejected() {
 
     let mut transfer = fresh();
     assert_message(
-        transfer.add(&[&dark], 2, Light::Dark).unwrap_err(),
+        transfer.add(&[&dark], 2, LightLevel::Dark).unwrap_err(),
         "too few frames in this level: 1, expected at least 2",
     );
-    assert_message(transfer.add(&[&dark, &dark[..2]], 2, Light::Dark).unwrap_err(), "2 x 1 pixels (2 in total)");
-    assert_message(transfer.add(&[&dark, &dark], 3, Light::Dark).unwrap_err(), "3 x 1 pixels (4 in total)");
-    assert_message(transfer.add(&[&dark, &dark], 0, Light::Dark).unwrap_err(), "0 x 0");
+    assert_message(transfer.add(&[&dark, &dark[..2]], 2, LightLevel::Dark).unwrap_err(), "2 x 1 pixels (2 in total)");
+    assert_message(transfer.add(&[&dark, &dark], 3, LightLevel::Dark).unwrap_err(), "3 x 1 pixels (4 in total)");
+    assert_message(transfer.add(&[&dark, &dark], 0, LightLevel::Dark).unwrap_err(), "0 x 0");
     assert_message(
-        transfer.add(&[&dark, &[300; 4]], 2, Light::Dark).unwrap_err(),
+        transfer.add(&[&dark, &[300; 4]], 2, LightLevel::Dark).unwrap_err(),
         "frames is 300; it must be from 0 to 2^bit_depth",
     );
     assert_message(
-        transfer.add(&[&dark, &[0; 4]], 2, Light::Dark).unwrap_err(),
+        transfer.add(&[&dark, &[0; 4]], 2, LightLevel::Dark).unwrap_err(),
         "50.0 % of the dark frames' pixels are at 0",
     );
-    assert_message(transfer.add(&[&lit, &lit], 2, Light::Photons(0.0)).unwrap_err(), "light is 0");
+    assert_message(transfer.add(&[&lit, &lit], 2, LightLevel::Photons(0.0)).unwrap_err(), "light is 0");
     assert_message(transfer.calibration().unwrap_err(), "no dark frames");
     // A rejected frame does not set the expected size.
-    transfer.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
+    transfer.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
     assert_message(
-        transfer.add(&[&lit, &lit_2], 4, Light::Unknown).unwrap_err(),
+        transfer.add(&[&lit, &lit_2], 4, LightLevel::Unknown).unwrap_err(),
         "4 x 1 pixels (4 in total), but the previous frames",
     );
     assert_message(transfer.calibration().unwrap_err(), "too few levels with light: 0");
-    transfer.add(&[&full, &full], 2, Light::Unknown).unwrap();
+    transfer.add(&[&full, &full], 2, LightLevel::Unknown).unwrap();
     assert_message(transfer.calibration().unwrap_err(), "no unsaturated flats (levels: 1)");
     let mut unchanged = fresh();
-    unchanged.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
-    unchanged.add(&[&dark, &dark_2], 2, Light::Unknown).unwrap();
+    unchanged.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
+    unchanged.add(&[&dark, &dark_2], 2, LightLevel::Unknown).unwrap();
     assert_message(unchanged.calibration().unwrap_err(), "do not increase with light");
-    unchanged.add(&[&lit, &lit_2], 2, Light::Unknown).unwrap();
+    unchanged.add(&[&lit, &lit_2], 2, LightLevel::Unknown).unwrap();
     unchanged.calibration().unwrap();
     // The only unsaturated level is too bright for the fit.
     let mut bright = fresh();
-    bright.add(&[&dark, &dark_2], 2, Light::Dark).unwrap();
-    bright.add(&[&[200, 190, 210, 205], &[190, 212, 190, 225]], 2, Light::Unknown).unwrap();
-    bright.add(&[&full, &full], 2, Light::Unknown).unwrap();
+    bright.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
+    bright.add(&[&[200, 190, 210, 205], &[190, 212, 190, 225]], 2, LightLevel::Unknown).unwrap();
+    bright.add(&[&full, &full], 2, LightLevel::Unknown).unwrap();
     assert_message(
         bright.calibration().unwrap_err(),
         "too few levels with light up to `fit_to` of saturation: 0, expected at least 1",
@@ -219,7 +221,7 @@ fn unusable_frames_are_rejected() {
     }
     let mut small = PhotonTransfer::new(&CalibrationParams::default()).unwrap();
     assert_message(
-        small.add(&[&dark, &dark], 2, Light::Dark).unwrap_err(),
+        small.add(&[&dark, &dark], 2, LightLevel::Dark).unwrap_err(),
         "shading.side_px is 15; it must be less than the width",
     );
 }
