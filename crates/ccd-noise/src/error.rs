@@ -44,7 +44,7 @@ pub enum Error {
     NoDark,
     /// All flats are saturated.
     #[error(
-        "no unsaturated flats (levels: {levels}): more than 0.2 % of the pixels are at {highest}, the highest grey \
+        "all levels of flats are saturated ({levels} in total): more than 0.2 % of the pixels are at {highest}, the highest grey \
          level; take flats with less light"
     )]
     Saturated {
@@ -55,7 +55,7 @@ pub enum Error {
     },
     /// Dark frames are clipped at 0.
     #[error(
-            "{:.1} % of the dark frames' pixels are at 0, expected at most 0.5 %: raise the camera's offset",
+            "{:.1} % of the dark frames' pixels are at 0, expected at most 0.5 %: raise the offset of the camera",
             100.0 * fraction
     )]
     DarkClipped {

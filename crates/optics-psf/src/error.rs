@@ -33,8 +33,7 @@ pub enum Error {
     },
     /// The sharpest plane of a stack is its first or last.
     #[error(
-        "the sharpest of {planes} planes is number {sharpest}, at the end of the stack: take planes on both sides of \
-         focus"
+        "the sharpest of {planes} planes is number {sharpest}, the stack's end: take planes on both sides of focus"
     )]
     FocusAtStackEnd {
         /// Index of the sharpest plane, from 0.
@@ -43,7 +42,7 @@ pub enum Error {
         planes: usize,
     },
     /// A window contains nothing measurable.
-    #[error("no {what} in the window")]
+    #[error("the window holds no {what} to measure")]
     NothingToMeasure {
         /// The missing structure.
         what: &'static str,

@@ -195,7 +195,7 @@ fn unusable_frames_are_rejected() {
     );
     assert_message(transfer.calibration().unwrap_err(), "too few levels with light: 0");
     transfer.add(&[&full, &full], 2, LightLevel::Unknown).unwrap();
-    assert_message(transfer.calibration().unwrap_err(), "no unsaturated flats (levels: 1)");
+    assert_message(transfer.calibration().unwrap_err(), "all levels of flats are saturated (1 in total)");
     let mut unchanged = fresh();
     unchanged.add(&[&dark, &dark_2], 2, LightLevel::Dark).unwrap();
     unchanged.add(&[&dark, &dark_2], 2, LightLevel::Unknown).unwrap();
