@@ -44,8 +44,8 @@ pub enum Error {
     NoDark,
     /// All flats are saturated.
     #[error(
-        "all levels of flats are saturated ({levels} in total): more than 0.2 % of the pixels are at {highest}, the highest grey \
-         level; take flats with less light"
+        "all levels of flats are saturated ({levels} in total): more than 0.2 % of the pixels are at {highest}, the \
+         highest grey level; take flats with less light"
     )]
     Saturated {
         /// Number of levels.
