@@ -1,5 +1,5 @@
 use crate::error::{Error, within};
-use crate::field::whole_rows;
+use crate::field::assert_rows;
 use crate::{CameraParams, ReadNoise};
 
 /// Pixel binning: `side` × `side` pixels become one.
@@ -50,7 +50,7 @@ impl Binning {
     /// If the length of `electrons` is not a multiple of `width`.
     #[must_use]
     pub fn sum_electrons(self, electrons: &[f32], width: usize) -> (Vec<f32>, usize) {
-        whole_rows(electrons.len(), width);
+        assert_rows(electrons.len(), width);
         let side = self.side().max(1);
         let binned_width = width / side;
         let mut binned = Vec::with_capacity(electrons.len() / (side * side));

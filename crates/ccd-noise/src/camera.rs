@@ -3,7 +3,7 @@ use rand_core::Rng;
 use crate::bloom::spread;
 use crate::chain::{Chain, Marker, expose_row, gather_row, mean_row, read_row};
 use crate::exposure::{Exposure, SaturatedRun};
-use crate::field::{NoiseField, rows, whole_rows};
+use crate::field::{NoiseField, assert_rows, rows};
 use crate::{Blooming, CameraParams, Error, PhotonNoise};
 
 /// A camera: converts photo-electrons to grey levels (Eq. 13 without its optics).
@@ -202,7 +202,7 @@ impl Camera {
         out: &mut [u16],
         mut runs: Option<&mut Vec<SaturatedRun>>,
     ) -> Exposure {
-        whole_rows(electrons.len(), width);
+        assert_rows(electrons.len(), width);
         assert_eq!(out.len(), electrons.len(), "`out` and `electrons` must have the same length");
         let (field, chain) = (NoiseField::new(key), &self.chain);
         let pattern = |y| chain.pattern.as_ref().map(|pattern| pattern.row(y));

@@ -6,7 +6,7 @@ use portable_numerics::random::SplitMix64;
 use crate::exposure::SaturatedRun;
 use crate::field::{blocks, padded};
 use crate::hash::{BLOCK, Block, RowWords, Stream};
-use crate::poisson::{at_least_nothing, poisson};
+use crate::poisson::{clamp_to_zero, poisson};
 use crate::{CameraParams, PhotonNoise, ReadNoise};
 
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +80,7 @@ impl Chain {
     fn means(&self, electrons: &[f32; BLOCK], pixels: Option<&PixelPattern>) -> [f32; BLOCK] {
         let mut means = *electrons;
         for (i, mean) in means.iter_mut().enumerate() {
-            let light = at_least_nothing(*mean);
+            let light = clamp_to_zero(*mean);
             *mean = pixels.map_or(light, |pixels| light * pixels.response[i]) + self.dark;
         }
         means
@@ -168,7 +168,7 @@ fn with_read_noise(
 #[multiversion::multiversion(targets = "simd")]
 pub(crate) fn mean_row(chain: &Chain, electrons: &[f32], out: &mut [f32]) {
     for (dn, &mean) in out.iter_mut().zip(electrons) {
-        let charge = (at_least_nothing(mean) + chain.dark).min(chain.full_well);
+        let charge = (clamp_to_zero(mean) + chain.dark).min(chain.full_well);
         *dn = chain.level(charge).max(0.0).min(chain.highest);
     }
 }

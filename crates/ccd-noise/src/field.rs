@@ -28,7 +28,7 @@ impl NoiseField {
     ///
     /// If the length of `out` is not a multiple of `width`.
     pub fn normal_into(&self, width: usize, origin: [u32; 2], out: &mut [f32]) {
-        whole_rows(out.len(), width);
+        assert_rows(out.len(), width);
         for (y, out) in rows(origin).zip(out.chunks_exact_mut(width)) {
             normal_row(&self.row(y), origin[0], out);
         }
@@ -43,7 +43,7 @@ impl NoiseField {
     ///
     /// If the length of `means` is not a multiple of `width`, or differs from the length of `out`.
     pub fn poisson_into(&self, means: &[f32], width: usize, origin: [u32; 2], out: &mut [f32]) {
-        whole_rows(means.len(), width);
+        assert_rows(means.len(), width);
         assert_eq!(out.len(), means.len(), "`out` and `means` must have the same length");
         let both = means.chunks_exact(width).zip(out.chunks_exact_mut(width));
         for (y, (means, out)) in rows(origin).zip(both) {
@@ -57,7 +57,7 @@ pub(crate) fn rows(origin: [u32; 2]) -> impl Iterator<Item = u32> {
     (0..).map(move |i| origin[1].wrapping_add(i))
 }
 
-pub(crate) fn whole_rows(len: usize, width: usize) {
+pub(crate) fn assert_rows(len: usize, width: usize) {
     assert!(width > 0 && len.is_multiple_of(width), "{len} pixels are not a multiple of the width, {width}",);
 }
 

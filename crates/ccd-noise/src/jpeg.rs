@@ -1,7 +1,7 @@
 //! Lossy steps of JPEG compression, without the lossless entropy coding.
 
 use crate::error::{Error, require, within};
-use crate::field::whole_rows;
+use crate::field::assert_rows;
 
 /// Chroma subsampling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -116,7 +116,7 @@ impl Jpeg {
     ///
     /// If the length of `grey` is not a multiple of `width`.
     pub fn grey(&self, grey: &mut [u8], width: usize) {
-        whole_rows(grey.len(), width);
+        assert_rows(grey.len(), width);
         compress(&self.luma, grey, width);
     }
 
@@ -140,7 +140,7 @@ impl Jpeg {
     ///
     /// If the length of `rgb` is not a multiple of 3 · `width`.
     pub fn rgb(&self, rgb: &mut [u8], width: usize) {
-        whole_rows(rgb.len(), 3 * width);
+        assert_rows(rgb.len(), 3 * width);
         let [mut luma, mut blue, mut red] = [(); 3].map(|()| vec![0; rgb.len() / 3]);
         split(rgb, &mut luma, &mut blue, &mut red);
         compress(&self.luma, &mut luma, width);

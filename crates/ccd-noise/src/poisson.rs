@@ -6,14 +6,14 @@ use portable_numerics::random::{SplitMix64, open_uniform, open_unit};
 use crate::hash::{BLOCK, Block, Stream};
 
 /// Means below this use inversion, larger means use a normal proposal. Both are exact and equally fast at this mean.
-const SUMMED_BELOW: f32 = 20.0;
+const INVERSION_BELOW: f32 = 20.0;
 
 /// Larger means count as this one, 2²⁴. It exceeds any full-well capacity, and counts up to it are exact in single
 /// precision.
 const LARGEST_MEAN: f32 = 16_777_216.0;
 
 /// Number of terms of inversion: the probability of a larger count is below 1e-24.
-const SUMMED_TERMS: usize = 96;
+const INVERSION_TERMS: usize = 96;
 
 /// Returns one Poisson deviate per mean, from normal deviates. Negative means and NaN count as 0.
 #[inline(always)]
@@ -21,21 +21,21 @@ pub(crate) fn poisson(means: &[f32; BLOCK], normals: &[f32; BLOCK], block: &Bloc
     let chances = block.words(Stream::Chance);
     let mut means = *means;
     for mean in &mut means {
-        *mean = at_least_nothing(*mean).min(LARGEST_MEAN);
+        *mean = clamp_to_zero(*mean).min(LARGEST_MEAN);
     }
     let (least, most) = extremes(&means);
-    if most < SUMMED_BELOW {
-        return summed(&means, &chances, &block.words(Stream::Fine));
+    if most < INVERSION_BELOW {
+        return by_inversion(&means, &chances, &block.words(Stream::Fine));
     }
     let mut counts = from_normals(&means, normals, &chances, block);
-    if least < SUMMED_BELOW {
+    if least < INVERSION_BELOW {
         let mut small = means;
         for mean in &mut small {
-            *mean = if *mean < SUMMED_BELOW { *mean } else { 0.0 };
+            *mean = if *mean < INVERSION_BELOW { *mean } else { 0.0 };
         }
-        let summed = summed(&small, &chances, &block.words(Stream::Fine));
+        let summed = by_inversion(&small, &chances, &block.words(Stream::Fine));
         for i in 0..BLOCK {
-            counts[i] = if means[i] < SUMMED_BELOW { summed[i] } else { counts[i] };
+            counts[i] = if means[i] < INVERSION_BELOW { summed[i] } else { counts[i] };
         }
     }
     counts
@@ -43,7 +43,7 @@ pub(crate) fn poisson(means: &[f32; BLOCK], normals: &[f32; BLOCK], block: &Bloc
 
 /// Returns `mean`, or +0 if it is negative, -0 or NaN.
 #[inline(always)]
-pub(crate) fn at_least_nothing(mean: f32) -> f32 {
+pub(crate) fn clamp_to_zero(mean: f32) -> f32 {
     if mean > 0.0 { mean } else { 0.0 }
 }
 
@@ -61,7 +61,7 @@ fn extremes(means: &[f32; BLOCK]) -> (f32, f32) {
 
 /// Returns deviates by inversion: the number of cumulative probabilities below a uniform deviate.
 #[inline(always)]
-fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32; BLOCK] {
+fn by_inversion(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32; BLOCK] {
     const STEP: f64 = 1.0 / 4_294_967_296.0;
     let mut counts = [0.0; BLOCK];
     // Smaller groups than elsewhere, because the slowest pixel determines the time of its group.
@@ -75,7 +75,7 @@ fn summed(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -> [f32
         }
         let mut sum = term;
         let mut count = [0_u64; FEW];
-        for k in 1..SUMMED_TERMS {
+        for k in 1..INVERSION_TERMS {
             let inverse = 1.0 / k as f64;
             let mut exceeding = 0;
             for i in 0..FEW {
@@ -109,7 +109,7 @@ fn from_normals(
     let mut counts = [0.0; BLOCK];
     let mut open = [0_u32; BLOCK];
     for i in 0..BLOCK {
-        let mean = means[i].max(SUMMED_BELOW);
+        let mean = means[i].max(INVERSION_BELOW);
         // The integer part is separated, so that the fraction keeps full precision.
         let whole = mean.floor();
         let part = mean - whole;
@@ -117,16 +117,16 @@ fn from_normals(
         counts[i] = whole + step;
         let short = part - step;
         // Squeeze test: acceptance is certain, always for K >= µ.
-        let kept = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
-        open[i] = u32::from(!(kept & (counts[i] >= 0.0)));
+        let accepted = short * short * short <= 6.0 * mean * mean * open_unit(chances[i]);
+        open[i] = u32::from(!(accepted & (counts[i] >= 0.0)));
     }
     for at in (0..BLOCK).step_by(16) {
         if open[at..at + 16].iter().fold(0, |any, o| any | o) == 0 {
             continue;
         }
         for i in at..at + 16 {
-            if open[i] != 0 && means[i] >= SUMMED_BELOW {
-                counts[i] = finish(means[i], counts[i], open_unit(chances[i]), block.rare(i));
+            if open[i] != 0 && means[i] >= INVERSION_BELOW {
+                counts[i] = exact_count(means[i], counts[i], open_unit(chances[i]), block.rare(i));
             }
         }
     }
@@ -138,7 +138,7 @@ fn from_normals(
 #[cold]
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "counts below 2²⁴ are exact in single precision")]
-fn finish(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
+fn exact_count(mean: f32, count: f32, chance: f32, mut words: SplitMix64) -> f32 {
     let quotient = PoissonQuotient::new(mean);
     let count = f64::from(count);
     if count >= 0.0 && 1.0 - f64::from(chance) <= quotient.ratio(count) {

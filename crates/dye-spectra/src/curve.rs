@@ -19,7 +19,7 @@ pub struct Curve {
     coefficients: [[f32; DEGREE + 1]; 3],
     scale: f32,
     /// Largest amount for the polynomials.
-    most: f32,
+    max_amount: f32,
     /// Sum for larger amounts; the mixture takes the position of the first dye.
     beyond: Terms,
 }
@@ -27,25 +27,25 @@ pub struct Curve {
 impl Curve {
     #[expect(clippy::cast_possible_truncation, reason = "pixels use single precision")]
     pub(crate) fn new(terms: &[Wavelength], mix: &Amounts) -> Self {
-        let alone = |amount: f64| {
-            let mut alone = [0.0; DYES];
-            alone[0] = amount;
-            alone
+        let single_dye = |amount: f64| {
+            let mut amounts = [0.0; DYES];
+            amounts[0] = amount;
+            amounts
         };
         let mixed = |absorbances: &Amounts| absorbances.iter().zip(mix).map(|(a, amount)| a * amount).sum::<f64>();
-        let terms: Vec<Wavelength> = terms.iter().map(|(a, weights)| (alone(mixed(a)), *weights)).collect();
+        let terms: Vec<Wavelength> = terms.iter().map(|(a, weights)| (single_dye(mixed(a)), *weights)).collect();
         let steepest = terms.iter().fold(0.0_f64, |steepest, (a, _)| steepest.max(a[0]));
         // An empty mixture absorbs nothing at any amount.
-        let most =
+        let max_amount =
             if steepest > 0.0 { (MAX_ABSORBANCE / steepest).min(f64::from(f32::MAX)) } else { f64::from(f32::MAX) };
         let quotient = |u: f64| {
-            let amount = 0.5 * most * (u + 1.0);
-            exact(&terms, &alone(amount)).map(|light| (1.0 - light) / amount)
+            let amount = 0.5 * max_amount * (u + 1.0);
+            exact(&terms, &single_dye(amount)).map(|light| (1.0 - light) / amount)
         };
         Self {
             coefficients: interpolate(quotient).map(|channel| channel.map(|c| c as f32)),
-            scale: (2.0 / most) as f32,
-            most: most as f32,
+            scale: (2.0 / max_amount) as f32,
+            max_amount: max_amount as f32,
             beyond: Terms::new(&terms),
         }
     }
@@ -72,11 +72,11 @@ impl Curve {
                 *light = 1.0 - amount * quotient;
             }
         }
-        if amount.iter().fold(false, |any, &amount| any | (amount > self.most)) {
+        if amount.iter().fold(false, |any, &amount| any | (amount > self.max_amount)) {
             let exact = self.beyond.block([0], [amount]);
             for (light, exact) in light.iter_mut().zip(exact) {
                 for ((light, exact), &amount) in light.iter_mut().zip(exact).zip(amount) {
-                    *light = if amount > self.most { exact } else { *light };
+                    *light = if amount > self.max_amount { exact } else { *light };
                 }
             }
         }

@@ -72,8 +72,8 @@ fn blur_strip(
     let radius = half.len() - 1;
     let pitch = columns.next_multiple_of(LANES);
     let dst_width = width + 2 * margin;
-    let strip = at_least(strip, (dst.len() / dst_width + 2 * radius) * pitch);
-    let line = at_least(line, pitch + 2 * radius);
+    let strip = resized(strip, (dst.len() / dst_width + 2 * radius) * pitch);
+    let line = resized(line, pitch + 2 * radius);
 
     // Convolves along the rows that `dst` needs.
     let start = x.cast_signed() - (margin + radius).cast_signed();
@@ -100,7 +100,7 @@ fn blur_strip(
 }
 
 /// Returns the first `len` values of a growing buffer. Old values are not cleared.
-fn at_least(memory: &mut Vec<f32>, len: usize) -> &mut [f32] {
+fn resized(memory: &mut Vec<f32>, len: usize) -> &mut [f32] {
     if memory.len() < len {
         memory.resize(len, 0.0);
     }

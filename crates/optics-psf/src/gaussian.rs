@@ -120,7 +120,7 @@ impl Gaussian {
         dst: &mut [f32],
         scratch: &mut Scratch,
     ) {
-        whole_rows(src, width);
+        assert_rows(src, width);
         let rows = src.len() / width;
         let within = dst.len().is_multiple_of(width) && first + dst.len() / width <= rows;
         assert!(within, "{} pixels from row {first} exceed the {rows} rows of the image", dst.len());
@@ -160,7 +160,7 @@ impl Gaussian {
         dst: &mut [f32],
         scratch: &mut Scratch,
     ) {
-        whole_rows(pixels, width);
+        assert_rows(pixels, width);
         let expected = (width + 2 * margin) * (pixels.len() / width + 2 * margin);
         assert_eq!(dst.len(), expected, "`dst` has the wrong number of pixels");
         let source = Source { pixels, width, border };
@@ -171,7 +171,7 @@ impl Gaussian {
     }
 }
 
-fn whole_rows(pixels: &[f32], width: usize) {
+fn assert_rows(pixels: &[f32], width: usize) {
     let whole = width > 0 && !pixels.is_empty() && pixels.len().is_multiple_of(width);
     assert!(whole, "{} pixels are not a multiple of the width, {width}", pixels.len());
 }

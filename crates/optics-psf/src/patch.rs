@@ -232,8 +232,8 @@ impl PatchImager {
         let offset = focus.margin_px * self.microscope().params().oversampling;
         let absorbing = Samples { samples: transmittance, width, offset, background: 1.0 };
         let phase = Samples { samples: phase_rad, width, offset, background: 0.0 };
-        let known = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
-        let index = known.unwrap_or_else(|| {
+        let cached = padded[..*fresh].iter().position(|entry| entry.margin_px == focus.margin_px);
+        let index = cached.unwrap_or_else(|| {
             let canvas = self.canvas([width, height], focus.margin_px);
             if padded.len() == *fresh {
                 padded.push(PaddedSpectra { margin_px: 0, canvas: Arc::clone(&canvas), spectra: Spectra::default() });
@@ -308,27 +308,27 @@ impl TransferCache {
         #[expect(clippy::cast_possible_truncation, reason = "depths are at most 1000 µm")]
         let below = below as i64;
         if t == 0.0 {
-            return (*self.rungs(below..=below, stage_um)[0]).clone();
+            return (*self.samples(below..=below, stage_um)[0]).clone();
         }
         // Lagrange polynomials.
         let weight = |k: i64| {
             let others = (1 - SIDE..=SIDE).filter(|&j| j != k);
             others.map(|j| (t - j as f64) / (k - j) as f64).product::<f64>()
         };
-        let rungs = self.rungs(below + 1 - SIDE..=below + SIDE, stage_um);
-        Transfer::mixed(&rungs.into_iter().zip((1 - SIDE..=SIDE).map(weight)).collect::<Vec<_>>())
+        let samples = self.samples(below + 1 - SIDE..=below + SIDE, stage_um);
+        Transfer::mixed(&samples.into_iter().zip((1 - SIDE..=SIDE).map(weight)).collect::<Vec<_>>())
     }
 
-    fn rungs(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
+    fn samples(&self, numbers: RangeInclusive<i64>, stage_um: f64) -> Vec<Arc<Transfer>> {
         // The map stays valid if a thread panics.
         let lock = || self.cached.lock().unwrap_or_else(PoisonError::into_inner);
         let key = |number| (stage_um.to_bits(), number);
-        let known: Vec<Option<Arc<Transfer>>> = {
+        let cached: Vec<Option<Arc<Transfer>>> = {
             let cached = lock();
             numbers.clone().map(|number| cached.get(&key(number)).cloned()).collect()
         };
-        let make = |(number, known): (i64, Option<Arc<Transfer>>)| {
-            known.unwrap_or_else(|| {
+        let make = |(number, cached): (i64, Option<Arc<Transfer>>)| {
+            cached.unwrap_or_else(|| {
                 let transfer = Arc::new(Transfer::new(&self.microscope, -(number as f64) * self.step_um, stage_um));
                 let mut cached = lock();
                 if cached.len() * transfer.table.len() >= MOST_ENTRIES {
@@ -337,7 +337,7 @@ impl TransferCache {
                 Arc::clone(cached.entry(key(number)).or_insert(transfer))
             })
         };
-        numbers.zip(known).map(make).collect()
+        numbers.zip(cached).map(make).collect()
     }
 }
 

@@ -60,7 +60,7 @@ impl Transfer {
         let mut row = |direction: [f64; 2], samples: usize| {
             let mut mean = vec![[0.0; 2]; samples];
             for (pupil, weight) in &pupils {
-                profile(&mut overlap, pupil, direction, step, *weight, faint(pupil, is_far), &mut mean);
+                profile(&mut overlap, pupil, direction, step, *weight, negligible_from(pupil, is_far), &mut mean);
             }
             // Frequency 0 is transferred fully, without rounding errors of the quadrature.
             mean[0] = [1.0, 0.0];
@@ -160,16 +160,16 @@ const FAR_UM: f64 = 15.0;
 /// Transfer functions at large defocus oscillate around 0 with decreasing amplitude in q = 2π f r, r the radius of the
 /// condenser's cone. From this q on they stay below 0.01 and are omitted: no object has enough detail there, and their
 /// fringes would dominate the computing time.
-const FAINT: f64 = 66.0;
+const NEGLIGIBLE_Q: f64 = 66.0;
 /// Start of the fade-out, as a fraction of that frequency.
 const FADES_FROM: f64 = 0.8;
 
 /// Returns the frequency in cycles/µm from which on negligible transfer is omitted.
-fn faint(pupil: &Pupil, is_far: bool) -> f64 {
-    if is_far { FAINT / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
+fn negligible_from(pupil: &Pupil, is_far: bool) -> f64 {
+    if is_far { NEGLIGIBLE_Q / (TAU * pupil.cone_radius()).max(f64::MIN_POSITIVE) } else { f64::INFINITY }
 }
 
-/// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `faint`.
+/// Adds E at multiples of `step`, times a weight, to `sum`, up to the frequency `negligible_from`.
 ///
 /// E is smooth between three points: frequency 0, the frequency where the condenser's disc begins to leave the
 /// objective's, and the cutoff. A polynomial through few values of each section gives all others.
@@ -179,17 +179,21 @@ fn profile(
     direction: [f64; 2],
     step: f64,
     weight: f64,
-    faint: f64,
+    negligible_from: f64,
     sum: &mut [[f64; 2]],
 ) {
     let bend = pupil.objective - pupil.condenser;
     let steepest = pupil.steepest(pupil.objective);
     let cutoff = pupil.cutoff();
     let faded = |f: f64| {
-        if faint < cutoff { weight * fade((f / faint - FADES_FROM) / (1.0 - FADES_FROM)) } else { weight }
+        if negligible_from < cutoff {
+            weight * fade((f / negligible_from - FADES_FROM) / (1.0 - FADES_FROM))
+        } else {
+            weight
+        }
     };
     let (mut next, mut values) = (0, Vec::new());
-    for [from, to] in [[0.0, bend.min(faint)], [bend, cutoff.min(faint)]] {
+    for [from, to] in [[0.0, bend.min(negligible_from)], [bend, cutoff.min(negligible_from)]] {
         if to < from {
             break;
         }
@@ -337,12 +341,12 @@ mod tests {
                 let pupil = Pupil::new(&params, 0.57, depth, stage);
                 let step = pupil.cutoff() / (SAMPLES - 1) as f64;
                 let mut list = vec![[0.0; 2]; SAMPLES];
-                profile(&mut overlap, &pupil, [0.6, 0.8], step, 1.0, faint(&pupil, true), &mut list);
+                profile(&mut overlap, &pupil, [0.6, 0.8], step, 1.0, negligible_from(&pupil, true), &mut list);
                 for (i, [a, b]) in list.into_iter().enumerate() {
                     let [c, d] = overlap.integral(&pupil, step * i as f64, [0.6, 0.8]);
                     let error = (a - c).abs().max((b - d).abs());
                     let q = TAU * step * i as f64 * pupil.cone_radius();
-                    if q < FADES_FROM * FAINT {
+                    if q < FADES_FROM * NEGLIGIBLE_Q {
                         worst = worst.max(error);
                     } else {
                         assert!(error < 0.01, "the omitted part is too large: {error}");
