@@ -58,7 +58,7 @@ impl Edge {
                 (window, calibrate::edge(image, width, window).map_err(Error::Edge)?)
             }
         };
-        let EdgeFit { sigma_px, dark, light, normal, difference } = fit;
+        let EdgeFit { sigma_px, dark, light, normal, rms_residual: difference } = fit;
         // From the slopes of the least squares: ∫ t²φ² = 1 ∕ (4√π).
         let length = window.width.min(window.height) as f64;
         let error_px = difference / (light - dark) * (4.0 * PI.sqrt() * sigma_px / length).sqrt();

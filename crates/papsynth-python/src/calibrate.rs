@@ -1,7 +1,7 @@
 //! Calibration of a microscope and its camera.
 
 use papsynth_calibrate::{
-    Calibration, Edge, EdgeAt, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt, Window,
+    Calibration, Edge, EdgeAt, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt, Window,
 };
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -81,11 +81,11 @@ pub(crate) fn calibrate_camera(
     darks: Vec<ArrayLike<'_>>,
     bits: u32,
 ) -> PyResult<String> {
-    let mut levels = vec![("darks".to_owned(), frames("darks", &darks)?, Light::Dark)];
+    let mut levels = vec![("darks".to_owned(), frames("darks", &darks)?, LightLevel::Dark)];
     for (number, level) in flats.iter().enumerate() {
         let name = nth("flats", number);
         let frames = frames(&name, level)?;
-        levels.push((name, frames, Light::Unknown));
+        levels.push((name, frames, LightLevel::Unknown));
     }
     let camera = py.detach(|| {
         let mut measured = Flats::new(bits)?;

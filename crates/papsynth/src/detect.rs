@@ -96,9 +96,9 @@ impl Detector {
         let params = JpegParams {
             quality: camera.jpeg_quality,
             subsampling: match camera.jpeg_subsampling {
-                Subsampling::Full => ccd_noise::Subsampling::Full,
-                Subsampling::Columns => ccd_noise::Subsampling::Columns,
-                Subsampling::Squares => ccd_noise::Subsampling::Squares,
+                Subsampling::Full => ccd_noise::Subsampling::S444,
+                Subsampling::Columns => ccd_noise::Subsampling::S422,
+                Subsampling::Squares => ccd_noise::Subsampling::S420,
             },
             bit_depth: camera.bits,
         };
@@ -116,7 +116,7 @@ impl Detector {
                     Rendition::Raw => (unfused, unfused),
                     Rendition::Display | Rendition::Srgb => (INNER_BITS, camera.bits),
                 };
-                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.share);
+                let channel = |of: &dye_spectra::Channel| Channel::new(&camera, bits, of.relative_light);
                 let channels = colour.channels().iter().map(channel).collect::<Result<_, _>>()?;
                 let srgb = match rendition {
                     Rendition::Raw => None,
@@ -222,7 +222,7 @@ impl Detector {
     /// How far a pixel of so many mean electrons stands out from what it would be with more light, relative to its noise.
     pub(crate) fn contrast(&self, channel: usize, electrons: f64, without: f64) -> f64 {
         let camera = &self.channels[channel].camera;
-        let noise_dn = camera.noise_dn(electrons).max(f64::MIN_POSITIVE);
+        let noise_dn = camera.temporal_noise_dn(electrons).max(f64::MIN_POSITIVE);
         (camera.expected_dn(without) - camera.expected_dn(electrons)) / noise_dn
     }
 }

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ccd_noise::Error::{NoDark, Saturated};
-use optics_psf::Error::NoFocusInside;
-use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt};
+use optics_psf::Error::FocusAtStackEnd;
+use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt};
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
@@ -30,7 +30,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
             Error::NoNucleus => {
                 "give planes alone, no masks among them, or name the window of a nucleus with --window X,Y,W,H, in pixels"
             }
-            Error::Window { source: NoFocusInside { .. }, .. } => {
+            Error::Window { source: FocusAtStackEnd { .. }, .. } => {
                 "take the planes from below focus to above it, in the order of their numbers, and nothing else: \
                  no mask and no extended focus"
             }
@@ -104,7 +104,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, Failure>
 struct Exposure {
     name: String,
     files: Vec<PathBuf>,
-    light: Light,
+    light: LightLevel,
 }
 
 /// The folder's levels of light, dark first, each of two files or more.
@@ -133,9 +133,9 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failur
             ));
         }
     };
-    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: Light::Dark }];
+    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
     for path in &folders {
-        exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: Light::Unknown });
+        exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: LightLevel::Unknown });
     }
     if folders.is_empty() {
         let all = files(folder)?;
@@ -148,7 +148,7 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, Failur
         }
         for pair in all.chunks(PAIR) {
             let name = format!("{} and {}", pair[0].display(), name(&pair[1]));
-            exposures.push(Exposure { name, files: pair.to_vec(), light: Light::Unknown });
+            exposures.push(Exposure { name, files: pair.to_vec(), light: LightLevel::Unknown });
         }
     }
     match exposures.iter().find(|exposure| exposure.files.len() < PAIR) {

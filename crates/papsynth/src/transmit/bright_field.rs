@@ -100,7 +100,7 @@ impl BrightFieldPath {
         let Light { channels, lights, pictures, .. } = light;
         let mut passage = Passage { absorbances: vec![Vec::new(); channels.len()], floored: 0 };
         for group in &self.groups {
-            lights.resize_with(group.lights.len(), optics_psf::Light::default);
+            lights.resize_with(group.lights.len(), optics_psf::TransmittedLight::default);
             pictures.resize(group.lights.len(), Vec::new());
             for (light, of) in lights.iter_mut().zip(&group.lights) {
                 light.reset(of.imager.microscope(), width, height);
@@ -122,7 +122,7 @@ impl BrightFieldPath {
             }
             for (light, picture) in lights.iter().zip(pictures.iter_mut()) {
                 picture.resize(width * height, 0.0);
-                light.picture_into(picture);
+                light.image_into(picture);
             }
             if let (false, Some(overlaps), Mixer::Colour(colour)) = (exact, &self.overlaps, &group.mixer) {
                 let blur_px = |index: usize| self.blur_px(slide, index, focus, group);
@@ -156,7 +156,7 @@ impl BrightFieldPath {
         slide: Slide<'_>,
         focus: FocusAt,
         group: &Group,
-        lights: &mut [optics_psf::Light],
+        lights: &mut [optics_psf::TransmittedLight],
         floored: &mut usize,
     ) -> Result<Vec<Vec<f64>>, Cause> {
         let mut absorbances = vec![Vec::new(); lights.len()];
@@ -172,7 +172,7 @@ impl BrightFieldPath {
             let factors = passed.bench.factors.iter().zip(&passed.absorbances);
             for ((light, absorbances), (factor, own)) in lights.iter_mut().zip(&mut absorbances).zip(factors) {
                 light.multiply(factor, at_px);
-                *floored += factor.floored;
+                *floored += factor.clipped;
                 absorbances.extend(own);
             }
             self.spare().push(passed.bench);
@@ -307,7 +307,7 @@ fn abbe_image(
     let whole = abbe.image(&layers, stage_um)?;
     let rows = whole.chunks_exact(size[0]).skip(margin).take(height);
     let values = rows.flat_map(|row| row[margin..margin + width].iter().map(|light| *light as f32)).collect();
-    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, floored: 0 })
+    Ok(Factor { lattice: Lattice::Object, width, values, margin_px: 0, clipped: 0 })
 }
 
 /// The widest cone of light of all objects, µm.

@@ -169,6 +169,6 @@ pub(super) fn blurred(tile: &Tile, gaussian: &Gaussian, mut values: Vec<f32>, sc
     let margin = gaussian.radius();
     let width = tile.width + 2 * margin;
     values.resize(width * (tile.height() + 2 * margin), 0.0);
-    gaussian.spread_into(&tile.values, tile.width, &mut values, scratch);
+    gaussian.blur_expanded_into(&tile.values, tile.width, &mut values, scratch);
     Tile { origin: tile.origin.map(|at| at - margin as i64), width, values }
 }

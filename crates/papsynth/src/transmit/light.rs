@@ -1,6 +1,6 @@
 //! What is imaged, the light of one plane, and the empty slide's.
 
-use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, Scatter};
+use perlin_bg::{Background, BackgroundParams, FractalParams, Illumination, BackgroundTexture};
 use rand_core::Rng;
 
 use crate::error::Cause;
@@ -33,7 +33,7 @@ pub(crate) struct Light {
     /// Of each channel of the picture: the absorbance, or what the objects let through; then the light.
     pub(super) channels: Vec<Vec<f32>>,
     /// What the objects let through of light that is imaged by itself, and pictures of it.
-    pub(super) lights: Vec<optics_psf::Light>,
+    pub(super) lights: Vec<optics_psf::TransmittedLight>,
     pub(super) pictures: Vec<Vec<f32>>,
     /// Rows of the empty slide's light.
     pub(super) empty: Vec<f32>,
@@ -68,17 +68,17 @@ fn background(scene: &Scene) -> Result<Background, Cause> {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
         // A bowl whose top is off the centre, 1 − x2 (x − tx)² − …, has a tilt; the constant left over is in the level.
         SceneIllumination::Bowl { x2, y2, top } => {
-            Illumination::Bowl { x2, y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
+            Illumination::Quadratic { falloff_x: x2, falloff_y: y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
         }
     };
     let params = BackgroundParams {
         level: scene.background.level,
         illumination,
-        scatter: Scatter {
+        texture: BackgroundTexture {
             strength: scene.background.scatter,
             cell_px: (scene.background.scatter_um / view.pixel_um).max(1.0),
             noise: FractalParams::default(),
-            ..Scatter::default()
+            ..BackgroundTexture::default()
         },
     };
     let key = scene.key.stream("field", 0, "background").next_u64();

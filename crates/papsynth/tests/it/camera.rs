@@ -54,7 +54,7 @@ fn every_preset_has_the_noise_that_emva_1288_says() {
         };
         let camera = ccd_noise::Camera::new(&params).unwrap();
         let light = (f64::from(camera.max_dn()) * 0.8 - params.offset_dn * 0.8) * camera.electrons_per_dn();
-        let [temporal, pattern] = [camera.noise_dn(light), camera.pattern_dn(light)];
+        let [temporal, pattern] = [camera.temporal_noise_dn(light), camera.nonuniformity_dn(light)];
         let expected = temporal * temporal + pattern * pattern;
         // Four standard errors of a variance of so many pixels.
         assert!((variance / expected - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{}: {variance} {expected}", preset.name());
