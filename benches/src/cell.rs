@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use cloth_verlet::{Cloth, ClothParams, Crease, Turn, View};
+use cloth_verlet::{Cloth, ClothParams, Crease, FoldKind, PixelGrid};
 use quilt_texture::{QuiltParams, Quilter, Source};
 use voronoi_cytoskeleton::{LineParams, Skeleton, SkeletonParams, draw_into};
 
@@ -46,9 +46,9 @@ pub fn sheets(params: &ClothParams) -> Workload {
 pub fn thickness() -> Workload {
     let cloth = Cloth::new(&ClothParams { steps: 12, ..ClothParams::default() }).expect("the parameters are valid");
     let mut sheet = cloth.crumple(&outline(200, 3.0), &mut rng(1)).expect("the outline has an area");
-    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, turn: Turn::Flap };
+    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, kind: FoldKind::Flap };
     sheet.fold(&crease).expect("the crease meets the sheet");
-    let view = View { origin: [-110.0, -110.0], pixel: 1.0 };
+    let view = PixelGrid { origin: [-110.0, -110.0], pixel_size: 1.0 };
     let mut image = vec![0.0; SHEET_PX * SHEET_PX];
     Box::new(move || {
         sheet.thickness_into(&mut image, SHEET_PX, &view, |r| 1.5 - r * r);

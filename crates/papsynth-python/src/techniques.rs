@@ -194,10 +194,10 @@ fn crumple<'py>(
     excess: f64,
 ) -> PyResult<Bound<'py, PyAny>> {
     let outline = outline_of(&outline)?;
-    let params = cloth_verlet::ClothParams { vertices, excess, ..Default::default() };
+    let params = cloth_verlet::ClothParams { vertices, area_ratio: excess, ..Default::default() };
     drawn(py, shape, |out| -> Result<(), cloth_verlet::Error> {
         let sheet = cloth_verlet::Cloth::new(&params)?.crumple(&outline, &mut random(seed))?;
-        let view = cloth_verlet::View { origin: [0.0, 0.0], pixel: 1.0 };
+        let view = cloth_verlet::PixelGrid { origin: [0.0, 0.0], pixel_size: 1.0 };
         sheet.thickness_into(out, shape.1, &view, |_| 1.0);
         Ok(())
     })

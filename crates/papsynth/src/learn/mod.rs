@@ -5,7 +5,7 @@
 mod chromatin;
 mod nucleus;
 
-use fsd_shape::{ShapeModel, ShapeModelParams, Spread};
+use fsd_shape::{CovarianceModel, ShapeModel, ShapeModelParams};
 
 use crate::error::{Cause, Error};
 use crate::model::{CellClass, Donor, LogNormal, Model, Normal, Provenance, Shapes};
@@ -143,7 +143,7 @@ fn shapes(
         median: rounded(libm::exp(correlated.ln_radius_mean) * pixel_um),
         log_sd: rounded(correlated.ln_radius_sd),
     };
-    Ok((Shapes { correlated, independent: fit(Spread::Independent)? }, radius))
+    Ok((Shapes { correlated, independent: fit(CovarianceModel::Independent)? }, radius))
 }
 
 fn learn_texture(class: &mut CellClass, measured: &[Measured], params: &LearnParams) {

@@ -1,6 +1,6 @@
 //! Epithelial cells: outline, sheet, folds, and the three levels of detail ("Squamous Intermediate Cell Phantoms").
 
-use cloth_verlet::{Crease, Job, Sheet, Turn, View, crease_outline};
+use cloth_verlet::{Crease, FoldKind, PixelGrid, Sheet, SheetSpec, crease_outline};
 
 mod detail;
 mod outline;
@@ -83,16 +83,16 @@ fn creases(cell: &Cell<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec
         // The crease passes clear of the nucleus, which is too stiff to fold.
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
         let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
-        let turn = match fold.form {
-            FoldForm::Flap | FoldForm::Cigar => Turn::Flap,
-            FoldForm::Roll => Turn::Roll { turns: 1 },
+        let kind = match fold.form {
+            FoldForm::Flap | FoldForm::Cigar => FoldKind::Flap,
+            FoldForm::Roll => FoldKind::Roll { turns: 1 },
         };
         Crease {
             point: [centre[0] + at * normal[0], centre[1] + at * normal[1]],
             // The line runs a quarter turn before the direction that leads beyond it.
             direction_rad: direction - core::f64::consts::FRAC_PI_2,
             radius: fold.radius_um / pixel_um,
-            turn,
+            kind,
         }
     };
     // Away from the nucleus there is more to fold.
@@ -112,7 +112,7 @@ fn creases(cell: &Cell<'_>, fold: Fold, outline: &[Point], centre: Point) -> Vec
 fn crumple(studio: &Studio, cells: &[Cell<'_>], plans: &[Plan]) -> Result<Vec<Option<Sheet>>, Cause> {
     let Some(cloth) = &studio.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs = cells.iter().zip(plans);
-    let jobs = jobs.map(|(cell, plan)| Job { outline: &plan.outline, excess: cell.body.detail.excess });
+    let jobs = jobs.map(|(cell, plan)| SheetSpec { outline: &plan.outline, area_ratio: cell.body.detail.excess });
     let mut streams: Vec<Stream> = cells.iter().map(|cell| cell.stream("sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| Ok(Some(sheet?))).collect()
@@ -145,7 +145,7 @@ fn finish(cell: &Cell<'_>, plan: Plan, sheet: Option<Sheet>) -> Result<Phantom, 
             for crease in &plan.creases {
                 sheet.fold(crease)?;
             }
-            let view = View { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel: 1.0 };
+            let view = PixelGrid { origin: [absorbance.origin[0] as f64, absorbance.origin[1] as f64], pixel_size: 1.0 };
             sheet.thickness_into(&mut absorbance.values, coverage.width, &view, |radius| {
                 interpolate(profile, 1.0 - radius)
             });
