@@ -135,7 +135,7 @@ parameters! {
     /// Amorphous clumps.
     Smudges: Simulated, Logarithmic 6.0..800.0 "/mm2", "debris.smudges.count: median";
     /// Drifts of faint dirt.
-    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.drifts: median";
+    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.clusters: median";
     /// Unevenness of the light.
     Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.scatter: mean";
 }

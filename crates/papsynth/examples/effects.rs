@@ -159,7 +159,7 @@ fn base(section: &str) -> Recipe {
 
 /// The recipe with so much debris that some of each kind lies in a small field.
 fn abundant(recipe: &Recipe) -> Recipe {
-    const COUNTS: [&str; 7] = ["count", "clusters", "colonies", "groups", "strands", "drifts", "share"];
+    const COUNTS: [&str; 6] = ["count", "clusters", "colonies", "groups", "strands", "share"];
     let mut whole = serde_json::to_value(recipe).unwrap_or_default();
     if let Some(kinds) = whole.get_mut("debris").and_then(Value::as_object_mut) {
         for kind in kinds.values_mut().filter_map(Value::as_object_mut) {

@@ -221,7 +221,7 @@ mod tests {
         recipe.camera.bits = Number::Fixed(8.5);
         recipe.field.width_px =
             Number::Drawn { law: Law::Choice(vec![100.0, 100.5]), min: f64::NEG_INFINITY, max: f64::INFINITY };
-        recipe.debris.speckles.count = Number::uniform(0.5, 2.5);
+        recipe.debris.speckles.count = Number::uniform(0.5, 2.5).into();
         let text: Vec<String> = recipe.problems().iter().map(ToString::to_string).collect();
         assert_eq!(text, ["field.width_px: 100.5 is not a whole number", "camera.bits: 8.5 is not a whole number"]);
     }

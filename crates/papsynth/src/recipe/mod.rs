@@ -4,6 +4,7 @@
 //! [`Model`](crate::model::Model). Lengths are in micrometres, angles in degrees, probabilities from 0 to 1,
 //! absorbances decadic (A = −log₁₀ I/I₀, Eq. 11). Every number may be a distribution: see [`Number`].
 
+pub(crate) mod abundance;
 pub(crate) mod camera;
 mod check;
 pub mod diagnose;
@@ -24,6 +25,7 @@ pub use crate::debris::{
     NucleusForm, OutOfFocus, RedCells, Scratches, Smudges, SpeckForm, Speckles, Trichomonads,
 };
 pub use crate::error::Problem;
+pub use abundance::Abundance;
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
 pub use dyes::DyeAmounts;
 pub use imaging::{

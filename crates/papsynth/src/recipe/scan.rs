@@ -6,7 +6,7 @@ use super::section::section;
 section! {
     /// A whole slide, as a scanner sees it frame by frame (`papsynth slide`); fields do not look at it.
     ///
-    /// Counts of cells and debris are those of a field, whose size then says how dense they lie where the deposit is full.
+    /// Densities of cells and debris are those within the deposit. A count per field is divided by the mean area of a field.
     pub struct Scan {
         /// Width of the slide's picture.
         width_px: u32 = 56_000, 64..=1000000, "pixels";

@@ -31,6 +31,8 @@ pub(crate) struct Declared<'a> {
 pub(crate) enum Value<'a> {
     /// A number or a distribution.
     Real(Cow<'a, Number>),
+    /// A density per mm².
+    Density(&'a Number),
     /// A whole number, exact beyond 2⁵³.
     Whole(u64),
 }
@@ -41,6 +43,7 @@ impl Declared<'_> {
         let Bounds { low, high, whole } = self.bounds;
         let [range, fraction] = match &self.value {
             Value::Real(number) => [number.problem(low, high), number.fraction().filter(|_| whole)],
+            Value::Density(number) => [number.problem(low, high).map(|problem| format!("{problem} per mm²")), None],
             Value::Whole(value) => {
                 let outside = *value < low as u64 || *value > high as u64;
                 [outside.then(|| format!("{value} is outside {low} to {high}")), None]
@@ -174,11 +177,15 @@ macro_rules! section {
 
     (@default Number $default:expr) => { $crate::recipe::number::Number::from($default) };
     (@default Count $default:expr) => { $crate::recipe::number::Number::from($default) };
+    (@default Abundance $default:expr) => { $crate::recipe::abundance::Abundance::from($default) };
     (@default $Kind:ident $default:expr) => { $default };
     (@default $Kind:ident) => { <$Kind>::default() };
 
     (@bounds $Kind:ident) => { None };
     (@bounds Count $low:literal $high:literal) => {
+        Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: true })
+    };
+    (@bounds Abundance $low:literal $high:literal) => {
         Some($crate::recipe::section::Bounds { low: $low as f64, high: $high as f64, whole: true })
     };
     (@bounds $Kind:ident $low:literal $high:literal) => {

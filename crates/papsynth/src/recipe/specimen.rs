@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::abundance::Abundance;
 use super::dyes::DyeAmounts;
 use super::number::{Count, Number};
 use super::section::{Bounds, Declared, Part, section, within};
@@ -53,7 +54,7 @@ section! {
     /// Round clusters at random places, and some cells outside them.
     pub struct Clusters {
         /// Number of clusters; drawn once a field.
-        count: Count = Number::uniform(5.0, 11.0), 1..=10000;
+        count: Abundance = Abundance::per_mm2(Number::uniform(55.0, 125.0)), 1..=10000, "per field or per mm²";
         /// Radius (standard deviation) of a cluster; drawn for each cluster.
         radius_um: Number = Number::uniform(14.0, 34.0), 1..=10000, "µm";
         /// Weight of the places outside all clusters, relative to a cluster's centre.
@@ -119,10 +120,10 @@ impl Part for Cells {
 /// The cells of the default slide.
 pub(super) fn default_cells() -> Cells {
     let cells =
-        [("intermediate", 8.0, 24.0), ("superficial", 2.0, 10.0), ("parabasal", 0.0, 1.5), ("metaplastic", 0.0, 1.5)];
+        [("intermediate", 90.0, 270.0), ("superficial", 22.0, 112.0), ("parabasal", 0.0, 15.0), ("metaplastic", 0.0, 15.0)];
     let mix = |(class, least, most): (&str, f64, f64)| {
         let tints = if class == "superficial" { TintMix::superficial() } else { TintMix::default() };
-        (class.to_owned(), CellMix { count: Number::uniform(least, most), tints, ..CellMix::default() })
+        (class.to_owned(), CellMix { count: Abundance::per_mm2(Number::uniform(least, most)), tints, ..CellMix::default() })
     };
     cells.map(mix).into()
 }
@@ -131,7 +132,7 @@ section! {
     /// How many cells of a class there are, and how they differ from the model's.
     pub struct CellMix {
         /// Number of cells of this class; drawn once a field.
-        count: Count = 10, 0..=100000;
+        count: Abundance = Abundance::per_mm2(110), 0..=100000, "per field or per mm²";
         /// Factor on the size of the whole cell; drawn for each cell.
         size: Number = 1.0, 0.1..=10;
         /// Factor on the absorbance of its cytoplasm; drawn for each cell.

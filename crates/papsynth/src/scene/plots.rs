@@ -16,7 +16,7 @@ use super::draw::{empty, pixel_um, strew};
 use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use crate::debris::ground::{Sieve, near};
 use crate::error::Cause;
 use crate::key::Key;
@@ -144,6 +144,10 @@ impl Population {
         PLOT_PX as f64 * self.pixel_um
     }
 
+    fn plot_mm2(&self) -> f64 {
+        self.side_um() * self.side_um() * 1e-6
+    }
+
     /// How the layout lets cells lie on a slide.
     fn scatter(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
         /// Most plots that a cluster may reach beyond its own.
@@ -189,7 +193,7 @@ impl Population {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let count = named!("layout", layout.count);
-                for cluster in 0..field.whole(count.0, field.draw(count) * self.share) {
+                for cluster in 0..field.number_on_slide(count, [self.plot_mm2(), self.share], 1.0) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
                     let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
@@ -219,8 +223,8 @@ impl Population {
             let path = format!("cells.{name}.count");
             let alone = mix.group.form == GroupForm::Alone;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
-            let wanted = field.draw((&path, &mix.count)) * self.share * DENSEST / mean / size;
-            for _ in 0..field.whole(&path, wanted) {
+            let factor = DENSEST / mean / size;
+            for _ in 0..field.number_on_slide((&path, &mix.count), [self.plot_mm2(), self.share], factor) {
                 let mut rng = field.key.stream("cell", tried, "origin");
                 let origin = [0, 1].map(|_| random::between(0.0, side_um, &mut rng));
                 let number = tried;
@@ -280,15 +284,14 @@ impl Population {
         objects.retain(|cell| {
             cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um))
         });
-        let (width, height) = (PLOT_PX as usize, PLOT_PX as usize);
-        let view = View { width, height, pixel_um: self.pixel_um };
+        let region = Region { low_um: [0.0; 2], size_um: [side_um; 2] };
         let stays = |place: [f64; 2]| {
             let place = [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
             self.deposit.density(place) / DENSEST
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
         let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
+        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(sieve), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
