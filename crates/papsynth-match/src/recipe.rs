@@ -1,7 +1,8 @@
 //! From values of parameters to a recipe, and back.
 
 use papsynth::recipe::{
-    Abundance, Bowl, CellMix, Clusters, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics, Picture, Preset, Recipe,
+    Abundance, CellMix, Clusters, FocusOutput, Gaussians, Illumination, Law, Layout, Microscope, Number, Optics,
+    Preset, Quadratic, Recipe,
 };
 
 use crate::parameter::{PARAMETERS, Parameter as P, Source, Values};
@@ -70,13 +71,13 @@ impl Setting {
     pub fn base_values(&self) -> Values {
         let base = &self.base;
         let area = base_area(base);
-        let level = centre(&base.background.level) - TAKEN * centre(&base.background.scatter);
+        let level = centre(&base.background.level) - TAKEN * centre(&base.background.texture);
         let (x2, y2) = match &base.background.illumination {
-            Illumination::Bowl(Bowl { x2, y2, .. }) => (centre(x2), centre(y2)),
+            Illumination::Quadratic(Quadratic { falloff_x, falloff_y, .. }) => (centre(falloff_x), centre(falloff_y)),
             Illumination::Border(_) => (0.0, 0.0),
         };
         let camera = &base.camera;
-        let glare = centre(&camera.glare_removed);
+        let glare = centre(&camera.glare_subtracted);
         let signal = signal(level, glare);
         let per_dn = centre(&camera.full_well_e) * (1.0 - glare) / LEVELS;
         let (photons, read) = (signal / per_dn, centre(&camera.read_noise_e) / per_dn);
@@ -102,8 +103,8 @@ impl Setting {
             (P::BowlDown, y2),
             (P::Noise, noise.sqrt()),
             (P::Pattern, pattern * pattern / noise),
-            (P::Across, centre(&base.focus.fused_noise_across)),
-            (P::Down, centre(&base.focus.fused_noise_down)),
+            (P::Across, centre(&base.focus.noise_correlation_x)),
+            (P::Down, centre(&base.focus.noise_correlation_y)),
             (P::Pixel, centre(&base.field.pixel_um)),
             (P::Photons, photons / (photons + read * read).max(1e-9)),
             (P::Blur, centre(blur)),
@@ -131,7 +132,7 @@ impl Setting {
             (P::Speckles, density(&debris.speckles.count, area)),
             (P::Smudges, density(&debris.smudges.count, area)),
             (P::Dirt, density(&debris.dirt.clusters, area)),
-            (P::Scatter, centre(&base.background.scatter)),
+            (P::Scatter, centre(&base.background.texture)),
         ] {
             values.set(parameter, value);
         }
@@ -148,16 +149,15 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     let pixel_um = if on(P::Pixel) { get(P::Pixel) } else { setting.pixel_um };
     let mut r = setting.base.clone();
     let [width, height] = setting.size_px.map(|side| side as f64);
-    let area = width * height * pixel_um * pixel_um * 1e-6;
     r.field.width_px = width.into();
     r.field.height_px = height.into();
     r.field.pixel_um = number(pixel_um);
     r.field.magnification = 0.0.into();
     r.camera.bits = f64::from(setting.bits).into();
-    if setting.extended && r.focus.picture != Picture::Extended {
+    if setting.extended && r.focus.output != FocusOutput::Edf {
         r.focus = Preset::ExtendedFocus.recipe().focus;
     } else if !setting.extended {
-        r.focus.picture = Picture::Planes;
+        r.focus.output = FocusOutput::Planes;
         r.focus.planes = 1.0.into();
     }
     let either = |a: P, b: P| on(a) || on(b);
@@ -210,9 +210,9 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     // From the value and what the recipe to begin with has.
     type Spread = fn(f64, &Number) -> Number;
     let mut single: Vec<(P, &mut Number, Spread)> = vec![
-        (P::Scatter, &mut r.background.scatter, about),
-        (P::Across, &mut r.focus.fused_noise_across, |value, _| number(value)),
-        (P::Down, &mut r.focus.fused_noise_down, |value, _| number(value)),
+        (P::Scatter, &mut r.background.texture, about),
+        (P::Across, &mut r.focus.noise_correlation_x, |value, _| number(value)),
+        (P::Down, &mut r.focus.noise_correlation_y, |value, _| number(value)),
         (P::Depth, &mut r.slide.depth_um, |value, _| number(value)),
         (P::Dome, &mut r.nucleus.dome, |value, _| within(value, 0.2)),
         (P::Rim, &mut r.nucleus.rim, |value, _| Number::uniform(0.0, rounded(2.0 * value))),
@@ -270,7 +270,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     }
     /// Neither part is less than this of what is left of the noise.
     const LEAST: f64 = 0.02;
-    let glare = centre(&r.camera.glare_removed);
+    let glare = centre(&r.camera.glare_subtracted);
     let signal = signal(or_base(P::Level), glare);
     let all = or_base(P::Noise) * or_base(P::Noise);
     let pattern = or_base(P::Pattern).clamp(0.0, P::Pattern.prior().high) * all;

@@ -97,7 +97,7 @@ fn class(name: &'static str, count: f64, group: Group) -> Chapter {
 
 fn cells() -> Vec<Chapter> {
     let group = |form, size: f64, distance: f64| Group { form, size: size.into(), distance: distance.into() };
-    let heap = |size| group(GroupForm::Heap, size, 0.85);
+    let heap = |size| group(GroupForm::Aggregate, size, 0.85);
     vec![
         far(class("superficial", 1.0, Group::default())),
         far(class("intermediate", 1.0, Group::default())),

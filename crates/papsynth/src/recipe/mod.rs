@@ -29,15 +29,15 @@ pub use abundance::Abundance;
 pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
 pub use dyes::DyeAmounts;
 pub use imaging::{
-    Background, Border, Bowl, Colour, Field, Focus, Gaussians, Illumination, Imaging, Light, Microscope, Mixing,
-    Monochrome, Optics, Picture, Rendition,
+    Background, Border, Colour, Field, Focus, FocusOutput, Gaussians, Illumination, Imaging, Light, Microscope, Mixing,
+    Monochrome, Optics, Quadratic, Rendition,
 };
 pub use number::{Count, Law, Number, REACH_SD};
 pub use presets::Preset;
 pub use print::{is_toml_table, toml_value};
 pub use scan::{Deposit, Scan};
 pub use specimen::{
-    Acceptance, CellMix, Cells, Chromatin, Clusters, Cytoplasm, Folds, Group, GroupForm, Labels, Layout, Nucleus,
-    Restore, Seam, ShapeSpread, Sheet, Slide, Stain, Swath, TintMix,
+    Acceptance, Band, CellMix, Cells, Chromatin, Clusters, Cytoplasm, Folds, Group, GroupForm, Labels, Layout, Nucleus,
+    Restore, Seam, ShapeSpread, Sheet, Slide, Stain, TintMix,
 };
 pub use whole::{RECIPE_VERSION, Recipe};

@@ -257,7 +257,7 @@ macro_rules! section {
 
 /// The name of a number and the number itself: `named!(recipe.slide.depth_um)` names it `slide.depth_um`, and
 /// `named!(self.count)` names it `count`. With the path of a section, the name is the dotted path:
-/// `named!("layout", swath.width_um)` names it `layout.width_um`.
+/// `named!("layout", band.width_um)` names it `layout.width_um`.
 macro_rules! named {
     ($section:literal, $owner:ident.$number:ident) => {
         (concat!($section, ".", stringify!($number)), &$owner.$number)

@@ -1,8 +1,8 @@
 //! A recipe as a whole: its sections.
 
 use super::camera::Camera;
-use super::number::Number;
 use super::imaging::{Background, Field, Focus, Light, Optics};
+use super::number::Number;
 use super::scan::Scan;
 use super::section::{Declared, Part, section};
 use super::specimen::{Cells, Cytoplasm, Layout, Nucleus, Slide, Stain, default_cells};

@@ -60,8 +60,8 @@ pub(super) fn draw_cells(
     let relief = Relief::new(
         view.size_um(),
         numbers.draw(named!(recipe.slide.depth_um)),
-        numbers.draw(named!(recipe.slide.relief_um)),
-        numbers.draw(named!(recipe.slide.median_um)),
+        numbers.draw(named!(recipe.slide.depth_scale_um)),
+        numbers.draw(named!(recipe.slide.depth_filter_um)),
         numbers.key.stream("field", 0, "slide.relief").next_u64(),
     );
     let mut objects = Vec::with_capacity(wanted.iter().sum());
@@ -94,17 +94,12 @@ pub(super) fn draw_cells(
 }
 
 /// Returns how many cells of each class to place: those requested, or fewer of each class where they cannot fit.
-fn fitting(
-    recipe: &Recipe,
-    places: &Places,
-    requested: &[usize],
-    crowding: Crowding,
-) -> Result<Vec<usize>, Cause> {
+fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
     let mut wanted = requested.to_vec();
     for in_margin in [false, true] {
         // Of a group only the first cell keeps its distance.
         let first = |(mix, count): (&CellMix, &usize)| match mix.group.form {
-            GroupForm::Alone => *count,
+            GroupForm::Single => *count,
             _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
         };
         let of_area = |mix: &CellMix| mix.count.is_density() == in_margin;
@@ -238,11 +233,11 @@ fn draw_body(
         dome: own_number(named!(recipe.nucleus.dome)),
         edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
         clumping: own_number(named!(recipe.nucleus.clumping)),
-        wedge: {
-            let (name, wedge) = named!(recipe.nucleus.wedge);
+        thickness_gradient: {
+            let (name, slope) = named!(recipe.nucleus.thickness_gradient);
             let mut rng = own(name);
-            let wedge = wedge.draw(&mut rng);
-            [0, 1].map(|_| wedge * random::normal(&mut rng))
+            let slope = slope.draw(&mut rng);
+            [0, 1].map(|_| slope * random::normal(&mut rng))
         },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
@@ -283,27 +278,27 @@ fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
 
 fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn(&str) -> Stream) -> CellDetail {
     let cytoplasm = &recipe.cytoplasm;
-    let excess = cytoplasm.excess.draw(rng);
+    let excess_area = cytoplasm.excess_area.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
-    let (name, slope) = named!(recipe.cytoplasm.wedge);
+    let (name, slope) = named!(recipe.cytoplasm.thickness_gradient);
     let mut wedge_rng = own(name);
     let slope = slope.draw(&mut wedge_rng);
-    let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
+    let thickness_gradient = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
     let own = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let pliable = |named: (&str, &Number)| pliability * own(named);
     CellDetail {
-        excess,
-        corners: pliable(named!(recipe.cytoplasm.corners)),
+        excess_area,
+        angularity: pliable(named!(recipe.cytoplasm.angularity)),
         notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
-        tongues: random::count(pliable(named!(recipe.cytoplasm.tongues))),
+        protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
         wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
-        wrinkle: own(named!(recipe.cytoplasm.wrinkle)),
+        wrinkle_thickness: own(named!(recipe.cytoplasm.wrinkle_thickness)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         granules: if granular { granules } else { 0.0 },
         rim_um: own(named!(recipe.cytoplasm.rim_um)),
-        wedge,
+        thickness_gradient,
         ..cytoplasm.one(rng)
     }
 }
@@ -323,29 +318,29 @@ fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: 
 fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold> {
     let folds = &recipe.cytoplasm.folds;
     let roll = pliability * folds.roll.draw(rng);
-    let cigar = pliability * folds.cigar.draw(rng);
+    let folded_over = pliability * folds.folded_over.draw(rng);
     let flap = pliability * folds.flap.draw(rng);
     let which = random::uniform(rng);
     let direction_deg = random::between(0.0, 360.0, rng);
     let depth = folds.depth.draw(rng);
     let radius_um = folds.radius_um.draw(rng);
-    let form = if which < cigar {
-        FoldForm::Cigar
-    } else if which < cigar + roll {
+    let form = if which < folded_over {
+        FoldForm::FoldedOver
+    } else if which < folded_over + roll {
         FoldForm::Roll
-    } else if which < cigar + roll + flap {
+    } else if which < folded_over + roll + flap {
         FoldForm::Flap
     } else {
         return None;
     };
     /// A rolled rim takes in less of the cell than a flap.
     const ROLLED: f64 = 0.45;
-    /// Each side of a cigar is folded in from about half of the radius.
-    const CIGAR: f64 = 0.5;
+    /// Each side of a cell that is folded over is folded in from about half of the radius.
+    const FOLDED_OVER: f64 = 0.5;
     let depth = match form {
         FoldForm::Flap => depth,
         FoldForm::Roll => depth * ROLLED,
-        FoldForm::Cigar => CIGAR,
+        FoldForm::FoldedOver => FOLDED_OVER,
     };
     Some(Fold { form, direction_deg, depth, radius_um })
 }

@@ -9,7 +9,7 @@ use crate::key::Key;
 use crate::model::Model;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Abundance, Illumination, Light, Optics, Picture, Recipe};
+use crate::recipe::{Abundance, FocusOutput, Illumination, Light, Optics, Recipe};
 
 use super::cells::{Cells, Crowding, draw_cells};
 use super::field::{Object, Scene};
@@ -42,9 +42,8 @@ pub fn draw(recipe: &Recipe, model: &Model, weight_map: Option<&WeightMap>, key:
         let cells = draw_cells(recipe, model, weight_map, view, &numbers, &stain, crowding)?;
         Ok((attempt, numbers, cells))
     };
-    let is_crowded = |cause: &Cause| {
-        matches!(cause, Cause::NoRoom { .. } | Cause::Crowded { .. } | Cause::TooUneven { .. })
-    };
+    let is_crowded =
+        |cause: &Cause| matches!(cause, Cause::NoRoom { .. } | Cause::Crowded { .. } | Cause::TooUneven { .. });
     let mut drawn = draw_cells(0, Crowding::Error);
     for attempt in 1..MAX_ATTEMPTS {
         if !drawn.as_ref().is_err_and(is_crowded) {
@@ -113,7 +112,7 @@ pub(super) fn strew(
 
 /// The number of the slide that an image shows.
 fn slide_of(recipe: &Recipe, key: Key) -> u64 {
-    key.index / recipe.slide.fields.max(1) as u64
+    key.index / recipe.slide.fields_per_slide.max(1) as u64
 }
 
 /// The view without anything on it: how it is imaged.
@@ -154,7 +153,7 @@ pub(super) fn pixel_um(recipe: &Recipe, field: &FieldNumbers) -> f64 {
 fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
     let focus = recipe.focus.draw("focus", |path| field.stream(path));
     let middle = f64::from(focus.planes - 1) / 2.0;
-    if focus.picture == Picture::Planes {
+    if focus.output == FocusOutput::Planes {
         let travel = |plane| focus.centre_um + (f64::from(plane) - middle) * focus.step_um;
         return ((0..focus.planes).map(travel).collect(), None);
     }
@@ -162,8 +161,8 @@ fn planes(recipe: &Recipe, field: &FieldNumbers) -> (Vec<f64>, Option<Fusion>) {
         first_um: focus.centre_um - middle * focus.step_um,
         step_um: focus.step_um,
         planes: focus.planes as usize,
-        noise_correlation: [focus.fused_noise_across, focus.fused_noise_down],
-        noise_skew: focus.fused_noise_skew,
+        noise_correlation: [focus.noise_correlation_x, focus.noise_correlation_y],
+        noise_skew: focus.noise_correlation_diagonal,
     };
     (vec![focus.centre_um], Some(fusion))
 }
@@ -200,20 +199,20 @@ fn background(recipe: &Recipe, field: &FieldNumbers) -> SceneBackground {
         Illumination::Border(border) => {
             SceneIllumination::Border { exponent: field.draw(named!("background.illumination", border.exponent)) }
         }
-        Illumination::Bowl(bowl) => {
-            let distance = field.draw(named!("background.illumination", bowl.off_centre));
+        Illumination::Quadratic(quadratic) => {
+            let distance = field.draw(named!("background.illumination", quadratic.centre_offset));
             let angle = random::direction(&mut field.stream("background.illumination.direction"));
-            SceneIllumination::Bowl {
-                x2: field.draw(named!("background.illumination", bowl.x2)),
-                y2: field.draw(named!("background.illumination", bowl.y2)),
-                top: [distance * libm::cos(angle), distance * libm::sin(angle)],
+            SceneIllumination::Quadratic {
+                falloff_x: field.draw(named!("background.illumination", quadratic.falloff_x)),
+                falloff_y: field.draw(named!("background.illumination", quadratic.falloff_y)),
+                centre: [distance * libm::cos(angle), distance * libm::sin(angle)],
             }
         }
     };
     SceneBackground {
         level: field.draw(named!(recipe.background.level)),
         illumination,
-        scatter: field.draw(named!(recipe.background.scatter)),
-        scatter_um: field.draw(named!(recipe.background.scatter_um)),
+        texture: field.draw(named!(recipe.background.texture)),
+        texture_um: field.draw(named!(recipe.background.texture_um)),
     }
 }

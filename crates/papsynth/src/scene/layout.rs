@@ -70,10 +70,10 @@ pub(super) fn weights(
             });
         }
         Layout::Clusters(layout) => (cluster_map(layout, field, region, size, numbers), layout.count.is_density()),
-        Layout::Swath(layout) => {
+        Layout::Band(layout) => {
             let band = numbers.draw(named!("layout", layout.width_um));
             let outside = numbers.draw(named!("layout", layout.outside));
-            let mut rng = numbers.key.stream("field", 0, "layout.swath");
+            let mut rng = numbers.key.stream("field", 0, "layout.band");
             let angle = random::direction(&mut rng);
             let (nx, ny) = (libm::cos(angle), libm::sin(angle));
             let through = field.at([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
@@ -84,7 +84,7 @@ pub(super) fn weights(
             });
             (map, false)
         }
-        Layout::Map { path } => return given.cloned().ok_or_else(|| not_given(path, "an image")).map(of_map),
+        Layout::DensityMap { path } => return given.cloned().ok_or_else(|| not_given(path, "an image")).map(of_map),
         Layout::Labels(layout) => {
             let map = given.ok_or_else(|| not_given(&layout.path, "a label image"))?;
             let smooth = numbers.draw(named!("layout", layout.smooth_um));
@@ -176,7 +176,7 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
 
 /// What is wrong with what a layout names, before anything is drawn.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
-    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
+    let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
     map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
 }

@@ -48,9 +48,10 @@ impl Region {
 
     /// Returns the rectangle with a margin on each side, by axis.
     pub(crate) fn with_margin(self, margin_um: [f64; 2]) -> Self {
-        let [low_um, size_um] = [[0, 1].map(|axis| self.low_um[axis] - margin_um[axis]), [0, 1].map(|axis| {
-            self.size_um[axis] + 2.0 * margin_um[axis]
-        })];
+        let [low_um, size_um] = [
+            [0, 1].map(|axis| self.low_um[axis] - margin_um[axis]),
+            [0, 1].map(|axis| self.size_um[axis] + 2.0 * margin_um[axis]),
+        ];
         Self { low_um, size_um }
     }
 

@@ -167,15 +167,6 @@ fn focus_moves_blur_between_planes_and_keeps_the_noise_free_mean() {
 }
 
 #[test]
-fn more_cells_than_fit_is_an_error_before_the_search() {
-    let mut recipe = small(Preset::Sparse);
-    recipe.slide.spacing_um = Number::Fixed(30.0);
-    recipe.cells.get_mut("intermediate").unwrap().count = Number::Fixed(500.0).into();
-    let message = engine(&recipe).scene(Key { seed: 1, index: 0 }).unwrap_err().to_string();
-    assert!(message.contains("do not fit") && message.contains("slide.spacing_um"), "{message}");
-}
-
-#[test]
 fn an_unknown_class_is_named_with_those_there_are() {
     let mut recipe = small(Preset::Sparse);
     let mix = recipe.cells["intermediate"].clone();
