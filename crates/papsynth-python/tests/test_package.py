@@ -500,7 +500,7 @@ def test_a_data_set_is_its_own_wherever_it_is_unpickled(tmp_path, monkeypatch):
 def test_a_file_that_a_recipe_names_is_read_again(tmp_path):
     from PIL import Image
 
-    recipe = {**SMALL, "layout": {"kind": "map", "path": str(tmp_path / "map.png")}}
+    recipe = {**SMALL, "layout": {"kind": "density-map", "path": str(tmp_path / "map.png")}}
     seen = []
     for half in (slice(0, 32), slice(32, 64)):
         grey = np.zeros((64, 64), np.uint8)

@@ -5,7 +5,7 @@
 use image::GrayImage;
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe, Swath};
+use papsynth::recipe::{Band, CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe};
 use papsynth::scene::Kind;
 use papsynth::truth::{ObjectTruth, Part};
 use papsynth::{Engine, Frame, Inputs};
@@ -147,7 +147,7 @@ fn detail() -> Outcome<GrayImage> {
         recipe.cytoplasm.granular = 0.0.into();
         recipe.cytoplasm.folds.flap = 0.0.into();
         recipe.cytoplasm.folds.roll = 0.0.into();
-        recipe.cytoplasm.folds.cigar = 0.0.into();
+        recipe.cytoplasm.folds.folded_over = 0.0.into();
         let frame = frame(&recipe, 3)?;
         let cell = frame.finished.truth.objects.iter().find(|o| o.part == Part::Cytoplasm).ok_or("no cell")?;
         pictures.push(crop(&frame, cell, 240, 1));
@@ -155,12 +155,12 @@ fn detail() -> Outcome<GrayImage> {
     Ok(sheet(&pictures, 4))
 }
 
-/// Fig. 8: places drawn from a clustered layout and from a swath.
+/// Fig. 8: places drawn from a clustered layout and from a band.
 fn layouts() -> Outcome<GrayImage> {
     let layouts = [
         Layout::Uniform {},
         Layout::Clusters(Clusters { count: 4.0.into(), radius_um: 14.0.into(), outside: 0.03.into() }),
-        Layout::Swath(Swath { width_um: 12.0.into(), outside: 0.03.into() }),
+        Layout::Band(Band { width_um: 12.0.into(), outside: 0.03.into() }),
     ];
     let mut pictures = Vec::new();
     for layout in layouts {

@@ -97,7 +97,7 @@ fn class(name: &'static str, count: f64, group: Group) -> Chapter {
 
 fn cells() -> Vec<Chapter> {
     let group = |form, size: f64, distance: f64| Group { form, size: size.into(), distance: distance.into() };
-    let heap = |size| group(GroupForm::Heap, size, 0.85);
+    let heap = |size| group(GroupForm::Aggregate, size, 0.85);
     vec![
         far(class("superficial", 1.0, Group::default())),
         far(class("intermediate", 1.0, Group::default())),
@@ -160,7 +160,7 @@ fn debris() -> Vec<Chapter> {
         chapter("smudges", K::Smudge, |d| {
             (d.smudges.count, d.smudges.diameter_um) = (20.0.into(), Number::uniform(4.0, 20.0));
         }),
-        chapter("dirt", K::Dirt, |d| d.dirt.drifts = 40.0.into()),
+        chapter("dirt", K::Dirt, |d| d.dirt.clusters = 40.0.into()),
         chapter("specks", K::Speckle, |d| d.speckles.count = 60.0.into()),
         chapter("dye crystals", K::Crystal, |d| d.crystals.count = 60.0.into()),
         far(chapter("dust", K::Dust, |d| {

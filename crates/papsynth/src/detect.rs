@@ -96,9 +96,9 @@ impl Detector {
         let params = JpegParams {
             quality: camera.jpeg_quality,
             subsampling: match camera.jpeg_subsampling {
-                Subsampling::Full => ccd_noise::Subsampling::S444,
-                Subsampling::Columns => ccd_noise::Subsampling::S422,
-                Subsampling::Squares => ccd_noise::Subsampling::S420,
+                Subsampling::S444 => ccd_noise::Subsampling::S444,
+                Subsampling::S422 => ccd_noise::Subsampling::S422,
+                Subsampling::S420 => ccd_noise::Subsampling::S420,
             },
             bit_depth: camera.bits,
         };
@@ -232,7 +232,7 @@ impl Channel {
     fn new(camera: &SceneCamera, bits: u32, share: f64) -> Result<Self, Cause> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
-        let (range_dn, glare) = (largest - offset_dn, camera.glare_removed);
+        let (range_dn, glare) = (largest - offset_dn, camera.glare_subtracted);
         let params = CameraParams {
             exposure_s: camera.exposure_s,
             dark_current_e_per_s: camera.dark_current_e_per_s,

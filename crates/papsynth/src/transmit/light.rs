@@ -67,16 +67,17 @@ fn background(scene: &Scene) -> Result<Background, Cause> {
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
         // A bowl whose top is off the centre, 1 − x2 (x − tx)² − …, has a tilt; the constant left over is in the level.
-        SceneIllumination::Bowl { x2, y2, top } => {
-            Illumination::Quadratic { falloff_x: x2, falloff_y: y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
+        SceneIllumination::Quadratic { falloff_x, falloff_y, centre } => {
+            let tilt = [2.0 * falloff_x * centre[0], 2.0 * falloff_y * centre[1]];
+            Illumination::Quadratic { falloff_x, falloff_y, tilt }
         }
     };
     let params = BackgroundParams {
         level: scene.background.level,
         illumination,
         texture: BackgroundTexture {
-            strength: scene.background.scatter,
-            cell_px: (scene.background.scatter_um / view.pixel_um).max(1.0),
+            strength: scene.background.texture,
+            cell_px: (scene.background.texture_um / view.pixel_um).max(1.0),
             noise: FractalParams::default(),
             ..BackgroundTexture::default()
         },
