@@ -74,7 +74,7 @@ struct Kept {
 
 impl Frame {
     pub(crate) fn new(py: Python<'_>, frame: papsynth::Frame) -> PyResult<Self> {
-        let picture = frame.picture();
+        let picture = frame.image();
         let papsynth::Frame { planes, finished } = frame;
         let scene = &finished.scene;
         let (bits, channels) = (scene.camera.bits, planes.first().map_or(1, |plane| plane.channels));
@@ -176,7 +176,7 @@ impl Frame {
 
     #[getter]
     fn visible_masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        kept(py, &self.kept.visible_masks, || self.masks_of(py, |object| &object.front))
+        kept(py, &self.kept.visible_masks, || self.masks_of(py, |object| &object.visible))
     }
 
     #[getter]
@@ -197,7 +197,7 @@ impl Frame {
 
     #[getter]
     fn visible_rle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.rle_of(py, |object| &object.front)
+        self.rle_of(py, |object| &object.visible)
     }
 
     #[getter]
@@ -354,13 +354,13 @@ fn pickled_objects(truth: &Truth) -> Vec<PickledObject> {
                 o.cluster,
                 o.centre_um,
                 o.depth_um,
-                o.stain,
+                o.mean_absorbance,
                 o.tint_name().to_owned(),
                 o.rotation_deg,
                 o.area_um2,
                 o.truncated,
             ),
-            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.front, *width, *height)),
+            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.visible, *width, *height)),
             (o.defocus_um.clone(), o.detectability.clone()),
         )
     };

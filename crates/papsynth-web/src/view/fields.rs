@@ -116,7 +116,7 @@ impl Fields {
                     ),
                 ));
             }
-            let shown = |truth: ObjectTruth| Shown { front: truth.front.bounds(), truth };
+            let shown = |truth: ObjectTruth| Shown { front: truth.visible.bounds(), truth };
             self.kept[0].objects = Some(truth.objects.into_iter().map(shown).collect());
         }
         let frame = &self.kept[0];
@@ -181,7 +181,7 @@ impl Source for Fields {
             if is_apart(&wider.rows, bounds.y, bounds.height) || is_apart(&wider.columns, bounds.x, bounds.width) {
                 continue;
             }
-            for run in truth.front.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
+            for run in truth.visible.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
                 ids.paint(&cut, run.y as usize / step, level(run.x0)..level(run.x1), truth.id);
             }
         }
@@ -198,7 +198,7 @@ impl Source for Fields {
         let mut found: Vec<&ObjectTruth> =
             objects.iter().map(|shown| &shown.truth).filter(|truth| holds(&truth.amodal)).collect();
         found.sort_by(|a, b| b.depth_um.total_cmp(&a.depth_um).then(b.part.cmp(&a.part)));
-        Ok(found.into_iter().map(|truth| told(truth, holds(&truth.front))).collect())
+        Ok(found.into_iter().map(|truth| told(truth, holds(&truth.visible))).collect())
     }
 }
 
@@ -218,7 +218,7 @@ fn told(truth: &ObjectTruth, is_front: bool) -> Value {
         "centre_um": truth.centre_um,
         "depth_um": truth.depth_um,
         "area_um2": truth.area_um2,
-        "stain": truth.stain,
+        "stain": truth.mean_absorbance,
         "tint": truth.tint_name(),
         "rotation_deg": truth.rotation_deg,
         "truncated": truth.truncated,

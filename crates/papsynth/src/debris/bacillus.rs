@@ -96,7 +96,7 @@ impl Bacillus {
         });
         let mut tile = coverage.clone();
         for value in &mut tile.values {
-            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+            *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;
         }
         let (length_um, width_um) = (self.length_um, self.width_um);
         let area = (length_um - width_um).max(0.0) * width_um + core::f64::consts::FRAC_PI_4 * width_um * width_um;
@@ -105,7 +105,7 @@ impl Bacillus {
             _ => coverage.values.iter().map(|share| f64::from(*share)).sum(),
         };
         let dyes = site.dyes.bacillus;
-        Phantom::whole(tile, coverage, area_px, dyes).refracting(self.phase_rad, self.absorbance)
+        Phantom::whole(tile, coverage, area_px, dyes).with_phase(self.phase_rad, self.absorbance)
     }
 }
 

@@ -53,7 +53,7 @@ impl BareNucleus {
     pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         let stretch = self.elongation.sqrt();
-        let shape = wobbled_circle(self.radius_um, 0.04, 0.08, &mut rng);
+        let shape = perturbed_circle(self.radius_um, 0.04, 0.08, &mut rng);
         let scaled = |by: f64| -> Vec<Point> {
             shape.iter().map(|p| site.place([by * stretch * p[0], by * p[1] / stretch])).collect()
         };
@@ -64,8 +64,8 @@ impl BareNucleus {
         inner.cover(&scaled((1.0 - RIM_UM / self.radius_um).max(0.0)));
         nucleus
             .layered(&inner.values, |cover, inner| self.absorbance as f32 * (cover + RIM * (cover - inner).max(0.0)));
-        let look = Look::clouds(site.px(CLUMP_UM), &mut rng);
-        nucleus.texture(site.pools.clouds(), &look, self.texture as f32);
+        let look = FieldSampler::clouds(site.px(CLUMP_UM), &mut rng);
+        nucleus.texture(site.noise_fields.clouds(), &look, self.texture as f32);
         let mut shreds = nucleus.blank();
         for _ in 0..SHREDS {
             let (angle, reach) = (random::direction(&mut rng), self.radius_um * random::between(1.0, 1.8, &mut rng));
@@ -75,6 +75,6 @@ impl BareNucleus {
             let half_width = site.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }
-        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).stained(shreds.absorbance, self.dyes)
+        nucleus.finish(site.dyes.nucleus, 0.0, self.absorbance).with_inclusion(shreds.absorbance, self.dyes)
     }
 }

@@ -35,7 +35,7 @@ impl Bubble {
     pub(super) fn phantom(&self, site: &Site<'_>) -> Phantom {
         let mut rng = site.stream("shape");
         // Surface tension keeps it round.
-        let circle = wobbled_circle(self.radius_um, 0.004, 0.01, &mut rng);
+        let circle = perturbed_circle(self.radius_um, 0.004, 0.01, &mut rng);
         let outline = site.places(&circle);
         let mut painting = site.painting(&outline, 0.0);
         painting.coverage.cover(&outline);

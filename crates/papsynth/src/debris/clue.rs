@@ -58,10 +58,10 @@ const RIM_UM: f64 = 2.0;
 /// Lays its coat on a cell.
 pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
     let Some(cell) = phantom.pieces.first() else { return };
-    let (pools, pixel_um) = (site.pools, site.pixel_um);
+    let (noise_fields, pixel_um) = (site.noise_fields, site.pixel_um);
     let mut rng = site.stream("coat.shape");
     let margin = (coat.beyond_um + RIM_UM) / pixel_um + 2.0;
-    let whole = cell.coverage.clone().repeated(cell.cover_step);
+    let whole = cell.coverage.clone().repeated(cell.coverage_step);
     let corner = whole.origin.map(|at| at as f64);
     let opposite = [corner[0] + (whole.width - 1) as f64, corner[1] + (whole.height() - 1) as f64];
     let mut painting = Painting::around(&[corner, opposite], margin);
@@ -69,16 +69,16 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
     let near = |um: f64| averaged(&inside, random::count(um / pixel_um).max(1));
     let (rim, beyond) = (near(RIM_UM), near(coat.beyond_um));
     // Beyond the rim bacteria hang together in tufts.
-    let tufts = Look::clouds(TUFT_UM / pixel_um, &mut rng);
+    let tufts = FieldSampler::clouds(TUFT_UM / pixel_um, &mut rng);
     let mut tufted = Vec::with_capacity(painting.coverage.values.len());
-    painting.rows(pools.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
+    painting.rows(noise_fields.clouds(), &tufts, |_, _, _, field| tufted.extend_from_slice(field));
     // How dense the coat is at each pixel.
-    let threshold = pools.clouds().quantile(1.0 - coat.cover);
-    let look = Look::clouds(PATCH_UM / pixel_um, &mut rng);
+    let threshold = noise_fields.clouds().quantile(1.0 - coat.cover);
+    let look = FieldSampler::clouds(PATCH_UM / pixel_um, &mut rng);
     let width = painting.coverage.width;
     let mut density = vec![0.0_f64; painting.coverage.values.len()];
     let mut row = 0;
-    painting.rows(pools.clouds(), &look, |_, _, _, field| {
+    painting.rows(noise_fields.clouds(), &look, |_, _, _, field| {
         for (x, patch) in field.iter().enumerate() {
             let at = row * width + x;
             let covered = f64::from(inside.values[at]);
@@ -104,7 +104,7 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
         let end = [at[0] + length * libm::cos(way), at[1] + length * libm::sin(way)];
         painting.stroke(&Stroke::even(at, end, half_width), coat.absorbance * random::between(0.6, 1.3, &mut rng));
     }
-    *phantom = core::mem::take(phantom).stained(painting.absorbance, site.dyes.bacillus);
+    *phantom = core::mem::take(phantom).with_inclusion(painting.absorbance, site.dyes.bacillus);
     phantom.traits.push(Trait::Clue);
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn cover(coat: &Coat, site: &Site<'_>, phantom: &mut Phantom) {
 fn widened(tile: &Tile, place: &Tile) -> Tile {
     let mut wide = place.blank();
     let origin = wide.origin;
-    crate::phantom::tile::lay(&mut wide.values, place.width, origin, tile, |row, values| {
+    crate::phantom::tile::overlay(&mut wide.values, place.width, origin, tile, |row, values| {
         row.copy_from_slice(values);
     });
     wide

@@ -67,10 +67,10 @@ mod prelude {
     pub(super) use super::paint::{Painting, Stroke};
     pub(super) use super::site::Site;
     pub(super) use crate::key::Stream;
-    pub(super) use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
-    pub(super) use crate::phantom::pools::Look;
+    pub(super) use crate::phantom::noise_fields::FieldSampler;
+    pub(super) use crate::phantom::parametric_shape::{perturbed_circle, placed, smooth, textured};
+    pub(super) use crate::phantom::piece::{MIN_ABSORBANCE, Phantom};
     pub(super) use crate::phantom::tile::{Point, Tile, area};
-    pub(super) use crate::phantom::wobble::{placed, smooth, textured, wobbled_circle};
     pub(super) use crate::random;
     pub(super) use crate::recipe::dyes::DyeAmounts;
     pub(super) use crate::recipe::number::{Count, Number};

@@ -99,8 +99,8 @@ impl Strand {
             let half_widths = [site.px(half[0]), site.px(half[1])];
             painting.line(&Stroke { ends, half_widths }, VEIL * self.absorbance);
         }
-        let look = Look::clouds(site.px(CLOUD_UM), &mut rng);
-        painting.texture(site.pools.clouds(), &look, CLOUDY);
+        let look = FieldSampler::clouds(site.px(CLOUD_UM), &mut rng);
+        painting.texture(site.noise_fields.clouds(), &look, CLOUDY);
         for fibre in &fibres {
             let half_width = site.px(0.5 * self.fibre_um * random::between(0.6, 1.3, &mut rng));
             let strength = self.absorbance * random::between(0.4, 1.4, &mut rng);

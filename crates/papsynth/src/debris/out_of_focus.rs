@@ -44,7 +44,7 @@ impl Blob {
         let mut rng = site.stream("shape");
         let radius = site.px(self.radius_um);
         let turn = site.rotation_deg.to_radians();
-        let shape: Vec<Point> = wobbled_circle(radius, self.alpha, self.beta, &mut rng)
+        let shape: Vec<Point> = perturbed_circle(radius, self.alpha, self.beta, &mut rng)
             .iter()
             .map(|p| placed(*p, turn, site.centre))
             .collect();

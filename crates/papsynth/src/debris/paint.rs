@@ -2,8 +2,8 @@
 
 use dye_spectra::Amounts;
 
-use crate::phantom::piece::{LEAST_ABSORBANCE, Phantom};
-use crate::phantom::pools::{Look, Pool, SIDE, Texels};
+use crate::phantom::noise_fields::{FieldSampler, NoiseField, SIDE, Texels};
+use crate::phantom::piece::{MIN_ABSORBANCE, Phantom};
 use crate::phantom::tile::{Point, Tile};
 
 /// An object that is being painted.
@@ -135,11 +135,11 @@ impl Painting {
         }
     }
 
-    /// Visits every row with a field of a pool: where it starts, its coverage, its absorbance, and the field's values.
+    /// Visits every row with a field of a noise field: where it starts, its coverage, its absorbance, and the field's values.
     pub(super) fn rows(
         &mut self,
-        pool: &Pool,
-        look: &Look,
+        noise_field: &NoiseField,
+        look: &FieldSampler,
         mut visit: impl FnMut(Point, &mut [f32], &mut [f32], &[f32]),
     ) {
         let (width, [x, y]) = (self.coverage.width, self.coverage.origin);
@@ -147,14 +147,14 @@ impl Painting {
         let mut texels: Texels = [0.0; SIDE + 1];
         let covers = self.coverage.values.chunks_exact_mut(width);
         for (row, (cover, value)) in covers.zip(self.absorbance.values.chunks_exact_mut(width)).enumerate() {
-            pool.row_into(&mut field, look, [0.0, row as f64], &mut texels);
+            noise_field.row_into(&mut field, look, [0.0, row as f64], &mut texels);
             visit([x as f64, y as f64 + row as f64], cover, value, &field);
         }
     }
 
     /// Multiplies what it absorbs by 1 + strength · field, but by no less than 0.
-    pub(super) fn texture(&mut self, pool: &Pool, look: &Look, strength: f32) {
-        self.rows(pool, look, |_, _, values, field| {
+    pub(super) fn texture(&mut self, noise_field: &NoiseField, look: &FieldSampler, strength: f32) {
+        self.rows(noise_field, look, |_, _, values, field| {
             for (value, field) in values.iter_mut().zip(field) {
                 *value *= (1.0 + strength * field).max(0.0);
             }
@@ -163,16 +163,16 @@ impl Painting {
 
     /// The object, through which light comes late by `phase_rad` where it absorbs `absorbance`.
     pub(super) fn finish(mut self, dyes: Amounts, phase_rad: f64, absorbance: f64) -> Phantom {
-        if absorbance < LEAST_ABSORBANCE {
+        if absorbance < MIN_ABSORBANCE {
             // What only refracts has its phase counted by its absorbance.
-            let scale = (LEAST_ABSORBANCE / absorbance.max(f64::MIN_POSITIVE)) as f32;
+            let scale = (MIN_ABSORBANCE / absorbance.max(f64::MIN_POSITIVE)) as f32;
             let values = self.absorbance.values.iter_mut().zip(&self.coverage.values);
             for (value, cover) in values {
-                *value = if absorbance > 0.0 { *value * scale } else { cover * LEAST_ABSORBANCE as f32 };
+                *value = if absorbance > 0.0 { *value * scale } else { cover * MIN_ABSORBANCE as f32 };
             }
         }
         let area = self.coverage.values.iter().map(|share| f64::from(*share)).sum();
-        Phantom::whole(self.absorbance, self.coverage, area, dyes).refracting(phase_rad, absorbance)
+        Phantom::whole(self.absorbance, self.coverage, area, dyes).with_phase(phase_rad, absorbance)
     }
 }
 

@@ -58,7 +58,7 @@ impl RedCell {
         let mut rng = site.stream("shape");
         let radius_um = 0.5 * self.diameter_um;
         let squeeze = random::between(0.88, 1.0, &mut rng);
-        let circle = wobbled_circle(radius_um, 0.03, 0.05, &mut rng);
+        let circle = perturbed_circle(radius_um, 0.03, 0.05, &mut rng);
         let outline: Vec<Point> = circle.iter().map(|p| site.place([p[0], squeeze * p[1]])).collect();
         let mut painting = site.painting(&outline, 0.0);
         painting.coverage.cover(&outline);

@@ -2,9 +2,9 @@
 
 use super::paint::Painting;
 use crate::key::{Key, Stream};
-use crate::phantom::pools::Pools;
+use crate::phantom::noise_fields::NoiseFields;
+use crate::phantom::parametric_shape::placed;
 use crate::phantom::tile::Point;
-use crate::phantom::wobble::placed;
 use crate::scene::imaging::SceneDyes;
 use crate::scene::view::View;
 
@@ -19,7 +19,7 @@ pub(crate) struct Site<'a> {
     pub(crate) key: Key,
     pub(crate) kind: &'static str,
     pub(crate) number: u64,
-    pub(crate) pools: &'a Pools<'a>,
+    pub(crate) noise_fields: &'a NoiseFields<'a>,
     /// Size of a point of the grid, µm.
     pub(crate) pixel_um: f64,
     /// Its middle.

@@ -67,17 +67,17 @@ impl Smudge {
             *value = (1.0 - (u * u + v * v).sqrt()) as f32;
         });
         for (size, strength) in WAVES {
-            let look = Look::clouds(site.px(size * radius_um), &mut rng);
+            let look = FieldSampler::clouds(site.px(size * radius_um), &mut rng);
             let strength = (strength * self.ragged) as f32;
-            painting.rows(site.pools.clouds(), &look, |_, _, values, field| {
+            painting.rows(site.noise_fields.clouds(), &look, |_, _, values, field| {
                 values.iter_mut().zip(field).for_each(|(value, field)| *value += strength * field);
             });
         }
         // A pixel is covered where that is above 0, and its edge is as sharp as the grid.
         let sharpness = site.px(radius_um) as f32;
-        let grains = Look::clouds(site.px(GRAIN_SIGMA * self.grain_um), &mut rng);
+        let grains = FieldSampler::clouds(site.px(GRAIN_SIGMA * self.grain_um), &mut rng);
         let (absorbance, granularity) = (self.absorbance as f32, self.granularity as f32);
-        painting.rows(site.pools.clouds(), &grains, |_, covers, values, field| {
+        painting.rows(site.noise_fields.clouds(), &grains, |_, covers, values, field| {
             for ((cover, value), grain) in covers.iter_mut().zip(values).zip(field) {
                 let inside = *value;
                 *cover = (inside * sharpness + 0.5).clamp(0.0, 1.0);

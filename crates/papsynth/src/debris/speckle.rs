@@ -75,8 +75,8 @@ impl Speckle {
         let area = coverage.values.iter().map(|v| f64::from(*v)).sum();
         let mut tile = coverage.clone();
         for value in &mut tile.values {
-            *value *= self.absorbance.max(LEAST_ABSORBANCE) as f32;
+            *value *= self.absorbance.max(MIN_ABSORBANCE) as f32;
         }
-        Phantom::whole(tile, coverage, area, site.dyes.speckle).refracting(self.phase_rad, self.absorbance)
+        Phantom::whole(tile, coverage, area, site.dyes.speckle).with_phase(self.phase_rad, self.absorbance)
     }
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::*;
 use crate::key::Key;
 use crate::model::Model;
-use crate::phantom::pools::PoolMaker;
+use crate::phantom::noise_fields::NoiseFieldGenerator;
 use crate::recipe::{Optics, Preset, Recipe};
 use crate::scene::{self, Object, Scene};
 use crate::truth::traits::Trait;
@@ -34,9 +34,9 @@ fn draw(debris: &Debris) -> Scene {
 
 /// The phantoms of everything but cells.
 fn phantoms(scene: &Scene) -> Vec<(Kind, Phantom)> {
-    let maker = PoolMaker::new();
-    let pools = maker.make(scene.key);
-    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &pools, object)?));
+    let generator = NoiseFieldGenerator::new();
+    let noise_fields = generator.fields(scene.key);
+    let made = |object: &Object| Some((object.body.kind(), crate::phantom::debris(scene, &noise_fields, object)?));
     scene.objects.iter().filter_map(made).collect()
 }
 
@@ -243,7 +243,7 @@ fn reach_um(scene: &Scene, object: &Object, phantom: &Phantom) -> f64 {
     let n = scene.oversampling();
     let mut farthest = 0.0_f64;
     for piece in &phantom.pieces {
-        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.cover_step)] {
+        for (tile, step) in [(&piece.absorbance, n), (&piece.coverage, n / piece.coverage_step)] {
             let grid = crate::scene::View { pixel_um: scene.view.pixel_um / step as f64, ..scene.view };
             let centre = grid.to_px(object.centre_um);
             let mut index = 0;
@@ -265,11 +265,11 @@ fn hardly_anything_reaches_farther_than_it_says() {
         let mut debris = Debris::none();
         counted(&mut debris, kind, 150.0);
         let scene = draw(&debris);
-        let maker = PoolMaker::new();
-        let pools = maker.make(scene.key);
+        let generator = NoiseFieldGenerator::new();
+        let noise_fields = generator.fields(scene.key);
         let (mut beyond, mut most, mut told) = (0, 0.0_f64, 0);
         for object in &scene.objects {
-            let Some(phantom) = crate::phantom::debris(&scene, &pools, object) else { continue };
+            let Some(phantom) = crate::phantom::debris(&scene, &noise_fields, object) else { continue };
             let says = object.body.reach_um(scene.view.pixel_um) + 2.0 * scene.view.pixel_um;
             let share = reach_um(&scene, object, &phantom) / says;
             (told, most) = (told + 1, most.max(share));
@@ -292,11 +292,13 @@ fn hardly_a_cell_reaches_farther_than_it_says() {
         recipe.debris = Debris::none();
         let model = Model::builtin();
         let scene = scene::draw(&recipe, &model, None, KEY).unwrap();
-        let watch = crate::profile::Watch(None);
-        let studio = crate::phantom::Studio::new(&recipe, &model, watch).unwrap();
-        let pools = studio.pools.make(scene.key);
+        let timer = crate::profile::StageTimer(None);
+        let assets = crate::phantom::PhantomAssets::new(&recipe, &model, timer).unwrap();
+        let noise_fields = assets.noise_fields.fields(scene.key);
         let objects: Vec<&Object> = scene.objects.iter().collect();
-        for (object, phantom) in objects.iter().zip(crate::phantom::make(&studio, &scene, &pools, &objects).unwrap()) {
+        for (object, phantom) in
+            objects.iter().zip(crate::phantom::make(&assets, &scene, &noise_fields, &objects).unwrap())
+        {
             let share = reach_um(&scene, object, &phantom) / object.body.reach_um(scene.view.pixel_um);
             (told, most) = (told + 1, most.max(share));
             beyond += usize::from(share > 1.0);

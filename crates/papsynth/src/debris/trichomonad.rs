@@ -83,8 +83,8 @@ impl Trichomonad {
         let threads: Vec<[Point; 3]> = threads.iter().map(|thread| thread.map(|p| site.place(p))).collect();
         let mut painting = site.painting(outline.iter().chain(threads.iter().flatten()), 0.5);
         painting.fill(&outline, self.absorbance);
-        let look = Look::clouds(site.px(GRAIN_UM), &mut rng);
-        painting.texture(site.pools.clouds(), &look, GRAIN);
+        let look = FieldSampler::clouds(site.px(GRAIN_UM), &mut rng);
+        painting.texture(site.noise_fields.clouds(), &look, GRAIN);
         let mut hairs = painting.blank();
         let half_width = site.px(0.5 * FLAGELLUM_UM);
         for pair in threads.iter().flat_map(|thread| thread.windows(2)) {
@@ -104,7 +104,7 @@ impl Trichomonad {
         // Flagella are no part of its outline: nobody would draw it round them.
         painting
             .finish(self.dyes, 0.0, self.absorbance)
-            .stained(nucleus.absorbance, site.dyes.nucleus)
-            .stained(hairs.absorbance, self.dyes)
+            .with_inclusion(nucleus.absorbance, site.dyes.nucleus)
+            .with_inclusion(hairs.absorbance, self.dyes)
     }
 }

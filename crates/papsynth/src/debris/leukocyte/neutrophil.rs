@@ -53,7 +53,7 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let shapes: Vec<Vec<Point>> = lobes
         .iter()
         .map(|lobe| {
-            let shape = wobbled_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
+            let shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
             let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
             let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
             turned.map(|p| site.place([p[0] + at[0], p[1] + at[1]])).collect()
@@ -69,8 +69,8 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     if leukocyte.degenerated {
         strands(&mut painting, site, cell_radius, leukocyte.halo, &mut rng);
     }
-    let look = Look::clouds(site.px(VACUOLE_UM), &mut rng);
-    painting.texture(site.pools.clouds(), &look, VACUOLES);
+    let look = FieldSampler::clouds(site.px(VACUOLE_UM), &mut rng);
+    painting.texture(site.noise_fields.clouds(), &look, VACUOLES);
 
     let mut nucleus = painting.blank();
     for shape in &shapes {
@@ -82,13 +82,13 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
         nucleus.stroke(&Stroke::even(ends[0], ends[1], half_width), 0.0);
     }
     domed(&mut nucleus, &shapes, leukocyte);
-    let look = Look::clouds(site.px(CLUMP_UM), &mut rng);
-    nucleus.texture(site.pools.clouds(), &look, if leukocyte.degenerated { SMUDGED } else { CHROMATIN });
+    let look = FieldSampler::clouds(site.px(CLUMP_UM), &mut rng);
+    nucleus.texture(site.noise_fields.clouds(), &look, if leukocyte.degenerated { SMUDGED } else { CHROMATIN });
     for (cover, inside) in painting.coverage.values.iter_mut().zip(&nucleus.coverage.values) {
         *cover = cover.max(*inside);
     }
     let mut phantom =
-        painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).stained(nucleus.absorbance, site.dyes.nucleus);
+        painting.finish(leukocyte.dyes, 0.0, leukocyte.halo).with_inclusion(nucleus.absorbance, site.dyes.nucleus);
     if leukocyte.degenerated {
         phantom.traits.push(Trait::Degenerated);
     }

@@ -21,8 +21,8 @@ pub(super) fn make(leukocyte: &Leukocyte, site: &Site<'_>) -> Phantom {
     let turn = site.rotation_deg.to_radians();
     let radius = site.px(leukocyte.radius_um);
     let place = |shape: Vec<Point>| -> Vec<Point> { shape.iter().map(|p| placed(*p, turn, centre)).collect() };
-    let shape = place(wobbled_circle(radius, alpha, beta, &mut rng));
-    let body = (halo >= FAINTEST_HALO).then(|| place(wobbled_circle(radius * HALO, 0.10, 0.10, &mut rng)));
+    let shape = place(perturbed_circle(radius, alpha, beta, &mut rng));
+    let body = (halo >= FAINTEST_HALO).then(|| place(perturbed_circle(radius * HALO, 0.10, 0.10, &mut rng)));
     let mut nucleus = Tile::around(shape.iter().chain(body.iter().flatten()), 2.0);
     let mut coverage = nucleus.blank();
     nucleus.cover(&shape);
