@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{Clusters, Law, Layout, Number, Preset, Recipe};
+use papsynth::recipe::{Abundance, Clusters, Law, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
@@ -34,10 +34,13 @@ pub fn default_recipe() -> Recipe {
 pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
     let (width, height) = (width as f64, height as f64);
     let share = width * height / (middle(&recipe.field.width_px) * middle(&recipe.field.height_px));
+    let pixel_mm = middle(&recipe.field.pixel_um) * 1e-3;
+    let area_mm2 = width * height * pixel_mm * pixel_mm;
+    let number = |count: &Abundance| middle(count.number()) * if count.is_density() { area_mm2 } else { share };
     recipe.field.width_px = width.into();
     recipe.field.height_px = height.into();
     if let Layout::Clusters(Clusters { count, .. }) = &mut recipe.layout {
-        *count = (share * middle(count)).round().clamp(1.0, 1e4).into();
+        *count = number(count).round().clamp(1.0, 1e4).into();
     }
     let debris = &mut recipe.debris;
     let counts = recipe.cells.values_mut().map(|mix| &mut mix.count).chain([
@@ -47,7 +50,7 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
         &mut debris.candida.colonies,
         &mut debris.cocci.colonies,
         &mut debris.crystals.count,
-        &mut debris.dirt.drifts,
+        &mut debris.dirt.clusters,
         &mut debris.dust.count,
         &mut debris.fibres.count,
         &mut debris.leukocytes.clusters,
@@ -60,7 +63,7 @@ pub fn at_density(mut recipe: Recipe, [width, height]: Size) -> Recipe {
         &mut debris.trichomonads.groups,
     ]);
     for count in counts {
-        *count = (share * middle(count)).round().into();
+        *count = number(count).round().into();
     }
     recipe
 }

@@ -116,7 +116,7 @@ fn few_slides(folder: &Path, side: &Side) {
     if !slides.is_empty() && 2 * slides.len() < side.len() {
         let (folder, fields, slides) = (folder.display(), side.len(), slides.len());
         exit::note(format!(
-            "{folder}: {fields} fields of {slides} slides, which differ by their stain; more slides say more: generate with --set slide.fields=1"
+            "{folder}: {fields} fields of {slides} slides, which differ by their stain; more slides say more: generate with --set slide.fields_per_slide=1"
         ));
     }
 }

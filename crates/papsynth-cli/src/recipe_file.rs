@@ -271,9 +271,9 @@ mod tests {
         let recipe = load(Preset::Lbc, &["layout.kind=uniform", "slide.depth_um={ normal = [4, 0.5] }"]).unwrap();
         assert_eq!(recipe.layout, Layout::Uniform {});
         assert_eq!(recipe.slide.depth_um, Number::normal(4.0, 0.5));
-        let sets = ["layout.kind=swath", "layout.width_um=50", "layout.outside=0.1"];
-        let swath = Layout::Swath(papsynth::recipe::Swath { width_um: 50.0.into(), outside: 0.1.into() });
-        assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, swath);
+        let sets = ["layout.kind=band", "layout.width_um=50", "layout.outside=0.1"];
+        let band = Layout::Band(papsynth::recipe::Band { width_um: 50.0.into(), outside: 0.1.into() });
+        assert_eq!(load(Preset::Lbc, &sets).unwrap().layout, band);
         // The later one wins.
         let recipe = load(Preset::Lbc, &["field.width_px=96", "field.width_px=64"]).unwrap();
         assert_eq!(recipe.field.width_px, 64.0.into());

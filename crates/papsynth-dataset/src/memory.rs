@@ -92,8 +92,9 @@ impl Need {
             let side = CELL_UM * size / pixel_um;
             side * side * grid
         };
-        let classes = recipe.cells.values().filter(|mix| most(&mix.count) > 0.0);
-        let cells: Vec<(f64, f64)> = classes.map(|mix| (most(&mix.count), of_cell(most(&mix.size)))).collect();
+        let area_mm2 = recipe.largest_populated_mm2();
+        let counts = recipe.cells.values().map(|mix| (mix.count.bounds(area_mm2)[1], of_cell(most(&mix.size))));
+        let cells: Vec<(f64, f64)> = counts.filter(|(count, _)| *count > 0.0).collect();
         let count: f64 = cells.iter().map(|(count, _)| count).sum();
         let all: f64 = cells.iter().map(|(count, samples)| count * samples).sum();
         let largest = cells.iter().map(|(_, samples)| *samples).fold(0.0, f64::max);
@@ -120,7 +121,9 @@ impl Need {
         let grown = side * side / (recipe.field.width_px.bounds()[0] * recipe.field.height_px.bounds()[0]).max(1.0);
         let mut frame = recipe.clone();
         (frame.field.width_px, frame.field.height_px) = (side.into(), side.into());
-        frame.cells.values_mut().for_each(|mix| mix.count = (most(&mix.count) * grown).into());
+        for mix in frame.cells.values_mut().filter(|mix| !mix.count.is_density()) {
+            mix.count = (most(mix.count.number()) * grown).into();
+        }
         let of_frame = Self::of(&frame, &Layout::default());
         let channels = if matches!(recipe.light, Light::Monochrome(_)) { 1.0 } else { 3.0 };
         // Grey levels, three labels and layers of a pixel; and once more what is being packed.

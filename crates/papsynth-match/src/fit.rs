@@ -174,7 +174,7 @@ impl Match {
     /// The setting of fields and what is known beforehand of their values.
     fn setting(&self, measured: &Measured) -> (Setting, Values) {
         // Pictures of extended focus have more than their noise in common.
-        let fused = measured.extended && self.base.focus.picture == recipe::Picture::Planes;
+        let fused = measured.extended && self.base.focus.output == recipe::FocusOutput::Planes;
         let setting = Setting {
             base: if fused { self.base.clone().fused() } else { self.base.clone() },
             size_px: measured.size_px,

@@ -71,17 +71,17 @@ parameters! {
     /// Its standard deviation between fields.
     LevelSpread: Measured, Linear 0.0..0.04 "", "background.level: sd";
     /// Fall of the light towards the left and right border.
-    BowlAcross: Measured, Linear 0.0..0.12 "", "background.illumination.x2: mean";
+    BowlAcross: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_x: mean";
     /// Towards the upper and lower border.
-    BowlDown: Measured, Linear 0.0..0.12 "", "background.illumination.y2: mean";
+    BowlDown: Measured, Linear 0.0..0.12 "", "background.illumination.falloff_y: mean";
     /// Standard deviation of all noise of the empty slide, levels of 8 bits.
     Noise: Measured, Logarithmic 0.5..6.0 "dn", "camera.full_well_e, camera.read_noise_e: noise of the empty slide";
     /// Part of its variance that is the same in every picture.
     Pattern: Measured, Linear 0.0..0.8 "", "camera.prnu: part of the variance of noise";
     /// Noise shared with the next pixel of the row, in a fused picture.
-    Across: Measured, Linear 0.0..0.45 "", "focus.fused_noise_across";
+    Across: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_x";
     /// With the next pixel of the column.
-    Down: Measured, Linear 0.0..0.45 "", "focus.fused_noise_down";
+    Down: Measured, Linear 0.0..0.45 "", "focus.noise_correlation_y";
     /// Size of a pixel; sought only where it is asked for.
     Pixel: Simulated, Logarithmic 0.15..0.75 "um", "field.pixel_um";
     /// Part of the noise of the empty slide, without its fixed pattern, that is that of photons.
@@ -135,9 +135,9 @@ parameters! {
     /// Amorphous clumps.
     Smudges: Simulated, Logarithmic 6.0..800.0 "/mm2", "debris.smudges.count: median";
     /// Drifts of faint dirt.
-    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.drifts: median";
+    Dirt: Simulated, Logarithmic 12.0..1500.0 "/mm2", "debris.dirt.clusters: median";
     /// Unevenness of the light.
-    Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.scatter: mean";
+    Scatter: Simulated, Logarithmic 0.002..0.06 "", "background.texture: mean";
 }
 
 impl Parameter {

@@ -143,7 +143,7 @@ def test_data_sets_go_on_and_say_what_is_missing(tmp_path):
         ({"field": {"width_px": 7}}, "field.width_px"),
         ({"field": {"width_px": float("nan")}}, "field.width_px"),
         ({"focus": {"planes": {"uniform": [3, 1]}}}, "focus.planes"),
-        ({"layout": {"kind": "swath"}, "cells": {"nobody": {"count": 3}}}, "cells.nobody"),
+        ({"layout": {"kind": "band"}, "cells": {"nobody": {"count": 3}}}, "cells.nobody"),
         ({"cytoplasm": {"sheet": "xpdb"}}, "cytoplasm.sheet"),
     ],
 )
@@ -500,7 +500,7 @@ def test_a_data_set_is_its_own_wherever_it_is_unpickled(tmp_path, monkeypatch):
 def test_a_file_that_a_recipe_names_is_read_again(tmp_path):
     from PIL import Image
 
-    recipe = {**SMALL, "layout": {"kind": "map", "path": str(tmp_path / "map.png")}}
+    recipe = {**SMALL, "layout": {"kind": "density-map", "path": str(tmp_path / "map.png")}}
     seen = []
     for half in (slice(0, 32), slice(32, 64)):
         grey = np.zeros((64, 64), np.uint8)

@@ -28,6 +28,9 @@ from typing import Any, Literal, Union
 Number = Union[int, float, "dict[str, Any]"]
 """A number, or a distribution that it is drawn from."""
 
+Abundance = Union[int, float, "dict[str, Any]"]
+"""A count per field, or a density per mm² (see per_mm2); each a number or a distribution."""
+
 
 def _bounded(distribution: dict[str, Any], min: float | None, max: float | None) -> dict[str, Any]:
     bounds = {name: bound for name, bound in (("min", min), ("max", max)) if bound is not None}
@@ -52,6 +55,11 @@ def log_normal(median: float, sd: float, *, min: float | None = None, max: float
 def choice(*numbers: float, min: float | None = None, max: float | None = None) -> dict[str, Any]:
     """One of some numbers, all equally likely."""
     return _bounded({"choice": list(numbers)}, min, max)
+
+
+def per_mm2(density: Number) -> dict[str, Any]:
+    """A number of objects per mm², which may be a distribution: ``per_mm2(uniform(90, 270))``."""
+    return {"per_mm2": density}
 
 
 def _plain(value: Any) -> Any:
@@ -131,7 +139,7 @@ class Writer:
         self.text.append("\n".join(lines) + "\n")
 
     def definition(self, name):
-        if name in self.written or name == "Number":
+        if name in self.written or name in ("Number", "Abundance"):
             return
         self.written.append(name)
         schema = self.definitions[name]

@@ -129,6 +129,8 @@ mod tests {
                 planes_um: vec![-1.0, 0.0, 1.0],
                 saturated: Vec::new(),
                 floored: Vec::new(),
+                attempts: 1,
+                cells: std::collections::BTreeMap::new(),
                 objects: BTreeMap::new(),
                 truncated: 0,
                 most_layers: 3,

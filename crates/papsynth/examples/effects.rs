@@ -63,14 +63,14 @@ const CHOICES: [(&str, &[&str]); 21] = [
     ("nucleus.acceptance", &["near", "threshold"]),
     ("nucleus.seam", &["min-cut", "feather"]),
     ("nucleus.restore", &["before-detection", "after-detection", "off"]),
-    ("cells.intermediate.group.form", &["alone", "heap", "honeycomb", "palisade"]),
-    ("focus.picture", &["planes", "extended"]),
+    ("cells.intermediate.group.form", &["single", "aggregate", "honeycomb", "palisade"]),
+    ("focus.output", &["planes", "edf"]),
     ("debris.leukocytes.form", &["round", "lobed"]),
     ("debris.speckles.form", &["round", "dilated"]),
     ("camera.photon_noise", &["exact", "normal", "off"]),
     ("camera.binning", &["charge", "digital"]),
-    ("camera.jpeg_subsampling", &["full", "columns", "squares"]),
-    ("layout.kind", &["clusters", "swath", "uniform"]),
+    ("camera.jpeg_subsampling", &["4:4:4", "4:2:2", "4:2:0"]),
+    ("layout.kind", &["clusters", "band", "uniform"]),
     ("background.illumination.kind", &["bowl", "border"]),
     ("optics.imaging", &["product", "abbe"]),
     ("optics.kind", &["bright-field", "gaussian"]),
@@ -163,7 +163,7 @@ fn base(section: &str) -> Recipe {
 
 /// Returns the recipe with enough debris that a small field contains some of each kind.
 fn abundant(recipe: &Recipe) -> Recipe {
-    const COUNTS: [&str; 7] = ["count", "clusters", "colonies", "groups", "strands", "drifts", "share"];
+    const COUNTS: [&str; 6] = ["count", "clusters", "colonies", "groups", "strands", "share"];
     let mut whole = serde_json::to_value(recipe).unwrap_or_default();
     if let Some(kinds) = whole.get_mut("debris").and_then(Value::as_object_mut) {
         for kind in kinds.values_mut().filter_map(Value::as_object_mut) {

@@ -5,7 +5,7 @@
 use image::GrayImage;
 use papsynth::key::Key;
 use papsynth::model::Model;
-use papsynth::recipe::{CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe, Swath};
+use papsynth::recipe::{Band, CellMix, Chromatin, Clusters, Debris, Layout, Number, PhotonNoise, Preset, Recipe};
 use papsynth::scene::Kind;
 use papsynth::truth::{ObjectTruth, Part};
 use papsynth::{Engine, Frame, Inputs};
@@ -160,7 +160,7 @@ fn layouts() -> Outcome<GrayImage> {
     let layouts = [
         Layout::Uniform {},
         Layout::Clusters(Clusters { count: 4.0.into(), radius_um: 14.0.into(), outside: 0.03.into() }),
-        Layout::Swath(Swath { width_um: 12.0.into(), outside: 0.03.into() }),
+        Layout::Band(Band { width_um: 12.0.into(), outside: 0.03.into() }),
     ];
     let mut images = Vec::new();
     for layout in layouts {

@@ -44,7 +44,7 @@ fn bare() -> Recipe {
     recipe.cells.clear();
     recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe.camera.photon_noise = PhotonNoise::Off;
     recipe.camera.read_noise_e = 0.0.into();

@@ -99,7 +99,7 @@ fn class(name: &'static str, count: f64, group: Group) -> Entry {
 
 fn cells() -> Vec<Entry> {
     let group = |form, size: f64, distance: f64| Group { form, size: size.into(), distance: distance.into() };
-    let heap = |size| group(GroupForm::Heap, size, 0.85);
+    let heap = |size| group(GroupForm::Aggregate, size, 0.85);
     vec![
         zoomed_out(class("superficial", 1.0, Group::default())),
         zoomed_out(class("intermediate", 1.0, Group::default())),
@@ -162,7 +162,7 @@ fn debris() -> Vec<Entry> {
         entry("smudges", K::Smudge, |d| {
             (d.smudges.count, d.smudges.diameter_um) = (20.0.into(), Number::uniform(4.0, 20.0));
         }),
-        entry("dirt", K::Dirt, |d| d.dirt.drifts = 40.0.into()),
+        entry("dirt", K::Dirt, |d| d.dirt.clusters = 40.0.into()),
         entry("specks", K::Speckle, |d| d.speckles.count = 60.0.into()),
         entry("dye crystals", K::Crystal, |d| d.crystals.count = 60.0.into()),
         zoomed_out(entry("dust", K::Dust, |d| {

@@ -96,9 +96,9 @@ impl Detector {
         let params = JpegParams {
             quality: camera.jpeg_quality,
             subsampling: match camera.jpeg_subsampling {
-                Subsampling::Full => ccd_noise::Subsampling::Full,
-                Subsampling::Columns => ccd_noise::Subsampling::Columns,
-                Subsampling::Squares => ccd_noise::Subsampling::Squares,
+                Subsampling::S444 => ccd_noise::Subsampling::Full,
+                Subsampling::S422 => ccd_noise::Subsampling::Columns,
+                Subsampling::S420 => ccd_noise::Subsampling::Squares,
             },
             bit_depth: camera.bits,
         };
@@ -246,7 +246,7 @@ impl Channel {
     fn new(camera: &SceneCamera, bits: u32, relative_light: f64) -> Result<Self, Cause> {
         let largest = libm::exp2(f64::from(bits)) - 1.0;
         let offset_dn = camera.offset_dn * libm::exp2(f64::from(bits) - f64::from(camera.bits));
-        let (range_dn, glare) = (largest - offset_dn, camera.glare_removed);
+        let (range_dn, glare) = (largest - offset_dn, camera.glare_subtracted);
         let params = CameraParams {
             exposure_s: camera.exposure_s,
             dark_current_e_per_s: camera.dark_current_e_per_s,

@@ -17,7 +17,7 @@ use crate::transmit::MicroscopeCache;
 /// What a recipe names but does not hold.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {
-    /// The image that `layout.path` names, for [`Layout::Map`](crate::recipe::Layout::Map): brightness 0 to 1;
+    /// The image that `layout.path` names, for [`Layout::DensityMap`](crate::recipe::Layout::DensityMap): brightness 0 to 1;
     /// for [`Layout::Labels`](crate::recipe::Layout::Labels): 1 where a label lies, else 0.
     pub weight_map: Option<WeightMap>,
     /// What adds up how long the stages take.

@@ -212,7 +212,7 @@ pub(crate) struct Rerender {
 Examples:
   papsynth sweep --out sweep --frames 8 --vary focus.centre_um=-4,-2,0,2,4
   papsynth sweep mine.toml --out sweep --frames 20 --vary debris.bacilli.clusters=0,8,32 --vary camera.full_well_e=2000,18000
-  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 --vary background.illumination.x2=0,0.1,0.3")]
+  papsynth sweep --out sweep --frames 4 --vary stain.slide_nucleus=0.5,1,2 --vary background.illumination.falloff_x=0,0.1,0.3")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,

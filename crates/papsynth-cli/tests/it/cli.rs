@@ -67,7 +67,7 @@ const HOSTILE: [(&str, &str); 74] = [
     ("[camera]\nbits = 17", "camera.bits"),
     ("[camera]\noffset_dn = 200", "camera.offset_dn"),
     ("[camera]\nphoton_noise = \"poison\"", "camera.photon_noise: `poison` is not known"),
-    ("[background]\nlevel = 0.02\nscatter = 0.4", "background.scatter"),
+    ("[background]\nlevel = 0.02\ntexture = 0.4", "background.texture"),
     ("[background.illumination]\nkind = \"bowl\"\nexponent = 1", "background.illumination.exponent"),
     ("[layout]\nkind = \"cluster\"", "did you mean `clusters`?"),
     ("[layout]\nkind = \"map\"", "missing field `path`"),

@@ -6,7 +6,7 @@ use std::fs;
 use crate::support::Bench;
 
 /// Coarse pixels: many cells in few of them.
-const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields=1 \
+const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set field.pixel_um=0.5 --set slide.fields_per_slide=1 \
     --set cells.intermediate.count=5 --set cells.superficial.count=2 --set cells.parabasal.count=0 \
     --set cells.metaplastic.count=0 --quiet";
 
@@ -14,7 +14,7 @@ const FIELD: &str = "--set field.width_px=340 --set field.height_px=260 --set fi
 fn the_recipe_that_is_found_makes_fields() {
     let bench = Bench::new("match-finds");
     bench.good(&format!(
-        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.scatter=0.004 {FIELD}"
+        "generate --out real --frames 3 --seed 3 --set background.level=0.8 --set background.texture=0.004 {FIELD}"
     ));
     let outcome = bench.good("match real --out mine.toml --report mine.json --budget 90 --seed 1 --threads 2");
     assert!(outcome.out.starts_with("3 fields, 3 windows, "), "{}", outcome.out);

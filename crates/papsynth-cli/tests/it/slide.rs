@@ -27,9 +27,9 @@ fn any_part_of_a_slide_is_made_alone() {
     refused(&bench, "slide tile --at 0,0 --size 99999,99999 --out no.png", "at once");
     refused(&bench, "slide tile --at 0 --out no.png", "two whole numbers");
     refused(&bench, "slide tile --at 0,0 --out no.png --set scan.frame_px=9", "scan.frame_px");
-    refused(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=swath", "layout.kind");
+    refused(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=band", "layout.kind");
     refused(&bench, "slide tile --at 0,0 --out no.png --set optics.imaging=abbe", "optics.imaging");
-    refused(&bench, "slide tile --at 27000,27000 --out no.png --set scan.reach_um=20", "scan.reach_um");
+    refused(&bench, "slide tile --at 27000,27000 --out no.png --set scan.max_object_radius_um=20", "scan.max_object_radius_um");
     refused(&bench, "slide tile --at 0,0 --size 20,20 --out no.jpg", "ends in .png");
     let planes = bench.good(&format!("slide tile {SMALL} --at 0,0 --size 20,20 --out planes.png --set focus.planes=3"));
     assert!(planes.err.contains("of 3 planes the middle one"), "{}", planes.err);
@@ -52,7 +52,7 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     let bench = Bench::new("slide-make");
     let make = format!("slide make {SMALL} --out slide --size 900,600 --shard-px 512");
     refused(&bench, &format!("{make} --max-memory 20MB"), "may be used");
-    refused(&bench, &format!("{make} --set scan.reach_um=20"), "scan.reach_um");
+    refused(&bench, &format!("{make} --set scan.max_object_radius_um=20"), "scan.max_object_radius_um");
     assert!(!bench.path("slide").exists());
     // The same files with as much as one thread needs.
     bench.good(&format!("{make} --threads 8 --max-memory 300MiB"));

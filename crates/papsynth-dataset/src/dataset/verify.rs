@@ -205,7 +205,7 @@ fn given_flaws(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Finding>,
 
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
-        recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
+        recipe::Layout::DensityMap { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
         _ => None,
     }
 }

@@ -27,8 +27,8 @@ pub struct InputFile {
 /// # Errors
 /// If the file cannot be read, or allows no place.
 pub fn read_inputs(recipe: &mut Recipe, folder: &Path, limits: &Limits) -> Result<(Inputs, Option<InputFile>), Error> {
-    let is_grey = matches!(recipe.layout, Layout::Map { .. });
-    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
+    let is_grey = matches!(recipe.layout, Layout::DensityMap { .. });
+    let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = &mut recipe.layout else {
         return Ok((Inputs::default(), None));
     };
     let found = folder.join(&path);

@@ -32,7 +32,7 @@ impl SlideSet {
     ///
     /// # Errors
     /// If the folder holds something else, or a slide of another recipe, model, seed, number, stream version or shard size, objects in the
-    /// middle of the deposit reach farther than `scan.reach_um`, or the system refuses.
+    /// middle of the deposit reach farther than `scan.max_object_radius_um`, or the system refuses.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use papsynth::recipe::Recipe;
-use papsynth::scene::{Kind, Scene};
+use papsynth::scene::{ClassCount, Kind, Scene};
 use papsynth::truth::{Group, Mask, Part, Truth};
 use papsynth::white_level;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,10 @@ pub struct FrameSummary {
     /// Number of places in each plane, in pixels, where the model of the optics would have given less light than there can
     /// be and a least one was put in its place: beside very dark things.
     pub floored: Vec<usize>,
+    /// Number of times that the objects were drawn: more than 1 if the cells of the first draws did not fit.
+    pub attempts: u32,
+    /// Number of cells requested and placed, by class.
+    pub cells: BTreeMap<String, ClassCount>,
     /// Number of objects and parts of cells by category, as `coco.json` names it.
     pub objects: BTreeMap<String, u64>,
     /// How many of them lie partly outside the image.
@@ -67,6 +71,8 @@ impl FrameSummary {
             planes_um: scene.planes_um.clone(),
             saturated: Vec::new(),
             floored: Vec::new(),
+            attempts: scene.attempts,
+            cells: scene.cells.clone(),
             objects: BTreeMap::new(),
             truncated: 0,
             most_layers: 0,

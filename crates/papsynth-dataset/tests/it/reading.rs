@@ -232,7 +232,7 @@ fn weight_maps_need_a_place() {
         Ok::<_, Error>((inputs.weight_map, file, named.layout))
     };
     assert_eq!(read(&recipe).unwrap(), (None, None, recipe.layout.clone()));
-    recipe.layout = Layout::Map { path: "map.png".to_owned() };
+    recipe.layout = Layout::DensityMap { path: "map.png".to_owned() };
     assert!(read(&recipe).unwrap_err().to_string().contains("map.png: there is no such file"));
     fs::write(scratch.join("map.png"), grey_png(&[0, 51, 255, 0], 2)).unwrap();
     let (found, file, layout) = read(&recipe).unwrap();
@@ -240,7 +240,7 @@ fn weight_maps_need_a_place() {
     assert_eq!((found.width, found.weights), (2, vec![0.0, 0.2, 1.0, 0.0]));
     let file = file.unwrap();
     assert_eq!(file.bytes, grey_png(&[0, 51, 255, 0], 2));
-    assert_eq!(layout, Layout::Map { path: file.name.clone() });
+    assert_eq!(layout, Layout::DensityMap { path: file.name.clone() });
     fs::write(scratch.join("map.png"), grey_png(&[0, 52, 255, 0], 2)).unwrap();
     assert_ne!(read(&recipe).unwrap().1.unwrap().name, file.name, "another content has another name");
     recipe.layout = Layout::Labels(Labels { path: "map.png".to_owned(), smooth_um: 1.0.into() });
@@ -248,7 +248,7 @@ fn weight_maps_need_a_place() {
     fs::write(scratch.join("map.png"), grey_png(&[0; 4], 2)).unwrap();
     let refused = |recipe: &Recipe| read(recipe).unwrap_err().to_string().contains("map.png: every pixel is 0");
     assert!(refused(&recipe));
-    recipe.layout = Layout::Map { path: "map.png".to_owned() };
+    recipe.layout = Layout::DensityMap { path: "map.png".to_owned() };
     assert!(refused(&recipe));
 }
 

@@ -122,12 +122,12 @@ fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
 fn what_asks_too_much_of_the_reach_begins_nothing() {
     let folder = Folder::new("reach");
     let mut short = recipe();
-    short.scan.reach_um = 20.0;
+    short.scan.max_object_radius_um = 20.0;
     let model = Model::builtin();
     let engine = Engine::new(&short, &model, &Inputs::default()).unwrap();
     let refused = SlideSet::create_or_resume(&folder.0, &engine.slide(SEED, 0).unwrap(), &info(&short, &model));
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("scan.reach_um") && !folder.0.exists(), "{refused}");
+    assert!(refused.contains("scan.max_object_radius_um") && !folder.0.exists(), "{refused}");
 }
 
 #[test]

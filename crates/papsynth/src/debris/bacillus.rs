@@ -6,7 +6,7 @@ section! {
     /// Rod-shaped bacteria ("Bacilli"), such as lactobacilli.
     pub struct Bacilli, drawn from rng as pub Bacillus {
         /// Number of clusters; drawn once a field.
-        clusters: Count (undrawn) = Number::log_normal(4.0, 0.8), 0..=100000;
+        clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(45.0, 0.8)), 0..=100000, "per field or per mm²";
         /// Bacilli of a cluster.
         per_cluster: Count (undrawn) = Number::log_normal(9.0, 0.9).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster.

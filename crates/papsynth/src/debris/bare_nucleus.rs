@@ -6,7 +6,7 @@ section! {
     /// Bare nuclei: what bacteria leave of intermediate cells.
     pub struct BareNuclei, drawn from rng as pub BareNucleus {
         /// Number of nuclei; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.5, 0.9), 0..=100000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(5.0, 0.9)), 0..=100000, "per field or per mm²";
         /// Share of the nuclei that lie on a cell.
         on_cells: Number (undrawn) = 0.15, 0..=1;
         /// Radius of the disc of the same area.

@@ -6,7 +6,7 @@ section! {
     /// Air bubbles in the mountant.
     pub struct Bubbles, drawn from rng as pub Bubble {
         /// Number of bubbles; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.08, 0.9), 0..=10000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.16, 0.9)), 0..=10000, "per field or per mm²";
         /// Radius.
         radius_um: Number = Number::log_normal(22.0, 0.45), 1..=250, "µm";
         /// Width of the dark rim relative to the radius.

@@ -6,7 +6,7 @@ section! {
     /// *Candida*: colonies of pseudohyphae and budding yeasts.
     pub struct Candidas, drawn from rng as pub Candida {
         /// Number of colonies; drawn once a field.
-        colonies: Count (undrawn) = Number::log_normal(0.08, 0.9), 0..=10000;
+        colonies: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.16, 0.9)), 0..=10000, "per field or per mm²";
         /// Pseudohyphae of a colony.
         hyphae: Count (given Growth as growth: "What it is.") = Number::uniform(1.0, 5.0), 0..=1000;
         /// Yeasts of a colony, most of them budding.

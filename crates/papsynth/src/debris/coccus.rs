@@ -6,7 +6,7 @@ section! {
     /// Cocci and coccobacilli, colony by colony.
     pub struct Cocci, drawn from rng as pub Colony {
         /// Number of colonies; drawn once a field.
-        colonies: Count (undrawn) = Number::log_normal(0.6, 1.1), 0..=100000;
+        colonies: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(6.4, 1.1)), 0..=100000, "per field or per mm²";
         /// Cocci of a colony.
         per_colony: Count (Count as cocci: "Number of cocci.") = Number::log_normal(30.0, 0.9).at_least(2.0), 1..=20000;
         /// Radius (standard deviation) of a cloud.

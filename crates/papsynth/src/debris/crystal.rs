@@ -6,7 +6,7 @@ section! {
     /// Precipitated dye: dark, angular, refracting grains.
     pub struct Crystals, drawn from rng as pub Crystal {
         /// Number of grains; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.45, 0.9), 0..=100000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(4.5, 0.9)), 0..=100000, "per field or per mm²";
         /// Share of the grains that lie on a cell.
         on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Diameter.

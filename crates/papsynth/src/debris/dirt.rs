@@ -7,8 +7,8 @@ section! {
     ///
     /// Each fleck lies at a depth of its own, but nobody counts them: the truth has one row and one mask for all of them.
     pub struct Dirt, drawn from rng as pub Fleck {
-        /// Number of drifts; drawn once a field.
-        drifts: Count (undrawn) = Number::log_normal(20.0, 0.7), 0..=100000;
+        /// Number of clusters; drawn once a field.
+        clusters: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(225.0, 0.7)), 0..=100000, "per field or per mm²";
         /// Flecks of a drift.
         per_drift: Count (undrawn) = Number::log_normal(4.0, 0.8).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a drift.
@@ -41,7 +41,7 @@ const ASTRAY_DEG: f64 = 14.0;
 impl Dirt {
     pub(super) fn draw(&self, ground: &mut Ground<'_, Fleck>) {
         let dyes = ground.dyes(&self.dyes);
-        for index in 0..ground.count(named!(self.drifts)) {
+        for index in 0..ground.count(named!(self.clusters)) {
             let mut rng = ground.stream(index, "drift");
             let drift = ground.cluster(&Number::Fixed(0.0), &self.drift_um, &mut rng);
             let direction_deg = random::between(0.0, 360.0, &mut rng);

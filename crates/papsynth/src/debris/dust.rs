@@ -7,7 +7,7 @@ section! {
     /// Dust on the cover glass or within the mountant.
     pub struct Dust, drawn from rng as pub Grain {
         /// Number of grains; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.12, 0.9), 0..=100000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.45, 0.9)), 0..=100000, "per field or per mm²";
         /// Diameter.
         diameter_um: Number = Number::log_normal(14.0, 0.5), 0.5..=200, "µm";
         /// How far above the cells it lies: 170 is the outside of a cover glass, less lies within the mountant.

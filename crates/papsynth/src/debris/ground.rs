@@ -2,17 +2,22 @@
 
 use crate::key::Stream;
 use crate::random;
+use crate::recipe::abundance::Abundance;
 use crate::recipe::dyes::DyeAmounts;
 use crate::recipe::number::Number;
 use crate::scene::stain::FieldStain;
-use crate::scene::view::{FieldNumbers, View};
+use crate::scene::view::{FieldNumbers, Region};
 
 /// A field whose cells have their places.
 pub(crate) struct Field<'a> {
-    pub(crate) view: View,
+    /// The field, and the field with its margin.
+    pub(crate) field: Region,
+    pub(crate) region: Region,
     pub(crate) numbers: &'a FieldNumbers,
     pub(crate) stain: &'a FieldStain<'a>,
+    /// Cells; the first `inside` have their centres in the field, the others in the margin.
     pub(crate) cells: Vec<CellPlace>,
+    pub(crate) inside: usize,
     /// What may lie on a part of a slide: how much there is relative to a field, and where it stays.
     pub(crate) sieve: Option<Sieve<'a>>,
 }
@@ -24,6 +29,8 @@ pub(crate) struct Ground<'a, T> {
     kind: &'static str,
     section: &'static str,
     lies_on_glass: bool,
+    /// Whether its objects also lie in the margin of the field.
+    in_margin: bool,
     pub(super) strewn: Vec<Strewn<T>>,
 }
 
@@ -87,18 +94,33 @@ const ON_TOP_UM: f64 = 0.8;
 const BENEATH: f64 = 0.25;
 
 impl<'a, T> Ground<'a, T> {
-    pub(super) fn new(field: &'a Field<'a>, kind: &'static str, section: &'static str, lies_on_glass: bool) -> Self {
-        Self { field, kind, section, lies_on_glass, strewn: Vec::new() }
+    pub(super) fn new(
+        field: &'a Field<'a>,
+        kind: &'static str,
+        section: &'static str,
+        lies_on_glass: bool,
+        in_margin: bool,
+    ) -> Self {
+        Self { field, kind, section, lies_on_glass, in_margin, strewn: Vec::new() }
     }
 
-    /// A number of the section that is drawn once a field, as a count.
-    pub(super) fn count(&self, (name, number): (&str, &Number)) -> u64 {
+    /// Draws the number of objects, or of clusters, of the field or of the part of a slide.
+    pub(super) fn count(&self, (name, abundance): (&str, &Abundance)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
-        let numbers = self.field.numbers;
-        let Some(sieve) = &self.field.sieve else { return numbers.count((&path, number)) as u64 };
+        let (numbers, area_mm2) = (self.field.numbers, self.field.region.area_mm2());
+        let Some(sieve) = &self.field.sieve else { return numbers.number_of((&path, abundance), area_mm2) };
         let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        let wanted = numbers.draw((&path, number)).max(0.0) * sieve.share * more;
-        numbers.whole(&path, wanted)
+        numbers.number_on_slide((&path, abundance), [area_mm2, sieve.share], more)
+    }
+
+    /// Returns the area where the objects lie.
+    fn region(&self) -> Region {
+        if self.in_margin { self.field.region } else { self.field.field }
+    }
+
+    /// Returns the cells there.
+    fn cells(&self) -> &[CellPlace] {
+        if self.in_margin { &self.field.cells } else { &self.field.cells[..self.field.inside] }
     }
 
     /// The stream of a purpose of one object of the kind.
@@ -123,18 +145,18 @@ impl<'a, T> Ground<'a, T> {
 
     /// Any place of the field.
     pub(super) fn anywhere(&self, rng: &mut Stream) -> [f64; 2] {
-        let [width, height] = self.field.view.size_um();
-        [random::between(0.0, width, rng), random::between(0.0, height, rng)]
+        let Region { low_um: [left, top], size_um: [width, height] } = self.region();
+        [left + random::between(0.0, width, rng), top + random::between(0.0, height, rng)]
     }
 
     /// A cluster on a cell or anywhere.
     pub(super) fn cluster(&self, on_cells: &Number, radius_um: &Number, rng: &mut Stream) -> Cluster {
         let on_cell = random::chance(on_cells.draw(rng), rng);
         let radius_um = radius_um.draw(rng);
-        let cell = random::below(self.field.cells.len(), rng);
+        let cell = random::below(self.cells().len(), rng);
         let (angle, distance) = (random::direction(rng), random::uniform(rng).sqrt());
         let anywhere = self.anywhere(rng);
-        match self.field.cells.get(cell) {
+        match self.cells().get(cell) {
             Some(cell) if on_cell => {
                 let reach = distance * cell.radius_um * 0.9;
                 let centre_um =
@@ -148,7 +170,7 @@ impl<'a, T> Ground<'a, T> {
     /// Strews objects that lie anywhere. `draw` draws one, by its number, from its stream, and `depth_um` its depth.
     pub(super) fn strew_anywhere(
         &mut self,
-        count: (&str, &Number),
+        count: (&str, &Abundance),
         draw: impl Fn(&Self, u64, &mut Stream) -> T,
         depth_um: impl Fn(&mut Stream) -> f64,
     ) {
@@ -164,7 +186,7 @@ impl<'a, T> Ground<'a, T> {
     /// Strews objects of which a share lies on cells. `draw` draws one from its stream.
     pub(super) fn strew_on_cells(
         &mut self,
-        count: (&str, &Number),
+        count: (&str, &Abundance),
         on_cells: &Number,
         draw: impl Fn(&mut Stream) -> T,
     ) {
@@ -182,7 +204,7 @@ impl<'a, T> Ground<'a, T> {
     /// Strews clusters of objects. `draw` draws one, by its number, from its stream.
     pub(super) fn strew_in_clusters(
         &mut self,
-        count: (&str, &Number),
+        count: (&str, &Abundance),
         clusters: &Clusters<'_>,
         draw: impl Fn(&Self, u64, &mut Stream) -> T,
     ) {

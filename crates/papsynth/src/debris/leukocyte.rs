@@ -19,7 +19,7 @@ section! {
     /// White blood cells ("White blood cells", Eqs. 6, 7, Fig. 9).
     pub struct Leukocytes {
         /// Number of clusters; drawn once a field.
-        clusters: Count = Number::log_normal(2.4, 1.0), 0..=100000;
+        clusters: Abundance = Abundance::per_mm2(Number::log_normal(27.0, 1.0)), 0..=100000, "per field or per mm²";
         /// Leukocytes of a cluster.
         per_cluster: Count = Number::log_normal(1.7, 0.75).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a cluster; of lobed ones that of those which do not touch another.

@@ -30,6 +30,7 @@ mod trichomonad;
 use serde::{Deserialize, Serialize};
 
 use crate::phantom::piece::Phantom;
+use crate::recipe::abundance::Abundance;
 use crate::recipe::section::section;
 use crate::scene::cell::CellBody;
 use crate::words::words;
@@ -72,6 +73,7 @@ mod prelude {
     pub(super) use crate::phantom::piece::{MIN_ABSORBANCE, Phantom};
     pub(super) use crate::phantom::tile::{Point, Tile, area};
     pub(super) use crate::random;
+    pub(super) use crate::recipe::abundance::Abundance;
     pub(super) use crate::recipe::dyes::DyeAmounts;
     pub(super) use crate::recipe::number::{Count, Number};
     pub(super) use crate::recipe::section::{named, section};
@@ -168,9 +170,22 @@ macro_rules! kinds {
                 }
             }
 
-            /// The number that says how many there are of a kind; of cells none does.
+            /// Returns the abundance of a kind; none of cells.
+            pub(crate) fn abundance(&self, kind: Kind) -> Option<&Abundance> {
+                match kind {
+                    Kind::Cell => None,
+                    $(Kind::$Kind => Some(&self.$field.$count),)*
+                }
+            }
+
+            /// Returns the abundance of each kind, with its key.
+            pub(crate) fn abundances(&self) -> Vec<(&'static str, &Abundance)> {
+                vec![$((concat!("debris.", stringify!($field), ".", stringify!($count)), &self.$field.$count)),*]
+            }
+
+            /// Returns the abundance of a kind; none of cells.
             #[cfg(test)]
-            fn count_mut(&mut self, kind: Kind) -> Option<&mut crate::recipe::Number> {
+            fn count_mut(&mut self, kind: Kind) -> Option<&mut Abundance> {
                 match kind {
                     Kind::Cell => None,
                     $(Kind::$Kind => Some(&mut self.$field.$count),)*
@@ -182,7 +197,8 @@ macro_rules! kinds {
                 let mut strewn = Vec::new();
                 $({
                     let kind = Kind::$Kind;
-                    let mut ground = Ground::new(field, kind.name(), stringify!($field), kind.lies_on_glass());
+                    let in_margin = self.$field.$count.is_density();
+                    let mut ground = Ground::new(field, kind.name(), stringify!($field), kind.lies_on_glass(), in_margin);
                     self.$field.draw(&mut ground);
                     strewn.extend(ground.strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| {
                         Strewn { number, cluster, lie, thing: Body::$Kind(thing) }
@@ -207,7 +223,7 @@ kinds! {
     /// Amorphous debris: granular clumps.
     smudges: Smudges { count } => Smudge(Smudge), "smudge";
     /// Faint flecks of background dirt.
-    dirt: Dirt { drifts } => Dirt(Fleck), "dirt";
+    dirt: Dirt { clusters } => Dirt(Fleck), "dirt";
     /// Cocci and coccobacilli, colony by colony.
     cocci: Cocci { colonies } => Coccus(Colony), "coccus";
     /// *Candida*: pseudohyphae and budding yeasts.

@@ -6,7 +6,7 @@ section! {
     /// Strands of mucus, bundles of faint fibres.
     pub struct Mucus, drawn from rng as pub Strand {
         /// Number of strands; drawn once a field.
-        strands: Count (undrawn) = Number::log_normal(0.3, 0.8), 0..=10000;
+        strands: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(2.4, 0.8)), 0..=10000, "per field or per mm²";
         /// Share of the strands that lie on a cell.
         on_cells: Number (undrawn) = 0.3, 0..=1;
         /// Length of a strand.

@@ -6,7 +6,7 @@ section! {
     /// Objects far outside the depth of the slide ("Out of focus objects").
     pub struct OutOfFocus, drawn from rng as pub Blob {
         /// Number of objects; drawn once a field.
-        count: Count (undrawn) = Number::uniform(0.0, 3.0), 0..=100000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::uniform(0.0, 34.0)), 0..=100000, "per field or per mm²";
         /// Radius (s of Eq. 7).
         radius_um: Number = Number::log_normal(9.0, 0.5), 0.3..=500, "µm";
         /// Range of the radial perturbation (α of Eq. 7).

@@ -6,7 +6,7 @@ section! {
     /// Scratches in the slide or in the cover glass.
     pub struct Scratches, drawn from rng as pub Scratch {
         /// Number of scratches; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(0.12, 0.8), 0..=10000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.3, 0.8)), 0..=10000, "per field or per mm²";
         /// Length.
         length_um: Number = Number::uniform(20.0, 120.0), 5..=500, "µm";
         /// Width.

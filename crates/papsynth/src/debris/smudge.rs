@@ -6,7 +6,7 @@ section! {
     /// Amorphous debris: granular clumps of what was left of cells, mucus and bacteria.
     pub struct Smudges, drawn from rng as pub Smudge {
         /// Number of clumps; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(9.0, 0.8), 0..=100000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(100.0, 0.8)), 0..=100000, "per field or per mm²";
         /// Share of the clumps that lie on a cell.
         on_cells: Number (undrawn) = 0.25, 0..=1;
         /// Diameter of a clump.

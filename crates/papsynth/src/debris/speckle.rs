@@ -16,7 +16,7 @@ section! {
     /// Specks of dust and stain ("Speckles").
     pub struct Speckles, drawn from rng as pub Speckle {
         /// Number of speckles; drawn once a field.
-        count: Count (undrawn) = Number::log_normal(6.0, 0.7), 0..=1000000;
+        count: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(67.0, 0.7)), 0..=1000000, "per field or per mm²";
         /// How it is grown from its two pixels.
         form: SpeckForm = SpeckForm::Round;
         /// How often a speckle is grown by a pixel to all sides (binary dilation).

@@ -6,7 +6,7 @@ section! {
     /// Trichomonads, pale pear-shaped flagellates.
     pub struct Trichomonads, drawn from rng as pub Trichomonad {
         /// Number of groups; drawn once a field.
-        groups: Count (undrawn) = Number::log_normal(0.07, 0.9), 0..=100000;
+        groups: Abundance (undrawn) = Abundance::per_mm2(Number::log_normal(0.11, 0.9)), 0..=100000, "per field or per mm²";
         /// Trichomonads of a group.
         per_group: Count (undrawn) = Number::log_normal(5.0, 0.7).at_least(1.0), 1..=10000;
         /// Radius (standard deviation) of a group.

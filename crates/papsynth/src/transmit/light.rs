@@ -68,7 +68,7 @@ fn background(scene: &Scene) -> Result<Background, Cause> {
     let illumination = match scene.background.illumination {
         SceneIllumination::Border { exponent } => Illumination::BorderDistance { exponent },
         // 1 − x2 (x − tx)² − … with its maximum off the centre is a tilted parabola; its constant is part of the level.
-        SceneIllumination::Bowl { x2, y2, top } => {
+        SceneIllumination::Quadratic { falloff_x: x2, falloff_y: y2, centre: top } => {
             Illumination::Bowl { x2, y2, tilt: [2.0 * x2 * top[0], 2.0 * y2 * top[1]] }
         }
     };
@@ -76,8 +76,8 @@ fn background(scene: &Scene) -> Result<Background, Cause> {
         level: scene.background.level,
         illumination,
         scatter: Scatter {
-            strength: scene.background.scatter,
-            cell_px: (scene.background.scatter_um / view.pixel_um).max(1.0),
+            strength: scene.background.texture,
+            cell_px: (scene.background.texture_um / view.pixel_um).max(1.0),
             noise: FractalParams::default(),
             ..Scatter::default()
         },

@@ -15,7 +15,7 @@ fn empty() -> Recipe {
     recipe.cells.clear();
     recipe.debris = Debris::none();
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.background.level = 0.8.into();
     recipe
 }

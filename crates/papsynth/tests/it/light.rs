@@ -24,7 +24,7 @@ fn small() -> Recipe {
         mix.count = 2.0.into();
     }
     recipe.background.illumination = Illumination::Border(Border { exponent: 0.0.into() });
-    recipe.background.scatter = 0.0.into();
+    recipe.background.texture = 0.0.into();
     recipe.camera.bits = 16.0.into();
     recipe
 }
@@ -299,7 +299,7 @@ fn cytoplasm_takes_the_tint_of_its_dyes() {
 #[test]
 fn fields_of_one_slide_have_the_same_stain() {
     let mut recipe = small();
-    recipe.slide.fields = 4;
+    recipe.slide.fields_per_slide = 4;
     recipe.stain.field_balance = 0.0.into();
     recipe.stain.slide_balance = 0.5.into();
     let engine = engine(&recipe);

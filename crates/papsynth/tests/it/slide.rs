@@ -1,7 +1,7 @@
 //! Complete slides: no seams, and no dependence on tiles, frames, order or slide size.
 
 use papsynth::model::Model;
-use papsynth::recipe::{Bowl, Colour, Illumination, Light, Preset, Recipe};
+use papsynth::recipe::{Colour, Illumination, Light, Preset, Quadratic, Recipe};
 use papsynth::slide::SlidePart;
 use papsynth::truth::Part;
 use papsynth::{Engine, Inputs, Threads};
@@ -17,7 +17,7 @@ fn recipe() -> Recipe {
 /// Sets uniform illumination, so that frames differ only in noise.
 fn uniformly_lit(mut recipe: Recipe) -> Recipe {
     recipe.background.illumination =
-        Illumination::Bowl(Bowl { x2: 0.0.into(), y2: 0.0.into(), off_centre: 0.0.into() });
+        Illumination::Quadratic(Quadratic { falloff_x: 0.into(), falloff_y: 0.into(), centre_offset: 0.into() });
     recipe
 }
 
@@ -188,7 +188,7 @@ fn every_object_has_one_row_and_its_mask_matches_the_labels() {
 fn density_matches_fields_inside_the_deposit_and_is_lower_outside() {
     let mut recipe = Preset::Lbc.recipe();
     (recipe.scan.width_px, recipe.scan.height_px) = (60_000, 60_000);
-    recipe.scan.deposit.unevenness = 0.0.into();
+    recipe.scan.deposit.density_variation = 0.0.into();
     let engine = engine(&recipe);
     let count = |slide: &papsynth::Slide<'_>, origin, size: u32| {
         let found = slide.objects(origin, [size; 2]).unwrap();

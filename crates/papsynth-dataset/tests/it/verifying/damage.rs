@@ -120,8 +120,10 @@ fn a_folder_where_a_file_belongs_is_found_and_gives_way() {
 #[test]
 fn before_it_is_merged_nothing_is_taken_for_a_stray() {
     let scratch = Scratch::new("unmerged");
-    let recipe =
-        papsynth::recipe::Recipe { layout: papsynth::recipe::Layout::Map { path: "map.png".to_owned() }, ..recipe() };
+    let recipe = papsynth::recipe::Recipe {
+        layout: papsynth::recipe::Layout::DensityMap { path: "map.png".to_owned() },
+        ..recipe()
+    };
     let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
     let map = papsynth_dataset::read::InputFile { name: "map.png".to_owned(), bytes: b"a map".to_vec() };
     let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: Some(&map), layout: &layout };

@@ -84,7 +84,7 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
         let nucleus_at = off_centre[0] * normal[0] + off_centre[1] * normal[1];
         let at = (reach - fold.depth * radius).max(nucleus_at + 1.3 * nucleus_radius);
         let turn = match fold.form {
-            FoldForm::Flap | FoldForm::Cigar => Turn::Flap,
+            FoldForm::Flap | FoldForm::FoldedOver => Turn::Flap,
             FoldForm::Roll => Turn::Roll { turns: 1 },
         };
         Crease {
@@ -102,7 +102,7 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
     }
     match fold.form {
         // The two creases are not exactly parallel.
-        FoldForm::Cigar => {
+        FoldForm::FoldedOver => {
             vec![crease(direction), crease(direction + core::f64::consts::PI + SKEW * libm::sin(7.0 * direction))]
         }
         FoldForm::Flap | FoldForm::Roll => vec![crease(direction)],
@@ -112,7 +112,7 @@ fn creases(cell: &CellContext<'_>, fold: Fold, outline: &[Point], centre: Point)
 fn crumple(assets: &PhantomAssets, cells: &[CellContext<'_>], plans: &[CellPlan]) -> Result<Vec<Option<Sheet>>, Cause> {
     let Some(cloth) = &assets.cloth else { return Ok(plans.iter().map(|_| None).collect()) };
     let jobs = cells.iter().zip(plans);
-    let jobs = jobs.map(|(cell, plan)| Job { outline: &plan.outline, excess: cell.body.detail.excess });
+    let jobs = jobs.map(|(cell, plan)| Job { outline: &plan.outline, excess: cell.body.detail.excess_area });
     let mut streams: Vec<Stream> = cells.iter().map(|cell| cell.stream("sheet")).collect();
     let sheets = cloth.crumple_each(&jobs.collect::<Vec<_>>(), &mut streams);
     sheets.into_iter().map(|sheet| Ok(Some(sheet?))).collect()
@@ -153,7 +153,7 @@ fn finish(cell: &CellContext<'_>, plan: CellPlan, sheet: Option<Sheet>) -> Resul
         }
         None => flat(&mut absorbance, &coverage, profile, plan.centre, body.radius_um / pixel_um),
     }
-    detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.wedge);
+    detail::apply_gradient(&mut absorbance, plan.centre, body.radius_um / pixel_um, body.detail.thickness_gradient);
     detail::thin_rim(&mut absorbance, &coverage, body.detail.rim_um / pixel_um);
     let nucleus = [0, 1].map(|axis| plan.centre[axis] + body.nucleus.off_centre[axis] * body.radius_um / pixel_um);
     wrinkles::add(&mut absorbance, &coverage, &plan.outline, cell);
@@ -178,7 +178,7 @@ fn traits(body: &CellBody) -> Vec<Trait> {
     let fold = body.fold.map(|fold| match fold.form {
         FoldForm::Flap => Trait::Flap,
         FoldForm::Roll => Trait::Rolled,
-        FoldForm::Cigar => Trait::Folded,
+        FoldForm::FoldedOver => Trait::Folded,
     });
     let koilocytic = body.halo.map(|_| Trait::Koilocytic);
     let granular = (body.detail.granules > 0.0).then_some(Trait::Granular);

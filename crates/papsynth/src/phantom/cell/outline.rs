@@ -26,14 +26,14 @@ const SMOOTHING_PASSES: usize = 6;
 ///
 /// Changes that would make the outline cross itself are skipped.
 pub(super) fn shaped(outline: Vec<Point>, detail: &CellDetail, rng: &mut Stream) -> Vec<Point> {
-    if detail.corners <= 0.0 && detail.notches == 0 && detail.tongues == 0 {
+    if detail.angularity <= 0.0 && detail.notches == 0 && detail.protrusions == 0 {
         return outline;
     }
     let before = area(&outline);
     let middle = fsd_shape::centroid(&outline);
-    let mut shape = simple(angular(&outline, detail.corners, rng)).unwrap_or(outline);
+    let mut shape = simple(angular(&outline, detail.angularity, rng)).unwrap_or(outline);
     let radius = (before / core::f64::consts::PI).sqrt();
-    for (count, [low, high], sign) in [(detail.notches, NOTCH, -1.0), (detail.tongues, PROTRUSION, 1.0)] {
+    for (count, [low, high], sign) in [(detail.notches, NOTCH, -1.0), (detail.protrusions, PROTRUSION, 1.0)] {
         for _ in 0..count {
             let depth = sign * radius * low * libm::pow(high / low, random::between(0.0, 1.0, rng));
             if let Some(changed) = simple(displaced(&shape, depth, rng)) {

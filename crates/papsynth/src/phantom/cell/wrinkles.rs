@@ -45,7 +45,7 @@ pub(super) fn add(thickness: &mut Tile, coverage: &Tile, outline: &[Point], cell
         };
         let profile = WrinkleProfile {
             width: detail.wrinkle_um * random::between(0.6, 1.6, rng) / pixel_um,
-            strength: detail.wrinkle * random::between(0.4, 1.6, rng),
+            strength: detail.wrinkle_thickness * random::between(0.4, 1.6, rng),
             side: if random::chance(0.5, rng) { 1.0 } else { -1.0 },
             rise: random::between(0.05, TAPER, rng),
             fall: random::between(0.1, 2.0 * TAPER, rng),
