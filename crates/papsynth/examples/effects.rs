@@ -163,12 +163,12 @@ fn base(section: &str) -> Recipe {
 
 /// Returns the recipe with enough debris that a small field contains some of each kind.
 fn abundant(recipe: &Recipe) -> Recipe {
-    const COUNTS: [&str; 6] = ["count", "clusters", "colonies", "groups", "strands", "share"];
+    const COUNTS: [&str; 6] = ["count", "clusters", "colonies", "groups", "strands", "fraction"];
     let mut whole = serde_json::to_value(recipe).unwrap_or_default();
     if let Some(kinds) = whole.get_mut("debris").and_then(Value::as_object_mut) {
         for kind in kinds.values_mut().filter_map(Value::as_object_mut) {
             for (name, value) in kind.iter_mut().filter(|(name, _)| COUNTS.contains(&name.as_str())) {
-                *value = json!(if name == "share" { 0.5 } else { 2.0 });
+                *value = json!(if name == "fraction" { 0.5 } else { 2.0 });
             }
         }
     }

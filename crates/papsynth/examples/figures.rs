@@ -189,7 +189,7 @@ fn leukocytes() -> Outcome<GrayImage> {
     let mut recipe = empty();
     recipe.debris.leukocytes.clusters = 1.0.into();
     recipe.debris.leukocytes.per_cluster = 9.0.into();
-    recipe.debris.leukocytes.halo = 0.0.into();
+    recipe.debris.leukocytes.cytoplasm_absorbance = 0.0.into();
     let frame = frame(&recipe, 2)?;
     let first = of_kind(&frame, Kind::Leukocyte).first().copied().ok_or("no leukocyte")?;
     let mut masks = frame.clone();

@@ -146,7 +146,7 @@ fn debris() -> Vec<Entry> {
         entry("cocci", K::Coccus, |d| {
             (d.cocci.colonies, d.cocci.per_colony) = (12.0.into(), 60.0.into());
         }),
-        zoomed_out(with_cells(entry("clue cell", K::Cell, |d| d.clue_cells.share = 1.0.into()))),
+        zoomed_out(with_cells(entry("clue cell", K::Cell, |d| d.clue_cells.fraction = 1.0.into()))),
         entry("candida", K::Candida, |d| {
             d.candida.colonies = 1.0.into();
             d.candida.hyphae = 4.0.into();

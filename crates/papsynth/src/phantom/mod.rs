@@ -13,7 +13,7 @@ pub(crate) mod parametric_shape;
 pub(crate) mod piece;
 pub(crate) mod tile;
 
-use crate::debris::{Site, cover};
+use crate::debris::{ObjectContext, add_coat};
 use crate::error::Cause;
 use crate::profile::Stage;
 use crate::scene::{Body, Object, Scene, View};
@@ -41,7 +41,7 @@ pub(crate) fn make<'a>(
     assets.timer.time(Stage::Debris, || {
         for (cell, phantom) in cells.iter().zip(&mut made) {
             if let Some(coat) = &cell.object.coat {
-                cover(coat, &site(scene, noise_fields, cell.object), phantom);
+                add_coat(coat, &object_context(scene, noise_fields, cell.object), phantom);
             }
         }
         let mut cells = made.into_iter();
@@ -54,12 +54,12 @@ pub(crate) fn make<'a>(
 
 /// Draws the phantom of an object other than an epithelial cell.
 pub(crate) fn debris(scene: &Scene, noise_fields: &NoiseFields<'_>, object: &Object) -> Option<Phantom> {
-    object.body.phantom(&site(scene, noise_fields, object))
+    object.body.phantom(&object_context(scene, noise_fields, object))
 }
 
-fn site<'a>(scene: &Scene, noise_fields: &'a NoiseFields<'a>, object: &Object) -> Site<'a> {
+fn object_context<'a>(scene: &Scene, noise_fields: &'a NoiseFields<'a>, object: &Object) -> ObjectContext<'a> {
     let grid = scene.grid();
-    Site {
+    ObjectContext {
         dyes: scene.dyes,
         view: scene.view,
         oversampling: scene.oversampling(),

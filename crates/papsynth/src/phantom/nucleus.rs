@@ -123,7 +123,8 @@ fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
         let (dx, dy) = (p[0] - centre[0], p[1] - centre[1]);
         let rho2 = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
         let chord = (1.0 - rho2).max(0.0).sqrt() / MEAN_CHORD;
-        let slant = (dx * nucleus.thickness_gradient[0] + dy * nucleus.thickness_gradient[1]) / determinant.sqrt().sqrt();
+        let slant =
+            (dx * nucleus.thickness_gradient[0] + dy * nucleus.thickness_gradient[1]) / determinant.sqrt().sqrt();
         *value = ((1.0 - dome + dome * chord) * (1.0 + slant).max(0.0)) as f32;
     });
 }
