@@ -147,7 +147,7 @@ fn detail() -> Outcome<GrayImage> {
         recipe.cytoplasm.granular = 0.0.into();
         recipe.cytoplasm.folds.flap = 0.0.into();
         recipe.cytoplasm.folds.roll = 0.0.into();
-        recipe.cytoplasm.folds.cigar = 0.0.into();
+        recipe.cytoplasm.folds.folded_over = 0.0.into();
         let frame = frame(&recipe, 3)?;
         let cell = frame.finished.truth.objects.iter().find(|o| o.part == Part::Cytoplasm).ok_or("no cell")?;
         images.push(crop(&frame, cell, 240, 1));
