@@ -4,9 +4,9 @@
 //! cargo run --release -p papsynth --example default_model -- REFERENCE crates/papsynth/model/default.json
 //! ```
 //!
-//! Outlines and chromatin are learned from `REFERENCE/outlines` and `REFERENCE/nuclei` (statistics only). Sizes are those of
-//! the Herlev table (log-normal, Jantzen et al. 2005); absorbances were measured on monochrome fields of liquid-based
-//! cytology and on the authors' nuclei.
+//! Outlines and chromatin are learned from `REFERENCE/outlines` and `REFERENCE/nuclei` (statistics only). Sizes are
+//! those of the Herlev table (log-normal, Jantzen et al. 2005); absorbances were measured on monochrome fields of
+//! liquid-based cytology and on the authors' nuclei.
 
 #![expect(
     clippy::cast_possible_truncation,

@@ -1,8 +1,8 @@
 //! Shows the effect of every parameter of a section of the recipe: `effects SECTION OUT.png`.
 //!
 //! Each row is one parameter: the same small field with a low, the default and a high value, or with each value of an
-//! enumeration. Rows are enumerated from the recipe itself, for all its kinds, so they are complete except for layouts that
-//! need a file.
+//! enumeration. Rows are enumerated from the recipe itself, for all its kinds, so they are complete except for layouts
+//! that need a file.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 

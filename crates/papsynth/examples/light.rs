@@ -1,7 +1,7 @@
 //! Draws images that show the optics: `light NAME OUT.png`, NAME one of focus, halo, colour.
 //!
-//! focus: a nucleus at five stage positions, with the product model (the default), Abbe's integration over the source, and the
-//! paper's Gaussians. halo: a refracting speck through focus, with the same models. colour: a field in colour.
+//! focus: a nucleus at five stage positions, with the product model (the default), Abbe's integration over the source,
+//! and the paper's Gaussians. halo: a refracting speck through focus, with the same models. colour: a field in colour.
 
 #![expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small program with small numbers")]
 

@@ -1,7 +1,7 @@
 //! Times the workload of the Python reference program: `peer_workload frame|stack|throughput COUNT [THREADS]`.
 //!
-//! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and peak resident memory.
-//! Includes the ground truth of every image; writes no files.
+//! Prints one line of JSON with the medians of process CPU time and wall time per frame or stack, and peak resident
+//! memory. Includes the ground truth of every image; writes no files.
 
 #![expect(clippy::print_stdout, reason = "the program prints its measurements")]
 

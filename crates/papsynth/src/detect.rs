@@ -232,8 +232,8 @@ impl Detector {
         }
     }
 
-    /// Returns the difference in grey level between a pixel with `without` and with `electrons` mean electrons, relative to
-    /// the noise of the latter.
+    /// Returns the difference in grey level between a pixel with `without` and with `electrons` mean electrons,
+    /// relative to the noise of the latter.
     pub(crate) fn contrast(&self, channel: usize, electrons: f64, without: f64) -> f64 {
         let camera = &self.channels[channel].camera;
         let noise_dn = camera.noise_dn(electrons).max(f64::MIN_POSITIVE);
@@ -302,8 +302,8 @@ fn scale_and_add(values: &mut [f32], scale: f32, offset: f32) {
     values.iter_mut().for_each(|value| *value = *value * scale + offset);
 }
 
-/// Returns the sum of the pixels of runs inside a tile of `width` columns whose upper left pixel is pixel `origin` of the
-/// image. The order of the additions is fixed.
+/// Returns the sum of the pixels of runs inside a tile of `width` columns whose upper left pixel is pixel `origin` of
+/// the image. The order of the additions is fixed.
 #[multiversion(targets = "simd")]
 pub(crate) fn sum_over(runs: &[Run], tile: &[f32], width: usize, origin: [i64; 2]) -> f64 {
     /// Number of parallel partial sums.

@@ -1,14 +1,15 @@
 //! Correlated noise of an extended-depth-of-field (EDF) image, which is fused from several planes.
 //!
-//! On the empty slide, fusion weights change slowly from pixel to pixel, after filters and subpixel shifts, which correlates
-//! noise. In structured regions the sharpest plane changes every few pixels, and the correlation is weaker. The correlations
-//! were measured on real EDF images.
+//! On the empty slide, fusion weights change slowly from pixel to pixel, after filters and subpixel shifts, which
+//! correlates noise. In structured regions the sharpest plane changes every few pixels, and the correlation is weaker.
+//! The correlations were measured on real EDF images.
 
 use crate::scene::Fusion;
 
 /// Filters the noise, the difference between grey levels and expected grey levels, so that neighbours are correlated.
 ///
-/// The variance of the noise is unchanged, except just below the highest grey level. Input has `bits[0]`, output `bits[1]`.
+/// The variance of the noise is unchanged, except just below the highest grey level. Input has `bits[0]`, output
+/// `bits[1]`.
 pub(crate) fn correlate(
     grey: &mut [u16],
     expected: &mut [f32],
@@ -62,22 +63,27 @@ pub(crate) fn correlate(
             let [left, right] = [-1, 1].map(|step| mirrored(x, step, width) * channels + channel);
             let diagonals = shared[below + right] + shared[above + left] - shared[below + left] - shared[above + right];
             let at = y * row + i;
-            let alone = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
-            let rest = 1.0 - alone;
+            let uncorrelated = structure[at] / (structure[at] + half).max(f32::MIN_POSITIVE);
+            let correlated = 1.0 - uncorrelated;
             // The filtered noise includes the pixel's own noise, so the two variances do not simply add.
-            let norm = (alone * alone + rest * rest + 2.0 * alone * rest * centre).sqrt();
+            let norm =
+                (uncorrelated * uncorrelated + correlated * correlated + 2.0 * uncorrelated * correlated * centre)
+                    .sqrt();
             let step = ((top - expected[at]).max(0.0) * per_level) as usize;
-            let value = remaining[step.min(STEPS)] * (alone * own[at] + rest * (shared[at] + skew * diagonals)) / norm;
+            let value = remaining[step.min(STEPS)]
+                * (uncorrelated * own[at] + correlated * (shared[at] + skew * diagonals))
+                / norm;
             *grey = (expected[at] + value + 0.5).clamp(0.0, top) as u16;
         }
     }
 }
 
-/// Variance of structure, relative to that of noise, at which half of a pixel's noise is uncorrelated: fitted to the noise
-/// on cytoplasm and nuclei of real EDF images.
+/// Variance of structure, relative to that of noise, at which half of a pixel's noise is uncorrelated: fitted to the
+/// noise on cytoplasm and nuclei of real EDF images.
 const HALF_UNCORRELATED: f64 = 15.0;
 
-/// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey level.
+/// Noise of a plane relative to that of the fused image: fitted to the decrease of noise just below the highest grey
+/// level.
 const PLANE_NOISE: f64 = 2.0;
 
 /// Number of steps of the table of clipped noise, and its range in standard deviations.
@@ -144,8 +150,8 @@ fn mirrored(at: usize, step: i64, count: usize) -> usize {
 /// Correlation of noise two pixels apart, in x and y: measured on EDF images.
 const SECOND_NEIGHBOUR: [f64; 2] = [-0.025, 0.01];
 
-/// Returns the centre and right half of the symmetric filter (b, a, 1, a, b), normalised by the root of the sum of squares,
-/// that gives these correlations: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
+/// Returns the centre and right half of the symmetric filter (b, a, 1, a, b), normalised by the root of the sum of
+/// squares, that gives these correlations: ρ₁ = 2a(1 + b)/n, ρ₂ = (2b + a²)/n with n = 1 + 2a² + 2b².
 fn kernel(correlation: f64, second: f64) -> [f32; 3] {
     /// Steps of the fixed-point iteration, far more than convergence to a fraction of a per mille needs.
     const STEPS: usize = 60;

@@ -16,7 +16,7 @@ use crate::threads::{self, Threads};
 use crate::transmit::{FocusAt, LightBuffers, LightPath, MicroscopeCache, RowBand, Specimen};
 use crate::truth::{COVERED, Group, Mask, ObjectTruth, Part, Run, Truth, merge_layers, visible_masks_in};
 
-/// Buffers that are reused from image to image: allocation takes a noticeable share of the time of an image.
+/// Buffers that are reused from image to image, because allocation is slow relative to rendering.
 #[derive(Debug, Default)]
 pub(crate) struct FrameBuffers {
     light: LightBuffers,
@@ -157,7 +157,8 @@ impl Rendering {
 
     /// Returns the noise keys of a plane, one for each channel.
     ///
-    /// They depend on the stage position (to 10⁻⁶ µm) and not on the plane index, so other planes do not change the noise.
+    /// They depend on the stage position (to 10⁻⁶ µm) and not on the plane index, so other planes do not change the
+    /// noise.
     fn camera_keys(&self, stage_um: f64) -> Vec<u64> {
         let position = libm::round(stage_um * 1e6) as i64;
         let key = |purpose: &str| self.scene.own_key().stream("plane", position.cast_unsigned(), purpose).next_u64();
@@ -351,8 +352,8 @@ impl Rendering {
     }
 }
 
-/// Returns C′ = C ∗ G_σ, where C is 1 on nuclei with imaged texture and 0 elsewhere (Eq. 16), so that these are not blurred
-/// twice. Returns `None` if there are no such nuclei or restoration is off.
+/// Returns C′ = C ∗ G_σ, where C is 1 on nuclei with imaged texture and 0 elsewhere (Eq. 16), so that these are not
+/// blurred twice. Returns `None` if there are no such nuclei or restoration is off.
 fn feathered(scene: &Scene, phantoms: &[Phantom]) -> Result<Option<Vec<f32>>, Cause> {
     let (View { width, height, pixel_um }, n) = (scene.view, scene.oversampling());
     let imaged = || phantoms.iter().flat_map(|phantom| &phantom.pieces).filter(|piece| piece.imaged);

@@ -57,7 +57,7 @@ impl BareNucleus {
         let stretch = self.elongation.sqrt();
         let shape = perturbed_circle(self.radius_um, 0.04, 0.08, &mut rng);
         let scaled = |by: f64| -> Vec<Point> {
-            shape.iter().map(|p| context.place([by * stretch * p[0], by * p[1] / stretch])).collect()
+            shape.iter().map(|p| context.to_grid([by * stretch * p[0], by * p[1] / stretch])).collect()
         };
         let outline = scaled(1.0);
         let mut nucleus = context.canvas(&outline, 1.2 * self.radius_um);
@@ -74,7 +74,7 @@ impl BareNucleus {
             let (angle, reach) = (random::direction(&mut rng), self.radius_um * random::between(1.0, 1.8, &mut rng));
             let ends = [0.7 * self.radius_um, reach];
             let bend = angle + 0.3 * random::normal(&mut rng);
-            let ends = ends.map(|r| context.place([r * libm::cos(bend), r * libm::sin(angle)]));
+            let ends = ends.map(|r| context.to_grid([r * libm::cos(bend), r * libm::sin(angle)]));
             let half_width = context.px(self.radius_um * random::between(0.12, 0.45, &mut rng));
             shreds.stroke(&Stroke { ends, half_widths: [half_width, 0.4 * half_width] }, self.shreds);
         }

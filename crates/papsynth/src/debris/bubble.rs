@@ -36,7 +36,7 @@ impl Bubble {
         let mut rng = context.stream("shape");
         // Surface tension keeps it round.
         let circle = perturbed_circle(self.radius_um, 0.004, 0.01, &mut rng);
-        let outline = context.places(&circle);
+        let outline = context.curve_to_grid(&circle);
         let mut canvas = context.canvas(&outline, 0.0);
         canvas.coverage.cover(&outline);
         let radius = context.px(self.radius_um);

@@ -63,7 +63,7 @@ impl Candidas {
                 let width_um = self.width_um.draw(&mut rng);
                 let width_um = if growth == Growth::Hypha { width_um } else { yeast_diameter_um };
                 let candida = Candida { growth, width_um, yeast_diameter_um, dyes, ..self.one(&mut rng) };
-                let centre_um = colony.place(&mut rng);
+                let centre_um = colony.draw_position(&mut rng);
                 let depth_um = colony.depth_um + 0.5 * random::normal(&mut rng);
                 let placement = Placement::with_random_rotation(centre_um, depth_um, &mut rng);
                 placer.add(number, cluster_id(index), placement, candida);
@@ -122,7 +122,7 @@ impl Candida {
         let placed: Vec<Stroke> = strokes
             .iter()
             .map(|(ends, widths)| Stroke {
-                ends: ends.map(|end| context.place(end)),
+                ends: ends.map(|end| context.to_grid(end)),
                 half_widths: widths.map(|width| context.px(0.5 * width)),
             })
             .collect();

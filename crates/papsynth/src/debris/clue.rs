@@ -1,7 +1,7 @@
 //! Clue cells: epithelial cells covered with coccobacilli, most densely at the rim and beyond it.
 //!
-//! The coat of bacteria is part of its cell: it follows the outline and folds of the cell and has its depth. The row of the
-//! cell in the ground truth has the trait `clue`.
+//! The coat of bacteria is part of its cell: it follows the outline and folds of the cell and has its depth. The row of
+//! the cell in the ground truth has the trait `clue`.
 
 use super::prelude::*;
 use crate::scene::view::FieldNumbers;

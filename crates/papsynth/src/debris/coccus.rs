@@ -58,7 +58,7 @@ impl Colony {
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
         let places = if self.chain { self.chain(&mut rng) } else { self.clumps(&mut rng) };
-        let places: Vec<(Point, f64)> = places.iter().map(|(at, way)| (context.place(*at), *way)).collect();
+        let places: Vec<(Point, f64)> = places.iter().map(|(at, way)| (context.to_grid(*at), *way)).collect();
         let half_width = 0.5 * self.diameter_um;
         let margin_um = half_width * self.elongation;
         let mut canvas = context.canvas(places.iter().map(|(at, _)| at), margin_um);

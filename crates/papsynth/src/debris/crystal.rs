@@ -34,7 +34,8 @@ impl Crystal {
 
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
-        let outline = context.places(&shard(0.5 * self.diameter_um, 5 + random::below(3, &mut rng), 0.3, &mut rng));
+        let outline =
+            context.curve_to_grid(&shard(0.5 * self.diameter_um, 5 + random::below(3, &mut rng), 0.3, &mut rng));
         let mut canvas = context.canvas(&outline, 0.0);
         canvas.fill(&outline, self.absorbance);
         canvas.into_phantom(self.dyes, self.phase_rad, self.absorbance)

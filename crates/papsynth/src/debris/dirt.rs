@@ -49,7 +49,7 @@ impl Dirt {
             for member in 0..self.per_cluster.draw_count(&mut rng).max(1) as u64 {
                 let number = member_number(index, member);
                 let mut rng = placer.stream(number, "body");
-                let centre_um = cluster.place(&mut rng);
+                let centre_um = cluster.draw_position(&mut rng);
                 let fleck = self.one(&mut rng);
                 let fleck = Fleck { width_um: fleck.width_um.min(fleck.length_um), dyes, ..fleck };
                 let depth_um = cluster.depth_um + DEPTH_SD_UM * random::normal(&mut rng);
@@ -76,7 +76,7 @@ impl Fleck {
         let (mut at, mut heading) = ([-0.5 * step * count as f64, 0.0], KINK * random::normal(&mut rng));
         let mut joints: Vec<(Point, f64)> = Vec::with_capacity(count + 1);
         for _ in 0..=count {
-            joints.push((context.place(at), context.px(0.5 * self.width_um * random::between(0.35, 1.0, &mut rng))));
+            joints.push((context.to_grid(at), context.px(0.5 * self.width_um * random::between(0.35, 1.0, &mut rng))));
             at = [at[0] + step * libm::cos(heading), at[1] + step * libm::sin(heading)];
             heading = 0.5 * heading + KINK * random::normal(&mut rng);
         }

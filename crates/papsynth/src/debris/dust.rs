@@ -31,7 +31,8 @@ impl Grain {
 
     pub(super) fn phantom(&self, context: &ObjectContext<'_>) -> Phantom {
         let mut rng = context.stream("shape");
-        let outline = context.places(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
+        let outline =
+            context.curve_to_grid(&shard(0.5 * self.diameter_um, 7 + random::below(5, &mut rng), 0.25, &mut rng));
         let mut canvas = context.canvas(&outline, 0.0);
         canvas.fill(&outline, self.absorbance);
         canvas.into_phantom(context.dyes.speckle, 0.0, self.absorbance)

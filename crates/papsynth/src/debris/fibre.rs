@@ -54,7 +54,7 @@ impl Fibre {
         let mut at = [-0.5 * self.length_um, 0.0];
         let mut spine: Vec<Point> = Vec::with_capacity(PARTS + 1);
         for part in 0..=PARTS {
-            spine.push(context.place(at));
+            spine.push(context.to_grid(at));
             let t = part as f64 / PARTS as f64;
             let way = self.waves * SWING * libm::sin(core::f64::consts::TAU * turns * t + phase) + bow * (t - 0.5);
             at = [at[0] + step * libm::cos(way), at[1] + step * libm::sin(way)];

@@ -133,13 +133,14 @@ impl Leukocytes {
 const MIN_DISTANCE: f64 = 1.5;
 /// Maximum number of draws of a position.
 const MAX_TRIES: usize = 24;
-/// Distance of touching leukocytes, relative to the diameter of their cytoplasm: minimum, maximum. They flatten each other.
+/// Distance of touching leukocytes, relative to the diameter of their cytoplasm: minimum, maximum. They flatten each
+/// other.
 const TOUCHING: [f64; 2] = [0.72, 1.0];
 
 impl Cluster {
     /// Draws a position in the cluster with a minimum distance from all others, if possible.
     fn separate_position(&self, taken: &[[f64; 2]], min_distance_um: f64, rng: &mut Stream) -> [f64; 2] {
-        separated(taken, min_distance_um, || self.place(rng))
+        separated(taken, min_distance_um, || self.draw_position(rng))
     }
 
     /// Draws a position that touches another leukocyte, or is separate from all of them.

@@ -1,9 +1,9 @@
 //! Objects other than epithelial cells ("Debris Object Generation").
 //!
-//! Each kind of object has one file with its section of the recipe, the accepted ranges, and the numbers drawn for each object.
-//! `draw` places the objects of a field, `reach_um` returns the maximum radius of an object for a pixel size, and `phantom`
-//! draws its phantom. The list below generates the recipe's `[debris]`, the bodies of scenes and the classes of the ground
-//! truth. To add a kind, add its file and its entry.
+//! Each kind of object has one file with its section of the recipe, the accepted ranges, and the numbers drawn for each
+//! object. `draw` places the objects of a field, `reach_um` returns the maximum radius of an object for a pixel size,
+//! and `phantom` draws its phantom. The list below generates the recipe's `[debris]`, the bodies of scenes and the
+//! classes of the ground truth. To add a kind, add its file and its entry.
 
 mod bacillus;
 mod bare_nucleus;
@@ -81,7 +81,7 @@ mod prelude {
 }
 
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $field:ident: $Section:ident { $count:ident } => $Kind:ident($Thing:ident), $name:literal;)*) => {
+    ($($(#[$doc:meta])* $field:ident: $Section:ident { $count:ident } => $Kind:ident($Object:ident), $name:literal;)*) => {
         section! {
             /// Objects other than epithelial cells.
             pub struct Debris {
@@ -92,7 +92,8 @@ macro_rules! kinds {
         }
 
         words! {
-            /// Kind of an object; objects are numbered in this order. Objects other than cells have the name of their kind as class.
+            /// Kind of an object; objects are numbered in this order. Objects other than cells have the name of their
+            /// kind as class.
             #[derive(PartialOrd, Ord, Hash, Serialize, Deserialize)]
             #[serde(rename_all = "kebab-case")]
             pub enum Kind {
@@ -108,18 +109,19 @@ macro_rules! kinds {
         pub enum Body {
             /// An epithelial cell.
             Cell(Box<CellBody>),
-            $($(#[$doc])* $Kind($Thing),)*
+            $($(#[$doc])* $Kind($Object),)*
         }
 
         impl Kind {
-            /// Whether all objects of the kind share one row and one mask of the ground truth: a layer of uncounted objects.
+            /// Whether all objects of the kind share one row and one mask of the ground truth: a layer of uncounted
+            /// objects.
             #[must_use]
             pub fn is_layer(self) -> bool {
                 self == Self::Dirt
             }
 
             /// Whether it is on the glass: its density on a slide does not follow that of the cells.
-            pub(crate) fn lies_on_glass(self) -> bool {
+            pub(crate) fn is_on_glass(self) -> bool {
                 matches!(self, Self::Dust | Self::Fibre | Self::Bubble | Self::Scratch)
             }
         }
@@ -138,7 +140,7 @@ macro_rules! kinds {
             pub(crate) fn reach_um(&self, pixel_um: f64) -> f64 {
                 match self {
                     Self::Cell(cell) => cell.reach_um(),
-                    $(Self::$Kind(thing) => thing.reach_um(pixel_um),)*
+                    $(Self::$Kind(body) => body.reach_um(pixel_um),)*
                 }
             }
 
@@ -146,7 +148,7 @@ macro_rules! kinds {
             pub(crate) fn phantom(&self, context: &ObjectContext<'_>) -> Option<Phantom> {
                 match self {
                     Self::Cell(_) => None,
-                    $(Self::$Kind(thing) => Some(thing.phantom(context)),)*
+                    $(Self::$Kind(body) => Some(body.phantom(context)),)*
                 }
             }
 
@@ -154,7 +156,7 @@ macro_rules! kinds {
             pub(crate) fn absorbance(&self) -> f64 {
                 match self {
                     Self::Cell(cell) => cell.cytoplasm_absorbance,
-                    $(Self::$Kind(thing) => thing.absorbance,)*
+                    $(Self::$Kind(body) => body.absorbance,)*
                 }
             }
         }
@@ -197,10 +199,10 @@ macro_rules! kinds {
                 $({
                     let kind = Kind::$Kind;
                     let in_margin = self.$field.$count.is_density();
-                    let mut placer = KindPlacer::new(field, kind.name(), stringify!($field), kind.lies_on_glass(), in_margin);
+                    let mut placer = KindPlacer::new(field, kind.name(), stringify!($field), kind.is_on_glass(), in_margin);
                     self.$field.draw(&mut placer);
-                    objects.extend(placer.objects.into_iter().map(|PlacedObject { number, cluster, placement, thing }| {
-                        PlacedObject { number, cluster, placement, thing: Body::$Kind(thing) }
+                    objects.extend(placer.objects.into_iter().map(|PlacedObject { number, cluster, placement, body }| {
+                        PlacedObject { number, cluster, placement, body: Body::$Kind(body) }
                     }));
                 })*
                 objects

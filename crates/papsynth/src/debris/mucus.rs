@@ -90,14 +90,14 @@ impl Strand {
                     across = (across + 0.06 * random::normal(&mut rng)).clamp(-1.0, 1.0);
                     let ([x, y], way) = spine[i];
                     let off = across * half[i];
-                    context.place([x - middle[0] - off * libm::sin(way), y - middle[1] + off * libm::cos(way)])
+                    context.to_grid([x - middle[0] - off * libm::sin(way), y - middle[1] + off * libm::cos(way)])
                 })
                 .collect();
             fibres.push(fibre);
         }
         let mut canvas = context.canvas(fibres.iter().flatten(), self.fibre_width_um + 0.5 * self.width_um);
         for (part, half) in spine.windows(2).zip(half.windows(2)) {
-            let ends = [part[0].0, part[1].0].map(|p| context.place([p[0] - middle[0], p[1] - middle[1]]));
+            let ends = [part[0].0, part[1].0].map(|p| context.to_grid([p[0] - middle[0], p[1] - middle[1]]));
             let half_widths = [context.px(half[0]), context.px(half[1])];
             canvas.stroke_max(&Stroke { ends, half_widths }, VEIL * self.absorbance);
         }

@@ -44,14 +44,14 @@ impl ObjectContext<'_> {
     }
 
     /// Converts a point of the object, in µm from its centre before rotation, to grid points.
-    pub(super) fn place(&self, point_um: Point) -> Point {
+    pub(super) fn to_grid(&self, point_um: Point) -> Point {
         let point = point_um.map(|um| self.px(um));
         placed(point, self.rotation_deg.to_radians(), self.centre)
     }
 
     /// Converts the points of a curve.
-    pub(super) fn places(&self, points_um: &[Point]) -> Vec<Point> {
-        points_um.iter().map(|point| self.place(*point)).collect()
+    pub(super) fn curve_to_grid(&self, points_um: &[Point]) -> Vec<Point> {
+        points_um.iter().map(|point| self.to_grid(*point)).collect()
     }
 
     /// Creates an empty canvas around points of the grid, with a margin in µm.

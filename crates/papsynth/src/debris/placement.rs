@@ -29,8 +29,8 @@ pub(crate) struct KindPlacer<'a, T> {
     kind: &'static str,
     /// Name of its section of the recipe.
     section: &'static str,
-    lies_on_glass: bool,
-    /// Whether its objects also lie in the margin of the field.
+    is_on_glass: bool,
+    /// Whether objects are also placed in the margin of the field.
     in_margin: bool,
     pub(super) objects: Vec<PlacedObject<T>>,
 }
@@ -42,7 +42,7 @@ pub(crate) struct PlacedObject<T> {
     /// Number of its cluster; 0 for a single object.
     pub(crate) cluster: u32,
     pub(crate) placement: Placement,
-    pub(crate) thing: T,
+    pub(crate) body: T,
 }
 
 /// The density of debris in one plot of a slide.
@@ -100,27 +100,27 @@ impl<'a, T> KindPlacer<'a, T> {
         field: &'a Field<'a>,
         kind: &'static str,
         section: &'static str,
-        lies_on_glass: bool,
+        is_on_glass: bool,
         in_margin: bool,
     ) -> Self {
-        Self { field, kind, section, lies_on_glass, in_margin, objects: Vec::new() }
+        Self { field, kind, section, is_on_glass, in_margin, objects: Vec::new() }
     }
 
-    /// Draws the number of objects, or of clusters, of the field or of the part of a slide.
+    /// Draws the number of objects or clusters in the field or plot.
     pub(super) fn count(&self, (name, abundance): (&str, &Abundance)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
         let (numbers, area_mm2) = (self.field.numbers, self.field.region.area_mm2());
         let Some(plot) = &self.field.plot_density else { return numbers.number_of((&path, abundance), area_mm2) };
-        let more = if self.lies_on_glass { 1.0 } else { plot.max_density };
-        numbers.number_on_slide((&path, abundance), [area_mm2, plot.area_in_fields], more)
+        let factor = if self.is_on_glass { 1.0 } else { plot.max_density };
+        numbers.number_on_slide((&path, abundance), [area_mm2, plot.area_in_fields], factor)
     }
 
-    /// Returns the area where the objects lie.
+    /// Returns the region in which objects are placed.
     fn region(&self) -> Region {
         if self.in_margin { self.field.region } else { self.field.field }
     }
 
-    /// Returns the cells there.
+    /// Returns the cells in that region.
     fn cells(&self) -> &[CellPosition] {
         if self.in_margin { &self.field.cells } else { &self.field.cells[..self.field.inside] }
     }
@@ -179,9 +179,9 @@ impl<'a, T> KindPlacer<'a, T> {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
             let centre_um = self.anywhere(&mut rng);
-            let thing = draw(self, number, &mut rng);
+            let body = draw(self, number, &mut rng);
             let placement = Placement::with_random_rotation(centre_um, depth_um(&mut rng), &mut rng);
-            self.add(number, 0, placement, thing);
+            self.add(number, 0, placement, body);
         }
     }
 
@@ -194,12 +194,12 @@ impl<'a, T> KindPlacer<'a, T> {
     ) {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
-            let context = self.cluster(on_cells, &Number::Fixed(0.0), &mut rng);
+            let position = self.cluster(on_cells, &Number::Fixed(0.0), &mut rng);
             // Most are above the cell, some below it.
             let shift_um = if random::chance(BELOW_CELL, &mut rng) { 2.0 * ON_CELL_UM } else { 0.0 };
-            let thing = draw(&mut rng);
-            let placement = Placement::with_random_rotation(context.centre_um, context.depth_um - shift_um, &mut rng);
-            self.add(number, 0, placement, thing);
+            let body = draw(&mut rng);
+            let placement = Placement::with_random_rotation(position.centre_um, position.depth_um - shift_um, &mut rng);
+            self.add(number, 0, placement, body);
         }
     }
 
@@ -216,30 +216,30 @@ impl<'a, T> KindPlacer<'a, T> {
             for member in 0..clusters.members.draw_count(&mut rng).max(1) as u64 {
                 let number = member_number(index, member);
                 let mut rng = self.stream(number, "body");
-                let centre_um = cluster.place(&mut rng);
-                let thing = draw(self, number, &mut rng);
+                let centre_um = cluster.draw_position(&mut rng);
+                let body = draw(self, number, &mut rng);
                 let depth_um = cluster.depth_um + clusters.depth_sd_um * random::normal(&mut rng);
                 let placement = Placement::with_random_rotation(centre_um, depth_um, &mut rng);
-                self.add(number, cluster_id(index), placement, thing);
+                self.add(number, cluster_id(index), placement, body);
             }
         }
     }
 
     /// Adds an object; single objects have cluster 0.
-    pub(super) fn add(&mut self, number: u64, cluster: u32, placement: Placement, thing: T) {
-        if let Some(plot) = self.field.plot_density.as_ref().filter(|_| !self.lies_on_glass) {
+    pub(super) fn add(&mut self, number: u64, cluster: u32, placement: Placement, body: T) {
+        if let Some(plot) = self.field.plot_density.as_ref().filter(|_| !self.is_on_glass) {
             let mut rng = self.stream(number, "stays");
             if !random::chance((plot.keep_probability)(placement.centre_um), &mut rng) {
                 return;
             }
         }
-        self.objects.push(PlacedObject { number, cluster, placement, thing });
+        self.objects.push(PlacedObject { number, cluster, placement, body });
     }
 }
 
 impl Cluster {
     /// Draws a position in the cluster, normally distributed about its centre.
-    pub(super) fn place(&self, rng: &mut Stream) -> [f64; 2] {
+    pub(super) fn draw_position(&self, rng: &mut Stream) -> [f64; 2] {
         [
             self.centre_um[0] + self.radius_um * random::normal(rng),
             self.centre_um[1] + self.radius_um * random::normal(rng),

@@ -60,7 +60,7 @@ impl RedCell {
         let radius_um = 0.5 * self.diameter_um;
         let squeeze = random::between(0.88, 1.0, &mut rng);
         let circle = perturbed_circle(radius_um, 0.03, 0.05, &mut rng);
-        let outline: Vec<Point> = circle.iter().map(|p| context.place([p[0], squeeze * p[1]])).collect();
+        let outline: Vec<Point> = circle.iter().map(|p| context.to_grid([p[0], squeeze * p[1]])).collect();
         let mut canvas = context.canvas(&outline, 0.0);
         canvas.coverage.cover(&outline);
         let radius = context.px(radius_um);

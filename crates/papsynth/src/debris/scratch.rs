@@ -11,8 +11,8 @@ section! {
         length_um: Number = Number::uniform(20.0, 120.0), 5..=500, "µm";
         /// Width.
         width_um: Number = Number::log_normal(0.7, 0.4), 0.1..=20, "µm";
-        /// Height above the cells: slightly below 0 is the face of the slide, 170 is the outer face of a cover glass, where
-        /// only wide scratches are visible.
+        /// Height above the cells: slightly below 0 is the face of the slide, 170 is the outer face of a cover glass,
+        /// where only wide scratches are visible.
         height_um: Number (undrawn) = Number::choice([-3.0, 170.0, 170.0]), -1000..=1000, "µm";
         /// Absorbance.
         absorbance: Number = Number::uniform(0.02, 0.08), 0..=4;
@@ -47,7 +47,7 @@ impl Scratch {
             .map(|part| {
                 let x = step * part as f64 - 0.5 * self.length_um;
                 let width = self.width_um * random::between(0.4, 1.0, &mut rng);
-                (context.place([x, bow * x * x]), context.px(0.5 * width))
+                (context.to_grid([x, bow * x * x]), context.px(0.5 * width))
             })
             .collect();
         let mut canvas = context.canvas(line.iter().map(|(at, _)| at), 0.5 * self.width_um);

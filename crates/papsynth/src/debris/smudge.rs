@@ -55,7 +55,7 @@ impl Smudge {
         let stretch = self.elongation.sqrt();
         let (a, b) = (radius_um * stretch, radius_um / stretch);
         let reach = 1.0 + (MAX_EXTENT - 1.0) * self.ragged.min(1.5);
-        let corners = context.places(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
+        let corners = context.curve_to_grid(&[[-a, -b], [a, -b], [a, b], [-a, b]].map(|p| p.map(|v| v * reach)));
         let mut canvas = context.canvas(&corners, 0.0);
         let turn = context.rotation_deg.to_radians();
         let (sin, cos) = (libm::sin(turn), libm::cos(turn));

@@ -74,7 +74,7 @@ impl Trichomonad {
                 [a * cos * wobble, b * sin * wobble * (1.0 + PEAR * cos)]
             })
             .collect();
-        let outline = context.places(&smooth(&corners, POINTS_PER_CORNER));
+        let outline = context.curve_to_grid(&smooth(&corners, POINTS_PER_CORNER));
         // Flagella extend from the front, the axostyle from the tail.
         let mut threads: Vec<[Point; 3]> = (0..3 + random::below(2, &mut rng))
             .map(|_| {
@@ -83,7 +83,7 @@ impl Trichomonad {
             })
             .collect();
         threads.push([[-0.8 * a, 0.0], [-1.1 * a, 0.05 * a], [-1.3 * a, 0.1 * a * random::normal(&mut rng)]]);
-        let threads: Vec<[Point; 3]> = threads.iter().map(|thread| thread.map(|p| context.place(p))).collect();
+        let threads: Vec<[Point; 3]> = threads.iter().map(|thread| thread.map(|p| context.to_grid(p))).collect();
         let mut canvas = context.canvas(outline.iter().chain(threads.iter().flatten()), 0.5);
         canvas.fill(&outline, self.absorbance);
         let sampler = FieldSampler::clouds(context.px(GRAIN_UM), &mut rng);
@@ -96,9 +96,10 @@ impl Trichomonad {
         let mut nucleus = canvas.blank();
         let (at, tilt) = ([0.42 * a, 0.2 * b * random::normal(&mut rng)], 0.4 * random::normal(&mut rng));
         let reach = 0.15 * self.length_um;
-        let tip =
-            |side: f64| context.place([at[0] + side * reach * libm::cos(tilt), at[1] + side * reach * libm::sin(tilt)]);
-        let (middle, thick) = (context.place(at), context.px(0.07 * self.length_um));
+        let tip = |side: f64| {
+            context.to_grid([at[0] + side * reach * libm::cos(tilt), at[1] + side * reach * libm::sin(tilt)])
+        };
+        let (middle, thick) = (context.to_grid(at), context.px(0.07 * self.length_um));
         for side in [-1.0, 1.0] {
             let half_widths = [thick, 0.35 * thick];
             nucleus.stroke(&Stroke { ends: [middle, tip(side)], half_widths }, 0.0);

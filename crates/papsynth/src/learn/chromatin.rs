@@ -72,8 +72,9 @@ fn detrended(nucleus: &NucleusMeasurement) -> Vec<f64> {
 
 /// Returns (ν, length in µm) of the Matérn covariance whose blurred autocorrelation is nearest to a measured one.
 ///
-/// Subtracting mean and slope removes the three lowest modes of a nucleus of `area_um2`. A window of area a has one mode per
-/// 1/a in the frequency plane, so these three fill a disc of radius √(3/(π a)), which is excluded from the spectrum.
+/// Subtracting mean and slope removes the three lowest modes of a nucleus of `area_um2`. A window of area a has one
+/// mode per 1/a in the frequency plane, so these three fill a disc of radius √(3/(π a)), which is excluded from the
+/// spectrum.
 pub(super) fn fit_matern(measured: &[f64; LAGS], pixel_um: f64, area_um2: f64) -> (f64, f64) {
     let lowest = (3.0 / (core::f64::consts::PI * area_um2)).sqrt();
     let mut best = (f64::INFINITY, NUS[0], 0.5);

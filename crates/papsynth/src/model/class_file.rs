@@ -24,8 +24,8 @@ impl Model {
 
     /// Returns this model with the classes of `text` added; classes with the same name are replaced.
     ///
-    /// `text` is a model written by `papsynth learn` (JSON), or a class file (TOML). A class of a class file may name a base
-    /// class (`like`) and list only the values that differ.
+    /// `text` is a model written by `papsynth learn` (JSON), or a class file (TOML). A class of a class file may name a
+    /// base class (`like`) and list only the values that differ.
     ///
     /// ```
     /// # use papsynth::model::Model;

@@ -1,8 +1,8 @@
 //! Models: statistics of real cells.
 //!
-//! A model contains the shapes, sizes, absorbances and chromatin of each class of cells. It is one versioned JSON file with
-//! the provenance of its data. The built-in model contains only statistics (means, covariances, spectra); a learned model
-//! may also contain donors, which are pixels of real nuclei.
+//! A model contains the shapes, sizes, absorbances and chromatin of each class of cells. It is one versioned JSON file
+//! with the provenance of its data. The built-in model contains only statistics (means, covariances, spectra); a
+//! learned model may also contain donors, which are pixels of real nuclei.
 
 mod class_file;
 

@@ -184,8 +184,8 @@ fn depth_from_rim(mask: &[f32], width: usize) -> Vec<f64> {
     depth.iter().map(|d| d / deepest).collect()
 }
 
-/// Interpolates linearly in a profile of equal steps; `at` is 0 at the outer edge of the first step and 1 at the inner edge
-/// of the last.
+/// Interpolates linearly in a profile of equal steps; `at` is 0 at the outer edge of the first step and 1 at the inner
+/// edge of the last.
 pub(crate) fn interpolate(profile: &[f64], at: f64) -> f64 {
     let position = (at.clamp(0.0, 1.0) * profile.len() as f64 - 0.5).clamp(0.0, (profile.len() - 1) as f64);
     let cell = random::count(position.floor()).min(profile.len() - 1);

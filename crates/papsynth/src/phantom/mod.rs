@@ -1,7 +1,7 @@
 //! Phantoms of objects: the in-focus absorbance of each object and the exact coverage of its parts.
 //!
-//! This module draws epithelial cells; [`crate::debris`] draws all other kinds. A phantom depends only on its object and on the
-//! random streams of that object.
+//! This module draws epithelial cells; [`crate::debris`] draws all other kinds. A phantom depends only on its object
+//! and on the random streams of that object.
 
 mod assets;
 mod cell;
@@ -78,7 +78,8 @@ fn object_context<'a>(scene: &Scene, noise_fields: &'a NoiseFields<'a>, object: 
 pub(crate) const BATCH: usize = 16;
 
 impl Phantom {
-    /// Returns the phantom of an object of a plot, cropped to the object's maximum radius and moved to the plot's position.
+    /// Returns the phantom of an object of a plot, cropped to the object's maximum radius and moved to the plot's
+    /// position.
     ///
     /// `n` is the number of grid points per pixel and axis.
     pub(crate) fn on_slide(mut self, object: &Object, view: View, n: usize) -> Self {

@@ -1,4 +1,5 @@
-//! Periodic noise fields shared by the objects of one image; each object samples them at a random position and mirroring.
+//! Periodic noise fields shared by the objects of one image; each object samples them at a random position and
+//! mirroring.
 
 use std::sync::OnceLock;
 
@@ -28,7 +29,8 @@ pub(crate) struct NoiseFieldGenerator {
     fields: [SpectralField; 3],
 }
 
-/// The noise fields of one image, with mean 0, variance 1 and a period of [`SIDE`] texels. Each is computed on first use.
+/// The noise fields of one image, with mean 0, variance 1 and a period of [`SIDE`] texels. Each is computed on first
+/// use.
 #[derive(Debug)]
 pub(crate) struct NoiseFields<'a> {
     generator: &'a NoiseFieldGenerator,
@@ -49,8 +51,8 @@ pub(crate) type Texels = [f32; SIDE + 1];
 
 /// The position and mirroring at which one object samples a noise field.
 ///
-/// Sampling follows the rows of the field, so a row of pixels needs only two rows of texels. The fields are isotropic, so no
-/// rotation is needed.
+/// Sampling follows the rows of the field, so a row of pixels needs only two rows of texels. The fields are isotropic,
+/// so no rotation is needed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FieldSampler {
     origin: Point,

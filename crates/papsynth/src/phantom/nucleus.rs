@@ -107,7 +107,8 @@ fn clump(texture: &mut [f32], coverage: &Tile, fraction: f64, pixel_um: f64, rng
     texture.iter_mut().zip(&coarse).for_each(|(value, coarse)| *value = fine * *value + rough * coarse);
 }
 
-/// Computes the thickness of a nucleus relative to its mean: a mixture of a plate and an ellipsoid, with a linear gradient.
+/// Computes the thickness of a nucleus relative to its mean: a mixture of a plate and an ellipsoid, with a linear
+/// gradient.
 fn dome(thickness: &mut Tile, outline: &[Point], nucleus: &NucleusBody) {
     let dome = nucleus.dome;
     /// Mean over a disc of the chord √(1 − ρ²) of a sphere.

@@ -96,7 +96,7 @@ pub(super) fn strew(
     let inside = cells.len();
     cells.extend(outside);
     let placed = debris.draw(&Field { field, region, numbers, stain, cells, inside, plot_density });
-    objects.extend(placed.into_iter().map(|PlacedObject { number, cluster, placement, thing }| Object {
+    objects.extend(placed.into_iter().map(|PlacedObject { number, cluster, placement, body }| Object {
         id: 0,
         number,
         cluster,
@@ -106,7 +106,7 @@ pub(super) fn strew(
         rotation_deg: placement.rotation_deg,
         bethesda: String::new(),
         coat: None,
-        body: thing,
+        body,
     }));
 }
 

@@ -1,5 +1,5 @@
-//! Partially coherent bright field: the transmittance of each object, filtered by the transfer functions of the microscope,
-//! and the product over all objects.
+//! Partially coherent bright field: the transmittance of each object, filtered by the transfer functions of the
+//! microscope, and the product over all objects.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -414,7 +414,8 @@ fn illuminate(light: &mut [f32], empty: &[f32], stray: f32) {
     light.iter_mut().zip(empty).for_each(|(light, empty)| *light = empty * (stray + (1.0 - stray) * *light));
 }
 
-/// Returns the absorbance that corresponds to the mean of a factor over a mask, for a grid of `n` points per pixel and axis.
+/// Returns the absorbance that corresponds to the mean of a factor over a mask, for a grid of `n` points per pixel and
+/// axis.
 fn mean_absorbance(mask: &Mask, factor: &Factor, window: Window, n: usize) -> f64 {
     let (n, origin) = match factor.lattice {
         Lattice::Object => (n, window.origin),

@@ -17,8 +17,8 @@ use crate::threads;
 /// Standard deviation below which a Gaussian changes nothing visible in 16 bits, px.
 const SHARP_PX: f64 = 0.03;
 
-/// Fraction of an object's absorbance in the truncated tails of its blur. The largest error is ten times this value, which
-/// is the tolerance of the decimated blur.
+/// Fraction of an object's absorbance in the truncated tails of its blur. The largest error is ten times this value,
+/// which is the tolerance of the decimated blur.
 const LOST_TAIL: f64 = 1e-4;
 
 /// The same for the blur in the image plane, which affects all light.

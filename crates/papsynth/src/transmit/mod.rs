@@ -1,7 +1,8 @@
 //! Signal transmission: from phantoms to the light on the sensor (Eqs. 8–14).
 //!
-//! The optics of the scene select one of two models: [`bright_field`], partially coherent bright field, object by object;
-//! [`gaussian`], the paper's Gaussian blur of the absorbance. Both return the light of a plane in bands of rows.
+//! The optics of the scene select one of two models: [`bright_field`], partially coherent bright field, object by
+//! object; [`gaussian`], the paper's Gaussian blur of the absorbance. Both return the light of a plane in bands of
+//! rows.
 
 mod bright_field;
 mod channel_lights;

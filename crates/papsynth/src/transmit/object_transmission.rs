@@ -38,7 +38,8 @@ pub(super) struct ObjectTransmission {
 }
 
 impl Window {
-    /// Returns the smallest rectangle of complete pixels (`n` x `n` grid points) around the tiles; `None` without tiles.
+    /// Returns the smallest rectangle of complete pixels (`n` x `n` grid points) around the tiles; `None` without
+    /// tiles.
     pub(super) fn around<'a>(tiles: impl Iterator<Item = &'a Tile>, n: usize) -> Option<Self> {
         let n = n as i64;
         let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
@@ -79,7 +80,8 @@ impl DyeMixer {
         dye_spectra::absorbance(dyes, wavelength)
     }
 
-    /// Returns, for each channel and piece, the fraction of the object's absorbance that the piece contributes where it covers.
+    /// Returns, for each channel and piece, the fraction of the object's absorbance that the piece contributes where it
+    /// covers.
     pub(super) fn fractions(&self, phantom: &Phantom) -> Vec<Vec<f64>> {
         let pieces = &phantom.pieces;
         // Sums of the absorbance of each piece over the area of one piece.

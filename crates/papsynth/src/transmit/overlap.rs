@@ -1,9 +1,10 @@
 //! Colours of overlapping stained objects.
 //!
-//! Each object transmits a mean fraction of a channel's band, and the fractions of overlapping objects are multiplied. This
-//! is too dark where objects absorb the same wavelengths: the first leaves less light to absorb for the second. The image is
-//! therefore multiplied by the ratio of the light behind all dyes together to the product of the light behind each object.
-//! The ratio is computed on camera pixels, from amounts of dye with the defocus blur of each object.
+//! Each object transmits a mean fraction of a channel's band, and the fractions of overlapping objects are multiplied.
+//! This is too dark where objects absorb the same wavelengths: the first leaves less light to absorb for the second.
+//! The image is therefore multiplied by the ratio of the light behind all dyes together to the product of the light
+//! behind each object. The ratio is computed on camera pixels, from amounts of dye with the defocus blur of each
+//! object.
 
 use dye_spectra::{Colour, DYES};
 use multiversion::multiversion;

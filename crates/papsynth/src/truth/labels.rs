@@ -15,8 +15,8 @@ pub struct LabelMap {
 
 /// Returns the visible part of each mask.
 ///
-/// `objects` are `(id, depth, mask)`; a larger depth is nearer to the objective. Of two objects at the same depth, the one
-/// with the larger id covers the other.
+/// `objects` are `(id, depth, mask)`; a larger depth is nearer to the objective. Of two objects at the same depth, the
+/// one with the larger id covers the other.
 ///
 /// # Panics
 /// If a mask extends beyond the image.

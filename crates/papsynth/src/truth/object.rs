@@ -74,8 +74,8 @@ pub struct Truth {
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// One row for every object and every part of a cell, sorted by id and part. Objects without a pixel in the image are
-    /// omitted; all objects of a [layer](Kind::is_layer) share one row.
+    /// One row for every object and every part of a cell, sorted by id and part. Objects without a pixel in the image
+    /// are omitted; all objects of a [layer](Kind::is_layer) share one row.
     pub objects: Vec<ObjectTruth>,
 }
 

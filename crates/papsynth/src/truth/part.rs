@@ -18,7 +18,8 @@ pub enum Part {
 }
 
 words! {
-    /// A group of objects that occlude each other. Each group has one label map, in this order; file names use these names.
+    /// A group of objects that occlude each other. Each group has one label map, in this order; file names use these
+    /// names.
     #[derive(PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Group {

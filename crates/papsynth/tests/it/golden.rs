@@ -2,8 +2,8 @@
 //!
 //! `cargo xtask golden` runs this test, `cargo xtask golden --bless` rewrites the images.
 //!
-//! Tolerance: no pixel may differ by more than 1 grey level, and at most 1 % of the pixels may differ. Optimised routines may
-//! round differently; `fixtures/hashes.txt` covers every bit.
+//! Tolerance: no pixel may differ by more than 1 grey level, and at most 1 % of the pixels may differ. Optimised
+//! routines may round differently; `fixtures/hashes.txt` covers every bit.
 
 #![expect(clippy::cast_possible_truncation, reason = "a small program with small numbers")]
 

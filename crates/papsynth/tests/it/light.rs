@@ -167,7 +167,8 @@ fn the_focus_moves_by_the_stage_travel_times_the_mountant_index() {
         })
         .unwrap();
     let sharpest = (0..21).max_by(|a, b| roughness[*a].total_cmp(&roughness[*b])).unwrap();
-    // 3.03 µm of mountant are 2 µm of stage travel for paraxial rays, five steps above the centre, and less for other rays.
+    // 3.03 µm of mountant are 2 µm of stage travel for paraxial rays, five steps above the centre, and less for other
+    // rays.
     assert!((14..=15).contains(&sharpest), "{roughness:?}");
     assert!(finished.truth.objects.iter().all(|object| object.defocus_um[15].abs() < 1e-9));
 }

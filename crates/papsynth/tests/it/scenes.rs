@@ -88,7 +88,8 @@ fn numbers(value: &Value, path: &str) -> Vec<String> {
     }
 }
 
-/// Images a scene with several values of one number; each is rejected or imaged. Returns how many scenes were valid JSON.
+/// Images a scene with several values of one number; each is rejected or imaged. Returns how many scenes were valid
+/// JSON.
 fn try_all(engine: &Engine, value: &mut Value, pointer: &str) -> usize {
     let before = value.pointer(pointer).unwrap().clone();
     let mut read = 0;

@@ -59,14 +59,14 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
     // The nucleus is on the side opposite to the tail.
     let shift = -0.35 * tail * cell_radius + 0.08 * cell_radius * random::normal(&mut rng);
     let at = [shift * libm::cos(toward), shift * libm::sin(toward)];
-    let outline = context.places(&body);
+    let outline = context.curve_to_grid(&body);
     let shapes: Vec<Vec<Point>> = lobes
         .iter()
         .map(|lobe| {
             let shape = perturbed_circle(lobe.radius, leukocyte.alpha, leukocyte.beta, &mut rng);
             let stretch = |p: &Point| [p[0] * lobe.stretch, p[1] / lobe.stretch];
             let turned = shape.iter().map(|p| placed(stretch(p), lobe.heading, lobe.centre));
-            turned.map(|p| context.place([p[0] + at[0], p[1] + at[1]])).collect()
+            turned.map(|p| context.to_grid([p[0] + at[0], p[1] + at[1]])).collect()
         })
         .collect();
 
@@ -88,7 +88,7 @@ pub(super) fn make(leukocyte: &Leukocyte, context: &ObjectContext<'_>) -> Phanto
         nucleus.coverage.cover(shape);
     }
     for pair in lobes.windows(2) {
-        let ends = [0, 1].map(|i| context.place([pair[i].centre[0] + at[0], pair[i].centre[1] + at[1]]));
+        let ends = [0, 1].map(|i| context.to_grid([pair[i].centre[0] + at[0], pair[i].centre[1] + at[1]]));
         let half_width = context.px(BRIDGE * pair[0].radius.min(pair[1].radius));
         nucleus.stroke(&Stroke::even(ends[0], ends[1], half_width), 0.0);
     }
@@ -191,7 +191,7 @@ fn shreds(canvas: &mut ObjectCanvas, context: &ObjectContext<'_>, radius: f64, a
         let angle = random::direction(rng);
         let reach = radius * random::between(1.0, 1.25, rng);
         let bend = angle + 0.5 * random::normal(rng);
-        let ends = [0.5 * radius, reach].map(|r| context.place([r * libm::cos(angle), r * libm::sin(bend)]));
+        let ends = [0.5 * radius, reach].map(|r| context.to_grid([r * libm::cos(angle), r * libm::sin(bend)]));
         let half_width = context.px(random::between(0.4, 1.0, rng));
         canvas.stroke(&Stroke { ends, half_widths: [half_width, 0.3 * half_width] }, absorbance);
     }

@@ -55,7 +55,8 @@ fn simple(outline: Vec<Point>) -> Option<Vec<Point>> {
 fn angular(outline: &[Point], fraction: f64, rng: &mut Stream) -> Vec<Point> {
     let n = outline.len();
     let wanted = CORNERS[0] + random::below(CORNERS[1] + 1, rng);
-    // The next corner is the outline point farthest from the polygon (Douglas and Peucker, doi:10.3138/FM57-6770-U75U-7727).
+    // The next corner is the outline point farthest from the polygon (Douglas and Peucker,
+    // doi:10.3138/FM57-6770-U75U-7727).
     let mut corners = vec![random::below(n, rng)];
     corners.push((corners[0] + n / 2) % n);
     corners.sort_unstable();
@@ -105,7 +106,8 @@ fn angular(outline: &[Point], fraction: f64, rng: &mut Stream) -> Vec<Point> {
     shape
 }
 
-/// Returns the sides of a polygon whose corners are points of an outline of `n` points: first point and number of steps.
+/// Returns the sides of a polygon whose corners are points of an outline of `n` points: first point and number of
+/// steps.
 fn sides(corners: &[usize], n: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
     (0..corners.len()).map(move |i| {
         let (from, to) = (corners[i], corners[(i + 1) % corners.len()]);
