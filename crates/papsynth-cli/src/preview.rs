@@ -59,7 +59,7 @@ pub(crate) fn render(args: Render) -> Result<(), Failure> {
     let mut planes = Vec::new();
     let finished = image(&setup, scene, |plane| planes.push(plane.clone()))?;
     let frame = Frame { planes, finished };
-    let (picture, scene) = (frame.picture(), &frame.finished.scene);
+    let (picture, scene) = (frame.image(), &frame.finished.scene);
     write_png(&args.out, &picture, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
     told(&args.out, scene)
 }

@@ -75,7 +75,7 @@ struct Cache {
 
 impl Frame {
     pub(crate) fn new(py: Python<'_>, frame: papsynth::Frame) -> PyResult<Self> {
-        let picture = frame.picture();
+        let picture = frame.image();
         let papsynth::Frame { planes, finished } = frame;
         let scene = &finished.scene;
         let (bits, channels) = (scene.camera.bits, planes.first().map_or(1, |plane| plane.channels));
@@ -177,7 +177,7 @@ impl Frame {
 
     #[getter]
     fn visible_masks(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        cached(py, &self.cache.visible_masks, || self.masks_of(py, |object| &object.front))
+        cached(py, &self.cache.visible_masks, || self.masks_of(py, |object| &object.visible))
     }
 
     #[getter]
@@ -198,7 +198,7 @@ impl Frame {
 
     #[getter]
     fn visible_rle(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.rle_of(py, |object| &object.front)
+        self.rle_of(py, |object| &object.visible)
     }
 
     #[getter]
@@ -356,13 +356,13 @@ fn pickled_objects(truth: &Truth) -> Vec<PickledObject> {
                 o.cluster,
                 o.centre_um,
                 o.depth_um,
-                o.stain,
+                o.mean_absorbance,
                 o.tint_name().to_owned(),
                 o.rotation_deg,
                 o.area_um2,
                 o.truncated,
             ),
-            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.front, *width, *height)),
+            (rle::encode(&o.amodal, *width, *height), rle::encode(&o.visible, *width, *height)),
             (o.defocus_um.clone(), o.detectability.clone()),
         )
     };

@@ -9,7 +9,7 @@ use std::fmt::{self, Formatter};
 use std::path::Path;
 
 use papsynth::scene::Scene;
-use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Truth, visible_masks};
 use serde::Serialize;
 
 use super::manifest::Manifest;
@@ -204,9 +204,9 @@ fn own_document(
     for group in Group::ALL {
         let objects: Vec<&ObjectTruth> = truth.objects.iter().filter(|object| object.group() == group).collect();
         let stack: Vec<_> = objects.iter().map(|o| (o.id, o.depth_um, &o.amodal)).collect();
-        for (object, front) in objects.iter().zip(front_masks(&stack, truth.width, truth.height)) {
+        for (object, front) in objects.iter().zip(visible_masks(&stack, truth.width, truth.height)) {
             let what = format!("image {index}: not what lies in front of object {} is its front", object.id);
-            due(object.front == front, what)?;
+            due(object.visible == front, what)?;
         }
     }
     let mut saturated = document.saturated(index).map_err(Error::input(coco))?;

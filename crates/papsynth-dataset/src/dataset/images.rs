@@ -242,7 +242,7 @@ fn difference(one: &Truth, other: &Truth) -> Option<String> {
             ("class", a.class == b.class),
             ("place", a.centre_um == b.centre_um && a.depth_um == b.depth_um && a.rotation_deg == b.rotation_deg),
             ("complete mask", a.amodal == b.amodal),
-            ("visible mask", a.front == b.front),
+            ("visible mask", a.visible == b.visible),
         ];
         claims.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("object {} has another {what}", a.id))
     };

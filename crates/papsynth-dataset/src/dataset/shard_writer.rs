@@ -107,7 +107,7 @@ impl ShardWriter<'_> {
             begun.picture.clone_from(&plane.grey);
         }
         begun.saturated.push(plane.saturated.clone());
-        begun.floored.push(plane.floored);
+        begun.floored.push(plane.clipped_px);
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl ShardWriter<'_> {
         let key = finished.scene.key;
         let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
         frame.due(same, format!("the truth handed over is that of another scene, of frame {}", key.index))?;
-        let sharp = if frame.is_stack() { finished.sharp() } else { Vec::new() };
+        let sharp = if frame.is_stack() { finished.all_in_focus_levels() } else { Vec::new() };
         if self.dataset.layout.scenes {
             self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
         }

@@ -110,7 +110,7 @@ fn properties(field: &Field, group: Group, shown: &BTreeSet<u32>) -> Vec<(u32, M
                 // A nucleus has the label of its cell.
                 ("parent", json!(annotation.parent_id.map(|_| object.id))),
                 ("depth_um", json!(object.depth_um)),
-                ("stain", json!(object.stain)),
+                ("stain", json!(object.mean_absorbance)),
                 ("area_um2", json!(object.area_um2)),
                 ("area_px", json!(object.amodal.area())),
                 ("truncated", json!(object.truncated)),

@@ -106,8 +106,8 @@ impl Annotation {
             area: object.amodal.area(),
             iscrowd: 0,
             segmentation: Rle::new(&object.amodal, width, height),
-            front: Rle::new(&object.front, width, height),
-            front_area: object.front.area(),
+            front: Rle::new(&object.visible, width, height),
+            front_area: object.visible.area(),
             object_id: object.id,
             parent_id,
             part: object.part,
@@ -118,7 +118,7 @@ impl Annotation {
             cluster: object.cluster,
             centre_um: object.centre_um,
             depth_um: object.depth_um,
-            stain: object.stain,
+            stain: object.mean_absorbance,
             tint: object.tint_name().to_owned(),
             rotation_deg: object.rotation_deg,
             area_um2: object.area_um2,
@@ -188,7 +188,7 @@ impl Annotation {
 
 /// Whether a mask of an object leaves an image of this size.
 pub(crate) fn leaves(object: &ObjectTruth, width: usize, height: usize) -> bool {
-    let bounds = [&object.amodal, &object.front].into_iter().filter_map(Mask::bounds);
+    let bounds = [&object.amodal, &object.visible].into_iter().filter_map(Mask::bounds);
     bounds.into_iter().any(|b| (b.x + b.width) as usize > width || (b.y + b.height) as usize > height)
 }
 

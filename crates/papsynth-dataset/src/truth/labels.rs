@@ -36,7 +36,7 @@ impl Flatten {
         let all: u64 = of_group().map(|object| object.amodal.area()).sum();
         let shown = match self {
             // One object a pixel, whichever it is.
-            Self::Top | Self::Max => of_group().map(|object| object.front.area()).sum(),
+            Self::Top | Self::Max => of_group().map(|object| object.visible.area()).sum(),
             Self::Drop => self.labels(truth, group).iter().filter(|&&id| id > 0).count() as u64,
         };
         all - shown
@@ -105,7 +105,7 @@ mod tests {
                 let of_group = || truth.objects.iter().filter(|o| o.group() == group);
                 let ids: Vec<u32> = of_group().filter(|o| here(&o.amodal)).map(|o| o.id).collect();
                 match policy {
-                    Flatten::Top => of_group().find(|o| here(&o.front)).map_or(0, |o| o.id),
+                    Flatten::Top => of_group().find(|o| here(&o.visible)).map_or(0, |o| o.id),
                     Flatten::Drop if ids.len() > 1 => 0,
                     Flatten::Drop | Flatten::Max => ids.into_iter().max().unwrap_or(0),
                 }

@@ -137,11 +137,11 @@ const COLUMNS: [Named; 28] = [
     (Head::new("centre_y_um", Kind::Number), |row| Cell::Number(row.object.centre_um[1])),
     (Head::new("depth_um", Kind::Number), |row| Cell::Number(row.object.depth_um)),
     (Head::new("rotation_deg", Kind::Number), |row| Cell::Number(row.object.rotation_deg)),
-    (Head::new("stain", Kind::Number), |row| Cell::Number(row.object.stain)),
+    (Head::new("stain", Kind::Number), |row| Cell::Number(row.object.mean_absorbance)),
     (Head::new("tint", Kind::Text), |row| Cell::text(row.object.tint_name())),
     (Head::new("area_um2", Kind::Number), |row| Cell::Number(row.object.area_um2)),
     (Head::new("area_px", Kind::Whole), |row| Cell::Whole(row.object.amodal.area())),
-    (Head::new("front_area_px", Kind::Whole), |row| Cell::Whole(row.object.front.area())),
+    (Head::new("front_area_px", Kind::Whole), |row| Cell::Whole(row.object.visible.area())),
     (Head::new("bbox_x_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.x)),
     (Head::new("bbox_y_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.y)),
     (Head::new("bbox_width_px", Kind::Whole).or_null(), |row| bounds(row, |b| b.width)),
@@ -164,7 +164,7 @@ const MORE: [Named; 4] = [
     (Head::new("image_width_px", Kind::Whole), |row| Cell::Whole(row.size[0] as u64)),
     (Head::new("image_height_px", Kind::Whole), |row| Cell::Whole(row.size[1] as u64)),
     (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.amodal, row.size[0], row.size[1]))),
-    (Head::new("front_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.front, row.size[0], row.size[1]))),
+    (Head::new("front_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.visible, row.size[0], row.size[1]))),
 ];
 
 pub(crate) fn typed_columns() -> Vec<Named> {

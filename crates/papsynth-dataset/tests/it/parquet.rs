@@ -90,7 +90,7 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
     assert_eq!(objects.clone().count(), masks.len());
     for (row, object) in masks.iter().zip(objects) {
         assert_eq!(rle::decode(text(&row[0]), WIDTH, HEIGHT).unwrap(), object.amodal);
-        assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.front);
+        assert_eq!(rle::decode(text(&row[1]), WIDTH, HEIGHT).unwrap(), object.visible);
         assert_eq!(row[2..], [Field::Long(WIDTH as i64), Field::Long(HEIGHT as i64)]);
     }
     // Text alone, if that is wanted, and the other is another data set.

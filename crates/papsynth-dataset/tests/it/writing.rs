@@ -200,7 +200,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
             rle::decode(rle["counts"].as_str().unwrap(), WIDTH, HEIGHT).unwrap()
         };
         assert_eq!(mask("segmentation"), object.amodal);
-        assert_eq!(mask("front"), object.front);
+        assert_eq!(mask("front"), object.visible);
         let category = coco["categories"].as_array().unwrap().iter().find(|c| c["id"] == annotation["category_id"]);
         assert_eq!(category.unwrap()["supercategory"], object.group().name());
     }
@@ -218,7 +218,7 @@ fn truth_is_the_same_in_masks_tables_and_labels() {
         assert_eq!(get(i, "image"), if i < 6 { "0" } else { "2" });
         assert_eq!(get(i, "id"), object.id.to_string());
         assert_eq!(get(i, "area_px"), object.amodal.area().to_string());
-        assert_eq!(get(i, "front_area_px"), object.front.area().to_string());
+        assert_eq!(get(i, "front_area_px"), object.visible.area().to_string());
         assert_eq!(get(i, "traits"), object.traits.to_string());
         assert_eq!(get(i, "truncated"), object.truncated.to_string());
         assert_eq!(get(i, "depth_um").parse(), Ok(object.depth_um));

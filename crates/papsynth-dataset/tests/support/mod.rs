@@ -11,7 +11,7 @@ use papsynth::scene::{
     Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
     Tint, View,
 };
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
@@ -184,9 +184,9 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     for part in [Part::Cytoplasm, Part::Nucleus, Part::Whole] {
         let members = of_part(&objects, part);
         let stack: Vec<_> = members.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
-        let fronts = front_masks(&stack, WIDTH, HEIGHT);
+        let fronts = visible_masks(&stack, WIDTH, HEIGHT);
         for (i, front) in members.into_iter().zip(fronts) {
-            objects[i].front = front;
+            objects[i].visible = front;
         }
     }
     let truth = Truth { width: WIDTH, height: HEIGHT, objects };

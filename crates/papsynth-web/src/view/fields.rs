@@ -41,7 +41,7 @@ struct Frame {
 /// An object and the bounds of its visible mask.
 struct VisibleObject {
     truth: ObjectTruth,
-    front: Option<Bounds>,
+    bounds: Option<Bounds>,
 }
 
 impl DatasetSource {
@@ -116,7 +116,7 @@ impl DatasetSource {
                     ),
                 ));
             }
-            let shown = |truth: ObjectTruth| VisibleObject { front: truth.front.bounds(), truth };
+            let shown = |truth: ObjectTruth| VisibleObject { bounds: truth.visible.bounds(), truth };
             self.cached[0].objects = Some(truth.objects.into_iter().map(shown).collect());
         }
         let frame = &self.cached[0];
@@ -173,15 +173,15 @@ impl Source for DatasetSource {
         // A pixel of a level shows the upper left pixel of the level below, like labels of slides.
         let level = |px: u32| (px as usize).div_ceil(step);
         let wider = region.wider(size);
-        for VisibleObject { truth, front } in objects.iter().filter(|object| object.truth.group() == group) {
-            let Some(bounds) = front else { continue };
+        for VisibleObject { truth, bounds } in objects.iter().filter(|object| object.truth.group() == group) {
+            let Some(bounds) = bounds else { continue };
             let is_apart = |part: &Range<usize>, start: u32, length: u32| {
                 level(start + length) <= part.start || level(start) >= part.end
             };
             if is_apart(&wider.rows, bounds.y, bounds.height) || is_apart(&wider.columns, bounds.x, bounds.width) {
                 continue;
             }
-            for run in truth.front.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
+            for run in truth.visible.runs().iter().filter(|run| (run.y as usize).is_multiple_of(step)) {
                 ids.paint(&region, run.y as usize / step, level(run.x0)..level(run.x1), truth.id);
             }
         }
@@ -198,12 +198,12 @@ impl Source for DatasetSource {
         let mut found: Vec<&ObjectTruth> =
             objects.iter().map(|shown| &shown.truth).filter(|truth| holds(&truth.amodal)).collect();
         found.sort_by(|a, b| b.depth_um.total_cmp(&a.depth_um).then(b.part.cmp(&a.part)));
-        Ok(found.into_iter().map(|truth| object_json(truth, holds(&truth.front))).collect())
+        Ok(found.into_iter().map(|truth| object_json(truth, holds(&truth.visible))).collect())
     }
 }
 
 /// Returns an object as JSON for the page.
-fn object_json(truth: &ObjectTruth, is_front: bool) -> Value {
+fn object_json(truth: &ObjectTruth, is_visible: bool) -> Value {
     json!({
         "id": truth.id,
         "colour": colour_text(truth.id),
@@ -214,11 +214,11 @@ fn object_json(truth: &ObjectTruth, is_front: bool) -> Value {
         "bethesda": truth.bethesda,
         "traits": truth.traits,
         "cluster": truth.cluster,
-        "front": is_front,
+        "visible": is_visible,
         "centre_um": truth.centre_um,
         "depth_um": truth.depth_um,
         "area_um2": truth.area_um2,
-        "stain": truth.stain,
+        "mean_absorbance": truth.mean_absorbance,
         "tint": truth.tint_name(),
         "rotation_deg": truth.rotation_deg,
         "truncated": truth.truncated,

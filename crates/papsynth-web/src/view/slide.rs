@@ -78,7 +78,7 @@ impl Source for SlideSource {
             let ids = self.set.labels(group, 0, y..y + 1, x..x + 1).map_err(reply_to)?;
             let there = ids.into_iter().filter(|id| *id != 0);
             found.extend(
-                there.map(|id| json!({ "id": id, "colour": colour_text(id), "group": group.name(), "front": true })),
+                there.map(|id| json!({ "id": id, "colour": colour_text(id), "group": group.name(), "visible": true })),
             );
         }
         Ok(found)

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::debris::ground::{CellPlace, Field, Sieve, Strewn};
+use crate::debris::placement::{CellPosition, Field, PlacedObject, PlotDensity};
 use crate::debris::{Body, Debris};
 use crate::error::{Cause, Error};
 use crate::key::Key;
@@ -80,33 +80,33 @@ pub(super) fn strew(
     [field, region]: [Region; 2],
     numbers: &FieldNumbers,
     stain: &FieldStain<'_>,
-    sieve: Option<Sieve<'_>>,
+    plot_density: Option<PlotDensity<'_>>,
     objects: &mut Vec<Object>,
 ) {
     debris.clue_cells.draw(numbers, objects.iter_mut().map(|cell| (cell.number, &mut cell.coat)));
     let place = |object: &Object| match &object.body {
         Body::Cell(body) => {
             let (centre_um, depth_um) = (object.centre_um, object.depth_um);
-            Some(CellPlace { centre_um, depth_um, radius_um: body.radius_um })
+            Some(CellPosition { centre_um, depth_um, radius_um: body.radius_um })
         }
         _ => None,
     };
-    let is_inside = |cell: &CellPlace| field.touches(cell.centre_um, 0.0);
+    let is_inside = |cell: &CellPosition| field.touches(cell.centre_um, 0.0);
     let (mut cells, outside): (Vec<_>, Vec<_>) = objects.iter().filter_map(place).partition(is_inside);
     let inside = cells.len();
     cells.extend(outside);
-    let strewn = debris.draw(&Field { field, region, numbers, stain, cells, inside, sieve });
-    objects.extend(strewn.into_iter().map(|Strewn { number, cluster, lie, thing }| Object {
+    let placed = debris.draw(&Field { field, region, numbers, stain, cells, inside, plot_density });
+    objects.extend(placed.into_iter().map(|PlacedObject { number, cluster, placement, body }| Object {
         id: 0,
         number,
         cluster,
         plot: None,
-        centre_um: lie.centre_um,
-        depth_um: lie.depth_um,
-        rotation_deg: lie.rotation_deg,
+        centre_um: placement.centre_um,
+        depth_um: placement.depth_um,
+        rotation_deg: placement.rotation_deg,
         bethesda: String::new(),
         coat: None,
-        body: thing,
+        body,
     }));
 }
 

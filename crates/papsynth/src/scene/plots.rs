@@ -17,7 +17,7 @@ use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
 use super::view::{FieldNumbers, Region, View};
-use crate::debris::ground::{Sieve, near};
+use crate::debris::placement::{PlotDensity, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -290,8 +290,8 @@ impl Population {
             self.deposit.density(place) / DENSEST
         };
         // Those that stay anywhere are tried as often as there are some, the others more often.
-        let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(sieve), &mut objects);
+        let plot_density = PlotDensity { area_in_fields: self.share, max_density: DENSEST, keep_probability: &stays };
+        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });

@@ -65,14 +65,14 @@ const OBJECT: [ObjectColumn; 18] = [
         Cell::List(bounds.map(|side| Cell::Whole(side.into())).to_vec())
     }),
     (head("area", Kind::Whole), |o| Cell::Whole(o.truth.amodal.area())),
-    (head("front_area", Kind::Whole), |o| Cell::Whole(o.truth.front.area())),
+    (head("front_area", Kind::Whole), |o| Cell::Whole(o.truth.visible.area())),
     (head("area_um2", Kind::Number), |o| Cell::Number(o.truth.area_um2)),
     (head("depth_um", Kind::Number), |o| Cell::Number(o.truth.depth_um)),
-    (head("stain", Kind::Number), |o| Cell::Number(o.truth.stain)),
+    (head("stain", Kind::Number), |o| Cell::Number(o.truth.mean_absorbance)),
     (head("tint", Kind::Text), |o| Cell::text(o.truth.tint_name())),
     (head("truncated", Kind::Flag), |o| Cell::Flag(o.truth.truncated)),
     (head("rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.amodal, o.frame.width, o.frame.height))),
-    (head("front_rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.front, o.frame.width, o.frame.height))),
+    (head("front_rle", Kind::Text), |o| Cell::text(rle::encode(&o.truth.visible, o.frame.width, o.frame.height))),
 ];
 
 const OBJECT_HEADS: [Head; OBJECT.len()] = {

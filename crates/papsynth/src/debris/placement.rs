@@ -1,4 +1,4 @@
-//! The slide on which debris of one kind is strewn: where its cells lie, and the clusters that lie among them.
+//! Placement of debris: positions on the slide and on its cells, and clusters of objects.
 
 use crate::key::Stream;
 use crate::random;
@@ -8,7 +8,7 @@ use crate::recipe::number::Number;
 use crate::scene::stain::FieldStain;
 use crate::scene::view::{FieldNumbers, Region};
 
-/// A field whose cells have their places.
+/// A field with placed cells.
 pub(crate) struct Field<'a> {
     /// The field, and the field with its margin.
     pub(crate) field: Region,
@@ -16,140 +16,142 @@ pub(crate) struct Field<'a> {
     pub(crate) numbers: &'a FieldNumbers,
     pub(crate) stain: &'a FieldStain<'a>,
     /// Cells; the first `inside` have their centres in the field, the others in the margin.
-    pub(crate) cells: Vec<CellPlace>,
+    pub(crate) cells: Vec<CellPosition>,
     pub(crate) inside: usize,
-    /// What may lie on a part of a slide: how much there is relative to a field, and where it stays.
-    pub(crate) sieve: Option<Sieve<'a>>,
+    /// On a slide: the density of debris in one plot.
+    pub(crate) plot_density: Option<PlotDensity<'a>>,
 }
 
-/// A field on which objects of one kind are strewn.
-pub(crate) struct Ground<'a, T> {
+/// Places the objects of one kind on a field.
+pub(crate) struct KindPlacer<'a, T> {
     field: &'a Field<'a>,
-    /// The name of the kind, and of its section.
+    /// Name of the kind.
     kind: &'static str,
+    /// Name of its section of the recipe.
     section: &'static str,
-    lies_on_glass: bool,
-    /// Whether its objects also lie in the margin of the field.
+    is_on_glass: bool,
+    /// Whether objects are also placed in the margin of the field.
     in_margin: bool,
-    pub(super) strewn: Vec<Strewn<T>>,
+    pub(super) objects: Vec<PlacedObject<T>>,
 }
 
-/// An object that was strewn, and what it is.
-pub(crate) struct Strewn<T> {
-    /// Its number within its kind.
+/// A placed object.
+pub(crate) struct PlacedObject<T> {
+    /// Number within its kind.
     pub(crate) number: u64,
-    /// Its cluster; 0 if it is alone.
+    /// Number of its cluster; 0 for a single object.
     pub(crate) cluster: u32,
-    pub(crate) lie: Lie,
-    pub(crate) thing: T,
+    pub(crate) placement: Placement,
+    pub(crate) body: T,
 }
 
-/// What is strewn on a part of a slide.
-pub(crate) struct Sieve<'a> {
-    /// How large the part is, in fields.
-    pub(crate) share: f64,
-    /// How many more are tried of what came with the cells.
-    pub(crate) most: f64,
-    /// The probability that one of those stays at a place, µm.
-    pub(crate) stays: &'a dyn Fn([f64; 2]) -> f64,
+/// The density of debris in one plot of a slide.
+pub(crate) struct PlotDensity<'a> {
+    /// Area of the plot relative to a field.
+    pub(crate) area_in_fields: f64,
+    /// Maximum relative density of objects that are not on the glass; this many candidates are drawn.
+    pub(crate) max_density: f64,
+    /// Returns the probability that a candidate at a position (µm) is kept.
+    pub(crate) keep_probability: &'a dyn Fn([f64; 2]) -> f64,
 }
 
-/// Where a cell lies, for what lies on it.
-pub(crate) struct CellPlace {
+/// The position of a cell, for objects on it.
+pub(crate) struct CellPosition {
     pub(crate) centre_um: [f64; 2],
     pub(crate) depth_um: f64,
     pub(crate) radius_um: f64,
 }
 
-/// Where a cluster lies, and how wide it is.
+/// The position and radius of a cluster.
 pub(super) struct Cluster {
     pub(super) centre_um: [f64; 2],
     pub(super) depth_um: f64,
     radius_um: f64,
 }
 
-/// Clusters of objects: the purpose of their streams, and what is drawn of each.
+/// Parameters of clusters of objects.
 pub(super) struct Clusters<'a> {
+    /// Purpose of the random streams of clusters.
     pub(super) purpose: &'static str,
-    /// Share that lies on a cell.
+    /// Fraction of clusters that are on a cell.
     pub(super) on_cells: &'a Number,
     pub(super) radius_um: &'a Number,
-    /// Objects of a cluster.
+    /// Objects per cluster.
     pub(super) members: &'a Number,
-    /// Standard deviation of their depths, µm.
-    pub(super) spread_um: f64,
+    /// Standard deviation of the depths in a cluster, µm.
+    pub(super) depth_sd_um: f64,
 }
 
-/// Where an object lies.
-pub(crate) struct Lie {
+/// Position and rotation of an object.
+pub(crate) struct Placement {
     pub(crate) centre_um: [f64; 2],
     pub(crate) depth_um: f64,
     pub(crate) rotation_deg: f64,
 }
 
-/// Height of what lies on a cell above the cell's middle, µm.
-const ON_TOP_UM: f64 = 0.8;
+/// Height of objects on a cell above the centre of the cell, µm.
+const ON_CELL_UM: f64 = 0.8;
 
-/// Share of what lies with a cell that lies beneath it.
-const BENEATH: f64 = 0.25;
+/// Fraction of the objects at a cell that are below it.
+const BELOW_CELL: f64 = 0.25;
 
-impl<'a, T> Ground<'a, T> {
+impl<'a, T> KindPlacer<'a, T> {
     pub(super) fn new(
         field: &'a Field<'a>,
         kind: &'static str,
         section: &'static str,
-        lies_on_glass: bool,
+        is_on_glass: bool,
         in_margin: bool,
     ) -> Self {
-        Self { field, kind, section, lies_on_glass, in_margin, strewn: Vec::new() }
+        Self { field, kind, section, is_on_glass, in_margin, objects: Vec::new() }
     }
 
-    /// Draws the number of objects, or of clusters, of the field or of the part of a slide.
+    /// Draws the number of objects or clusters in the field or plot.
     pub(super) fn count(&self, (name, abundance): (&str, &Abundance)) -> u64 {
         let path = format!("debris.{}.{name}", self.section);
         let (numbers, area_mm2) = (self.field.numbers, self.field.region.area_mm2());
-        let Some(sieve) = &self.field.sieve else { return numbers.number_of((&path, abundance), area_mm2) };
-        let more = if self.lies_on_glass { 1.0 } else { sieve.most };
-        numbers.number_on_slide((&path, abundance), [area_mm2, sieve.share], more)
+        let Some(plot) = &self.field.plot_density else { return numbers.number_of((&path, abundance), area_mm2) };
+        let factor = if self.is_on_glass { 1.0 } else { plot.max_density };
+        numbers.number_on_slide((&path, abundance), [area_mm2, plot.area_in_fields], factor)
     }
 
-    /// Returns the area where the objects lie.
+    /// Returns the region in which objects are placed.
     fn region(&self) -> Region {
         if self.in_margin { self.field.region } else { self.field.field }
     }
 
-    /// Returns the cells there.
-    fn cells(&self) -> &[CellPlace] {
+    /// Returns the cells in that region.
+    fn cells(&self) -> &[CellPosition] {
         if self.in_margin { &self.field.cells } else { &self.field.cells[..self.field.inside] }
     }
 
-    /// The stream of a purpose of one object of the kind.
+    /// Returns the random stream of one object of the kind for a purpose.
     pub(super) fn stream(&self, number: u64, purpose: &str) -> Stream {
         self.field.numbers.key.stream(self.kind, number, purpose)
     }
 
-    /// Dyes as this field was stained.
+    /// Returns amounts of dye with the stain balance of the field.
     pub(super) fn dyes(&self, dyes: &DyeAmounts) -> dye_spectra::Amounts {
         self.field.stain.balanced(dyes)
     }
 
-    /// How strongly the field's nuclei are stained.
+    /// Returns the factor on the absorbance of nuclei in this field.
     pub(super) fn nuclear_stain(&self) -> f64 {
         self.field.stain.nucleus
     }
 
-    /// Dyes of pale cytoplasm.
+    /// Returns the dyes of cyanophilic cytoplasm.
     pub(super) fn cyanophilic(&self) -> dye_spectra::Amounts {
         self.field.stain.cyanophilic()
     }
 
-    /// Any place of the field.
+    /// Draws a uniform position in the field.
     pub(super) fn anywhere(&self, rng: &mut Stream) -> [f64; 2] {
         let Region { low_um: [left, top], size_um: [width, height] } = self.region();
         [left + random::between(0.0, width, rng), top + random::between(0.0, height, rng)]
     }
 
-    /// A cluster on a cell or anywhere.
+    /// Draws a cluster on a cell or anywhere.
     pub(super) fn cluster(&self, on_cells: &Number, radius_um: &Number, rng: &mut Stream) -> Cluster {
         let on_cell = random::chance(on_cells.draw(rng), rng);
         let radius_um = radius_um.draw(rng);
@@ -161,14 +163,14 @@ impl<'a, T> Ground<'a, T> {
                 let reach = distance * cell.radius_um * 0.9;
                 let centre_um =
                     [cell.centre_um[0] + reach * libm::cos(angle), cell.centre_um[1] + reach * libm::sin(angle)];
-                Cluster { centre_um, depth_um: cell.depth_um + ON_TOP_UM, radius_um }
+                Cluster { centre_um, depth_um: cell.depth_um + ON_CELL_UM, radius_um }
             }
             _ => Cluster { centre_um: anywhere, depth_um: random::normal(rng), radius_um },
         }
     }
 
-    /// Strews objects that lie anywhere. `draw` draws one, by its number, from its stream, and `depth_um` its depth.
-    pub(super) fn strew_anywhere(
+    /// Places objects anywhere. `draw` draws an object, given its number and stream; `depth_um` draws its depth.
+    pub(super) fn place_anywhere(
         &mut self,
         count: (&str, &Abundance),
         draw: impl Fn(&Self, u64, &mut Stream) -> T,
@@ -177,14 +179,14 @@ impl<'a, T> Ground<'a, T> {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
             let centre_um = self.anywhere(&mut rng);
-            let thing = draw(self, number, &mut rng);
-            let lie = Lie::any_way(centre_um, depth_um(&mut rng), &mut rng);
-            self.add(number, 0, lie, thing);
+            let body = draw(self, number, &mut rng);
+            let placement = Placement::with_random_rotation(centre_um, depth_um(&mut rng), &mut rng);
+            self.add(number, 0, placement, body);
         }
     }
 
-    /// Strews objects of which a share lies on cells. `draw` draws one from its stream.
-    pub(super) fn strew_on_cells(
+    /// Places objects, a fraction of them on cells. `draw` draws an object from its stream.
+    pub(super) fn place_on_cells(
         &mut self,
         count: (&str, &Abundance),
         on_cells: &Number,
@@ -192,17 +194,17 @@ impl<'a, T> Ground<'a, T> {
     ) {
         for number in 0..self.count(count) {
             let mut rng = self.stream(number, "body");
-            let spot = self.cluster(on_cells, &Number::Fixed(0.0), &mut rng);
-            // Mostly on top of the cell, sometimes beneath it.
-            let down_um = if random::chance(BENEATH, &mut rng) { 2.0 * ON_TOP_UM } else { 0.0 };
-            let thing = draw(&mut rng);
-            let lie = Lie::any_way(spot.centre_um, spot.depth_um - down_um, &mut rng);
-            self.add(number, 0, lie, thing);
+            let position = self.cluster(on_cells, &Number::Fixed(0.0), &mut rng);
+            // Most are above the cell, some below it.
+            let shift_um = if random::chance(BELOW_CELL, &mut rng) { 2.0 * ON_CELL_UM } else { 0.0 };
+            let body = draw(&mut rng);
+            let placement = Placement::with_random_rotation(position.centre_um, position.depth_um - shift_um, &mut rng);
+            self.add(number, 0, placement, body);
         }
     }
 
-    /// Strews clusters of objects. `draw` draws one, by its number, from its stream.
-    pub(super) fn strew_in_clusters(
+    /// Places clusters of objects. `draw` draws an object, given its number and stream.
+    pub(super) fn place_in_clusters(
         &mut self,
         count: (&str, &Abundance),
         clusters: &Clusters<'_>,
@@ -214,30 +216,30 @@ impl<'a, T> Ground<'a, T> {
             for member in 0..clusters.members.draw_count(&mut rng).max(1) as u64 {
                 let number = member_number(index, member);
                 let mut rng = self.stream(number, "body");
-                let centre_um = cluster.place(&mut rng);
-                let thing = draw(self, number, &mut rng);
-                let depth_um = cluster.depth_um + clusters.spread_um * random::normal(&mut rng);
-                let lie = Lie::any_way(centre_um, depth_um, &mut rng);
-                self.add(number, cluster_id(index), lie, thing);
+                let centre_um = cluster.draw_position(&mut rng);
+                let body = draw(self, number, &mut rng);
+                let depth_um = cluster.depth_um + clusters.depth_sd_um * random::normal(&mut rng);
+                let placement = Placement::with_random_rotation(centre_um, depth_um, &mut rng);
+                self.add(number, cluster_id(index), placement, body);
             }
         }
     }
 
-    /// Lets an object lie there; what is alone is of cluster 0.
-    pub(super) fn add(&mut self, number: u64, cluster: u32, lie: Lie, thing: T) {
-        if let Some(sieve) = self.field.sieve.as_ref().filter(|_| !self.lies_on_glass) {
+    /// Adds an object; single objects have cluster 0.
+    pub(super) fn add(&mut self, number: u64, cluster: u32, placement: Placement, body: T) {
+        if let Some(plot) = self.field.plot_density.as_ref().filter(|_| !self.is_on_glass) {
             let mut rng = self.stream(number, "stays");
-            if !random::chance((sieve.stays)(lie.centre_um), &mut rng) {
+            if !random::chance((plot.keep_probability)(placement.centre_um), &mut rng) {
                 return;
             }
         }
-        self.strewn.push(Strewn { number, cluster, lie, thing });
+        self.objects.push(PlacedObject { number, cluster, placement, body });
     }
 }
 
 impl Cluster {
-    /// A place in the cluster: normal about its middle, the weight map of a single clump.
-    pub(super) fn place(&self, rng: &mut Stream) -> [f64; 2] {
+    /// Draws a position in the cluster, normally distributed about its centre.
+    pub(super) fn draw_position(&self, rng: &mut Stream) -> [f64; 2] {
         [
             self.centre_um[0] + self.radius_um * random::normal(rng),
             self.centre_um[1] + self.radius_um * random::normal(rng),
@@ -245,24 +247,24 @@ impl Cluster {
     }
 }
 
-impl Lie {
-    /// Turned to any direction.
-    pub(super) fn any_way(centre_um: [f64; 2], depth_um: f64, rng: &mut Stream) -> Self {
+impl Placement {
+    /// Creates a placement with a random rotation.
+    pub(super) fn with_random_rotation(centre_um: [f64; 2], depth_um: f64, rng: &mut Stream) -> Self {
         Self { centre_um, depth_um, rotation_deg: random::between(0.0, 360.0, rng) }
     }
 }
 
-/// The name of a kind's cluster of that index.
+/// Returns the number of the cluster with this index.
 pub(super) fn cluster_id(index: u64) -> u32 {
     u32::try_from(index + 1).unwrap_or(u32::MAX)
 }
 
-/// The number of a member of a cluster within its kind.
+/// Returns the number within its kind of a member of a cluster.
 pub(super) fn member_number(cluster: u64, member: u64) -> u64 {
     cluster << 32 | member
 }
 
-/// Whether two places are nearer to each other than a distance.
+/// Whether two points are closer than a distance.
 pub(crate) fn near(a: [f64; 2], b: [f64; 2], distance: f64) -> bool {
     let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
     dx * dx + dy * dy < distance * distance
