@@ -7,7 +7,7 @@ mod error;
 mod fields;
 mod key;
 mod parameters;
-mod picture;
+mod grey_image;
 mod plan;
 mod results;
 mod saved;

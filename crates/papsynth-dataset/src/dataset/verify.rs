@@ -171,7 +171,7 @@ fn verify_in(
 
 /// Returns the shard that a file belongs to by its name: `images/000003.png` belongs to the shard of frame 3.
 fn shard_of(path: &str, dataset: &Dataset) -> Option<u64> {
-    const OF_FRAMES: [&str; 5] = ["images", "labels", "noise-free", "all-in-focus", "scenes"];
+    const OF_FRAMES: [&str; 6] = ["images", "preview", "labels", "noise-free", "all-in-focus", "scenes"];
     let (top, name) = path.split_once('/')?;
     let format = dataset.layout.formats.iter().find(|format| format.name() == top);
     let is_of_shard = [names::SHARDS, names::TABLES].contains(&top) || format.is_some_and(|format| format.is_sharded());

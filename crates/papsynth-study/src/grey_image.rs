@@ -35,7 +35,7 @@ const TRIES: usize = 60;
 pub(crate) type Places = Vec<[usize; 2]>;
 
 #[derive(Debug, Clone)]
-pub(crate) struct Picture {
+pub(crate) struct GreyImage {
     pub(crate) width: usize,
     pub(crate) levels: Vec<f32>,
 }
@@ -43,7 +43,7 @@ pub(crate) struct Picture {
 /// An image as in its file.
 #[derive(Debug)]
 pub(crate) struct Raw {
-    pub(crate) picture: Picture,
+    pub(crate) image: GreyImage,
     pub(crate) bytes: Vec<u8>,
     /// Whether the file has more than 8 bits.
     pub(crate) is_deep: bool,
@@ -61,16 +61,16 @@ impl Raw {
             let Stack { width, mut planes } = Stack::decode(&bytes, &limits).map_err(refuse)?;
             let central = planes.len() / 2;
             let levels = if planes.is_empty() { Vec::new() } else { planes.swap_remove(central) };
-            return Ok(Self { picture: Picture { width, levels }, bytes, is_deep: true });
+            return Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: true });
         }
         let LevelImage { width, channels, levels, white } = LevelImage::decode(&bytes, &limits).map_err(refuse)?;
         let green = if channels > 1 { 1 } else { 0 };
         let levels = levels.into_iter().skip(green).step_by(channels).map(f32::from).collect();
-        Ok(Self { picture: Picture { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
+        Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
     }
 }
 
-impl Picture {
+impl GreyImage {
     pub(crate) fn height(&self) -> usize {
         self.levels.len() / self.width.max(1)
     }
@@ -222,8 +222,8 @@ mod tests {
 
     use super::*;
 
-    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> Picture {
-        Picture { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
+    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> GreyImage {
+        GreyImage { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
     }
 
     fn rng() -> Xoshiro256PlusPlus {
@@ -251,24 +251,24 @@ mod tests {
     #[test]
     fn patches_are_covered_and_have_little_overlap() {
         // Discs of half the intensity on unevenly illuminated glass.
-        let picture = field(900, 700, |x, y| {
+        let image = field(900, 700, |x, y| {
             let light = 230.0 - 0.02 * x as f32;
             let (dx, dy) = ((x % 300) as f32 - 150.0, (y % 300) as f32 - 150.0);
             if dx * dx + dy * dy < 80.0 * 80.0 { 0.5 * light } else { light }
         });
-        let places = picture.places(200, 8, &mut rng());
+        let places = image.places(200, 8, &mut rng());
         assert_eq!(places.len(), 8);
-        let glass = picture.glass();
+        let glass = image.glass();
         for (k, &[x, y]) in places.iter().enumerate() {
             assert!(
                 (MARGIN_PX..=900 - 200 - MARGIN_PX).contains(&x) && (MARGIN_PX..=700 - 200 - MARGIN_PX).contains(&y)
             );
-            assert!(picture.cover([x, y], 200, glass) >= MIN_COVER);
+            assert!(image.cover([x, y], 200, glass) >= MIN_COVER);
             assert!(places[..k].iter().all(|other| overlap([x, y], *other, 200) <= MAX_OVERLAP));
         }
-        assert_eq!(places, picture.places(200, 8, &mut rng()), "the same seed gives the same positions");
+        assert_eq!(places, image.places(200, 8, &mut rng()), "the same seed gives the same positions");
         // The exposure does not change the positions.
-        let darker = Picture { width: picture.width, levels: picture.levels.iter().map(|l| l * 0.5).collect() };
+        let darker = GreyImage { width: image.width, levels: image.levels.iter().map(|l| l * 0.5).collect() };
         assert_eq!(places, darker.places(200, 8, &mut rng()));
     }
 
