@@ -9,8 +9,8 @@ use crate::error::Error;
 /// Size of the averaging window of the shading correction, px; frames must be larger.
 const SHADING_PX: usize = 15;
 
-/// Smallest difference between the brightest flat and the dark level, as a fraction of full scale. Below it, noise dominates the
-/// measured gain.
+/// Smallest difference between the brightest flat and the dark level, as a fraction of full scale. Below it, noise
+/// dominates the measured gain.
 const MIN_LIGHT: f64 = 0.01;
 
 /// The measured camera.

@@ -28,7 +28,8 @@ const BORDER_PX: f64 = 256.0;
 
 const MIB: f64 = 1_048_576.0;
 
-/// Estimated memory of the frames of a recipe, bytes: at least the measured use, and less than 2.5 times the measured use.
+/// Estimated memory of the frames of a recipe, bytes: at least the measured use, and less than 2.5 times the measured
+/// use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MemoryEstimate {
     /// Memory of the program without frames.
@@ -51,7 +52,8 @@ pub struct MemoryPlan {
 }
 
 impl MemoryEstimate {
-    /// Returns the estimate for the largest frame of a recipe. `tests/memory.rs` of papsynth-cli measures the constants.
+    /// Returns the estimate for the largest frame of a recipe. `tests/memory.rs` of papsynth-cli measures the
+    /// constants.
     #[must_use]
     pub fn of(recipe: &Recipe, layout: &Layout) -> Self {
         let most = |number: &Number| number.bounds()[1];
@@ -97,8 +99,8 @@ impl MemoryEstimate {
         let count: f64 = cells.iter().map(|(count, _)| count).sum();
         let all: f64 = cells.iter().map(|(count, samples)| count * samples).sum();
         let largest = cells.iter().map(|(_, samples)| *samples).fold(0.0, f64::max);
-        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all objects;
-        // buffers if threads share the frame.
+        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all
+        // objects; buffers if threads share the frame.
         let (kept, buffers, shared_buffers) = match (is_filtered, lights > 1.0) {
             (false, _) => (0.0, 8.0, 8.0),
             (true, false) => (25.0, 136.0, 62.0),
@@ -132,8 +134,8 @@ impl MemoryEstimate {
         Self { program, frame: of_frame.frame + side * side * a_pixel, shared: f64::INFINITY }
     }
 
-    /// Returns the parallelism that fits into a budget in bytes: at most `workers` frames at once or, with `shared`, one
-    /// frame on all threads. Returns `None` if one frame does not fit.
+    /// Returns the parallelism that fits into a budget in bytes: at most `workers` frames at once or, with `shared`,
+    /// one frame on all threads. Returns `None` if one frame does not fit.
     #[must_use]
     pub fn plan(&self, workers: usize, shared: bool, budget: Option<u64>) -> Option<MemoryPlan> {
         let budget = budget.map_or(f64::INFINITY, |bytes| bytes as f64);

@@ -8,7 +8,8 @@ use rand_core::Rng;
 use crate::error::Error;
 use crate::fields::{Field, bytes};
 
-/// Rows and columns at each border of a field that are not shown: fusion of planes or registration can leave them black.
+/// Rows and columns at each border of a field that are not shown: fusion of planes or registration can leave them
+/// black.
 const MARGIN_PX: usize = 8;
 
 /// Stride of the sampled pixels and rows that decide whether a patch is shown.
@@ -17,7 +18,8 @@ const STRIDE_PX: usize = 4;
 /// Quantile of the levels that defines the glass; bright specks are above it.
 const GLASS_QUANTILE: f64 = 0.95;
 
-/// Lower bound of the glass level of a patch, as a fraction of that of the field. Uneven illumination reduces it by less.
+/// Lower bound of the glass level of a patch, as a fraction of that of the field. Uneven illumination reduces it by
+/// less.
 const MIN_GLASS: f32 = 0.85;
 
 /// A pixel below this fraction of the glass level is covered. Noise and uneven illumination reduce the level by less.
@@ -50,8 +52,8 @@ pub(crate) struct Raw {
 }
 
 impl Raw {
-    /// Reads a field. Of a colour image it reads the green channel, which has the highest contrast and is nearest to the 570 nm
-    /// of the paper; of a stack the central plane.
+    /// Reads a field. Of a colour image it reads the green channel, which has the highest contrast and is nearest to
+    /// the 570 nm of the paper; of a stack the central plane.
     pub(crate) fn read(field: &Field) -> Result<Self, Error> {
         let limits = Limits::default();
         let bytes = bytes(&field.path, limits.max_file_bytes)?;
@@ -83,8 +85,8 @@ impl GreyImage {
         glass(&mut self.sample([0, 0], [self.width, self.height()], STRIDE_PX))
     }
 
-    /// Resamples to pixels that are `factor` times as large: area-weighted means, as in a camera with larger pixels. A factor
-    /// up to 1 changes nothing.
+    /// Resamples to pixels that are `factor` times as large: area-weighted means, as in a camera with larger pixels. A
+    /// factor up to 1 changes nothing.
     pub(crate) fn reduced(self, factor: f64) -> Self {
         if factor <= 1.0 {
             return self;
@@ -122,8 +124,9 @@ impl GreyImage {
         is_inside.then(|| self.sample([x, y], [side, side], 1))
     }
 
-    /// Returns up to `wanted` random positions (left, top) of patches that are sufficiently covered and have little overlap. The
-    /// rule is the same for real and synthetic fields, and depends only on ratios of levels, not on the exposure.
+    /// Returns up to `wanted` random positions (left, top) of patches that are sufficiently covered and have little
+    /// overlap. The rule is the same for real and synthetic fields, and depends only on ratios of levels, not on the
+    /// exposure.
     pub(crate) fn places<R: Rng + ?Sized>(&self, side: usize, wanted: usize, rng: &mut R) -> Places {
         let mut places = Places::new();
         let free = |length: usize| length.checked_sub(side + 2 * MARGIN_PX);
@@ -167,7 +170,8 @@ fn glass(sample: &mut [f32]) -> f32 {
     *sample.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
-/// Returns for each larger pixel along a line of `length` pixels the first pixel that it covers, and the weights of all.
+/// Returns for each larger pixel along a line of `length` pixels the first pixel that it covers, and the weights of
+/// all.
 fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a length")]
     let whole = |x: f64| x as usize;
@@ -197,8 +201,8 @@ pub(crate) fn noisy<R: Rng + ?Sized>(levels: &[f32], sigma: f64, rng: &mut R) ->
         .collect()
 }
 
-/// Encodes a square of 8-bit grey levels. The file is not compressed: the size of a compressed file could distinguish real from
-/// synthetic patches. It has only the mandatory chunks.
+/// Encodes a square of 8-bit grey levels. The file is not compressed: the size of a compressed file could distinguish
+/// real from synthetic patches. It has only the mandatory chunks.
 pub(crate) fn png(grey: &[u8], side: usize) -> Vec<u8> {
     let mut out = Vec::with_capacity(grey.len() + grey.len() / 64);
     let length = u32::try_from(side).unwrap_or_default();

@@ -83,8 +83,8 @@ impl Folders {
 }
 
 impl Plan {
-    /// Draws a plan. Fields depend only on the seed, so that they are the same for all subjects; patches, order and noise also
-    /// depend on the subject.
+    /// Draws a plan. Fields depend only on the seed, so that they are the same for all subjects; patches, order and
+    /// noise also depend on the subject.
     pub(crate) fn draw(params: &StudyParams, folders: &Folders) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let chosen = choose(params, folders, &mut notes);
@@ -180,7 +180,7 @@ impl FieldRecord {
             Grey::Glass => GLASS_LEVEL / self.glass,
         };
         image.levels.iter_mut().for_each(|level| *level *= scale);
-        Ok(picture)
+        Ok(image)
     }
 
     fn changed(&self, folders: &Folders) -> Error {
@@ -295,8 +295,8 @@ fn take_in_turn(turns: &[usize], places: &[Places], needed: usize) -> Vec<(usize
     all.take(needed).collect()
 }
 
-/// Reads for each field the differing recipe values and the objects of its data set. They are only needed for the breakdown, so
-/// a failure is a note, not an error.
+/// Reads for each field the differing recipe values and the objects of its data set. They are only needed for the
+/// breakdown, so a failure is a note, not an error.
 fn field_parameters<'a>(
     folders: &Folders,
     chosen: &[(Side, &'a Field)],

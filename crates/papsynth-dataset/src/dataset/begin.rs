@@ -46,7 +46,8 @@ impl Dataset {
         Self::begin(location, identity, info.layout.clone(), categories(info.recipe), map, &given)
     }
 
-    /// As [`create_or_resume`](Self::create_or_resume), with the identity and the input files `given`, the recipe first.
+    /// As [`create_or_resume`](Self::create_or_resume), with the identity and the input files `given`, the recipe
+    /// first.
     pub(crate) fn begin(
         location: impl Into<Location>,
         identity: Identity,

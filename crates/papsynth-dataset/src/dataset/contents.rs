@@ -1,9 +1,9 @@
 //! Checks of a shard: its files match its record, and the files are consistent. The second check finds files that were
 //! written wrongly, or changed together with their hashes.
 //!
-//! Everything is derived from the complete masks in the COCO document: visible masks, boxes, areas, the table, the summary in
-//! the record, and every label image, layer and outline of every format. Images must be equal in all formats, and have the
-//! size and the bit depth in the record.
+//! Everything is derived from the complete masks in the COCO document: visible masks, boxes, areas, the table, the
+//! summary in the record, and every label image, layer and outline of every format. Images must be equal in all
+//! formats, and have the size and the bit depth in the record.
 
 use std::fmt::{self, Formatter};
 use std::path::Path;
@@ -58,7 +58,8 @@ impl fmt::Display for Finding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fix {
-    /// `papsynth generate --verify` with the same recipe generates the file again; for a slide `papsynth slide make --verify`.
+    /// `papsynth generate --verify` with the same recipe generates the file again; for a slide `papsynth slide make
+    /// --verify`.
     Generate,
     /// `papsynth clean --untracked` removes the file.
     Clean,
@@ -67,7 +68,8 @@ pub enum Fix {
 }
 
 impl Dataset {
-    /// Returns the record of a shard if the shard is complete: the record belongs to this data set, and all its files match it.
+    /// Returns the record of a shard if the shard is complete: the record belongs to this data set, and all its files
+    /// match it.
     ///
     /// # Errors
     /// If a file cannot be read.

@@ -15,8 +15,8 @@ use crate::formats::{Format, LIMITS, Layout, levels, names};
 use crate::read::{self, LevelImage};
 use crate::truth::{Document, FrameSummary};
 
-/// Writes a data set in other formats into another folder, or resumes an earlier conversion. Grey levels, masks, recipe,
-/// model and seed are copied unchanged. Calls `report` after each frame, in order.
+/// Writes a data set in other formats into another folder, or resumes an earlier conversion. Grey levels, masks,
+/// recipe, model and seed are copied unchanged. Calls `report` after each frame, in order.
 ///
 /// # Errors
 /// If `from` is not a complete data set, its recipe or model was changed, its formats lack images that `layout` needs

@@ -68,9 +68,9 @@ impl Dataset {
         formats.find(|format| format.has_planes() && format.needs().is_none())
     }
 
-    /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved, from 0 to
-    /// [`FrameSummary::white`]. For a stack without planes ([`has_planes`](Self::has_planes)), the only plane is the
-    /// extended-depth-of-field image.
+    /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved,
+    /// from 0 to [`FrameSummary::white`]. For a stack without planes ([`has_planes`](Self::has_planes)), the only plane
+    /// is the extended-depth-of-field image.
     ///
     /// # Errors
     /// If the image cannot be read or differs from the record.
@@ -104,8 +104,8 @@ impl Dataset {
     }
 }
 
-/// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing, the
-/// central plane.
+/// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing,
+/// the central plane.
 pub(super) fn display_image(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
     let (image, edf) = dataset.image_paths(frame, shard);
     let name = edf.unwrap_or(image);
@@ -205,8 +205,8 @@ pub fn image_paths(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Er
     Ok(images)
 }
 
-/// Returns the first difference between the ground truth of two data sets: objects, classes, positions, complete and visible
-/// masks. Absorbance, defocus and detectability may differ.
+/// Returns the first difference between the ground truth of two data sets: objects, classes, positions, complete and
+/// visible masks. Absorbance, defocus and detectability may differ.
 ///
 /// # Errors
 /// If one is not a data set, or its ground truth cannot be read.
@@ -250,9 +250,9 @@ fn difference(one: &Truth, other: &Truth) -> Option<String> {
     one.objects.iter().zip(&other.objects).find_map(|(a, b)| what(a, b))
 }
 
-/// Returns the fields in a folder, sorted by name. The folder is a data set with masks of nuclei, or contains images (in it or
-/// in `images`). Nuclei of images are masks of the same name in `masks` (labels, or values above 0), or a table `NAME.csv`
-/// of `y,x` points next to the image. `frames.csv` lists the group of each image.
+/// Returns the fields in a folder, sorted by name. The folder is a data set with masks of nuclei, or contains images
+/// (in it or in `images`). Nuclei of images are masks of the same name in `masks` (labels, or values above 0), or a
+/// table `NAME.csv` of `y,x` points next to the image. `frames.csv` lists the group of each image.
 ///
 /// # Errors
 /// If there is no image, the folder cannot be read, or its tables are invalid.

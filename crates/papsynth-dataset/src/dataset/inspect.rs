@@ -106,8 +106,8 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     Ok(overview)
 }
 
-/// Returns the shards that are incomplete or lack a frame of a range. It reads only records and files of shards, so that it
-/// can run while other processes write.
+/// Returns the shards that are incomplete or lack a frame of a range. It reads only records and files of shards, so
+/// that it can run while other processes write.
 ///
 /// # Errors
 /// If a file cannot be read.

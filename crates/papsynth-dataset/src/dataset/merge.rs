@@ -27,8 +27,9 @@ pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
 type Process<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
 
 impl Dataset {
-    /// Merges all complete shards into `manifest.json`, the data card, `croissant.json`, `splits.csv` and `contact-sheet.png`
-    /// and, if each shard has one frame, `objects.csv` and `coco.json`. Files with the same content are not rewritten.
+    /// Merges all complete shards into `manifest.json`, the data card, `croissant.json`, `splits.csv` and
+    /// `contact-sheet.png` and, if each shard has one frame, `objects.csv` and `coco.json`. Files with the same content
+    /// are not rewritten.
     ///
     /// # Errors
     /// If a file cannot be read or written.

@@ -57,8 +57,8 @@ pub(crate) fn nested_below<'n>(folder: &Folder, names: impl IntoIterator<Item = 
     })
 }
 
-/// Returns the name of any file or folder in a folder, or `None` if it is empty or missing. Temporary files and files of the
-/// desktop do not count.
+/// Returns the name of any file or folder in a folder, or `None` if it is empty or missing. Temporary files and files
+/// of the desktop do not count.
 pub(crate) fn any_content(folder: &Folder) -> Result<Option<String>, Error> {
     if folder.is_remote() {
         return Ok(folder.names()?.into_iter().next());

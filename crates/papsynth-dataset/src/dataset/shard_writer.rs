@@ -33,8 +33,8 @@ impl Dataset {
     }
 }
 
-/// Writes the files of one shard. Frames and planes are written one after the other and not kept in memory. Dropping it before
-/// [`commit`](Self::commit) leaves an incomplete shard without a record.
+/// Writes the files of one shard. Frames and planes are written one after the other and not kept in memory. Dropping it
+/// before [`commit`](Self::commit) leaves an incomplete shard without a record.
 pub struct ShardWriter<'a> {
     dataset: &'a Dataset,
     shard: u64,

@@ -24,8 +24,8 @@ use crate::truth::categories;
 /// The result of [`verify`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifyReport {
-    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal. `None` if there
-    /// are findings.
+    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal. `None` if
+    /// there are findings.
     pub root: Option<String>,
     /// Number of complete frames.
     pub frames: u64,
@@ -44,9 +44,9 @@ pub struct VerifyProgress {
     pub total: u64,
 }
 
-/// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged files.
-/// With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the desktop, such as
-/// `.DS_Store`, are ignored.
+/// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged
+/// files. With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the
+/// desktop, such as `.DS_Store`, are ignored.
 ///
 /// # Errors
 /// If there is no data set, or a file cannot be read.

@@ -52,8 +52,8 @@ fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
 
-/// A folder whose files have relative names with `/` between folders. For a data set in an object store this is the local
-/// folder of copies: committed files are uploaded, and files are downloaded before they are read.
+/// A folder whose files have relative names with `/` between folders. For a data set in an object store this is the
+/// local folder of copies: committed files are uploaded, and files are downloaded before they are read.
 #[derive(Debug, Clone)]
 pub(crate) struct Folder {
     root: PathBuf,
@@ -188,8 +188,8 @@ impl Folder {
         Ok(record)
     }
 
-    /// Writes a file unless one of that name exists, and returns whether it was written. If two processes try at once, one
-    /// of them writes, except in an object store.
+    /// Writes a file unless one of that name exists, and returns whether it was written. If two processes try at once,
+    /// one of them writes, except in an object store.
     pub(crate) fn write_new(
         &self,
         name: &str,
@@ -285,7 +285,8 @@ impl Folder {
         Ok(())
     }
 
-    /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count as files.
+    /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count
+    /// as files.
     pub(crate) fn names(&self) -> Result<Vec<String>, Error> {
         if let Some(remote) = &self.remote {
             let names = remote.list("")?.into_keys();
@@ -335,8 +336,8 @@ impl Folder {
         entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
-    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are files
-    /// that another process has locked or that may not be opened.
+    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are
+    /// files that another process has locked or that may not be opened.
     pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
         let [mut removed, mut skipped] = [0; 2];
         for path in self.folders()? {

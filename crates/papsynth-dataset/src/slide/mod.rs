@@ -1,5 +1,5 @@
-//! Complete slides on the disk: an OME-Zarr image with labels. Several processes can write its shards; the last step adds the
-//! upper levels.
+//! Complete slides on the disk: an OME-Zarr image with labels. Several processes can write its shards; the last step
+//! adds the upper levels.
 //!
 //! | file | content |
 //! |---|---|

@@ -27,12 +27,12 @@ pub struct SlideSet {
 }
 
 impl SlideSet {
-    /// Creates a slide in a new or empty folder, or resumes the one in the folder. If `slide.json` is missing or damaged, the
-    /// records of shards identify the slide.
+    /// Creates a slide in a new or empty folder, or resumes the one in the folder. If `slide.json` is missing or
+    /// damaged, the records of shards identify the slide.
     ///
     /// # Errors
-    /// If the folder contains other files or a slide with another recipe, model, seed, number, stream version or shard size,
-    /// objects at the centre of the deposit are larger than `scan.reach_um`, or a file cannot be read or written.
+    /// If the folder contains other files or a slide with another recipe, model, seed, number, stream version or shard
+    /// size, objects at the centre of the deposit are larger than `scan.reach_um`, or a file cannot be read or written.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);
@@ -152,7 +152,8 @@ impl SlideSet {
         (0..rows).flat_map(move |row| (0..columns).map(move |column| [column, row]))
     }
 
-    /// Returns the record of a shard if the shard is complete: the record belongs to this slide, and all its files match it.
+    /// Returns the record of a shard if the shard is complete: the record belongs to this slide, and all its files
+    /// match it.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -204,7 +205,8 @@ impl SlideSet {
     }
 }
 
-/// Checks the objects at the centre of the deposit, or at the nearest point of the slide: the largest objects are there.
+/// Checks the objects at the centre of the deposit, or at the nearest point of the slide: the largest objects are
+/// there.
 fn check_centre(slide: &Slide) -> Result<(), Error> {
     let (side, size, deposit_um) = (slide.side_px(), slide.size_px(), slide.deposit_um());
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position on the slide")]

@@ -13,8 +13,8 @@ use crate::files::{Check, FileRecord};
 use crate::formats::names;
 
 impl SlideSet {
-    /// Verifies a slide: reads every file, and returns missing, truncated, changed and untracked files, sorted by path. Files of
-    /// the desktop, such as `.DS_Store`, are ignored.
+    /// Verifies a slide: reads every file, and returns missing, truncated, changed and untracked files, sorted by path.
+    /// Files of the desktop, such as `.DS_Store`, are ignored.
     ///
     /// # Errors
     /// If a file cannot be read.

@@ -81,7 +81,8 @@ impl Numbers {
         usize::try_from((self.0 >> 33) % u64::try_from(end.max(1)).unwrap()).unwrap()
     }
 
-    /// Returns an input with a few changes: bytes, numbers, and pieces that are moved, repeated, removed or copied from another input.
+    /// Returns an input with a few changes: bytes, numbers, and pieces that are moved, repeated, removed or copied from
+    /// another input.
     fn mutant(&mut self, inputs: &[Vec<u8>]) -> Vec<u8> {
         const WORDS: [&[u8]; 16] = [
             b"0",
