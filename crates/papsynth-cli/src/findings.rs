@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use papsynth_dataset::{Finding, Mend};
+use papsynth_dataset::{Finding, Fix};
 
 use crate::exit::{self, Failure};
 use crate::words::counted;
@@ -27,11 +27,11 @@ pub(crate) fn judge(dir: &Path, findings: &[Finding]) -> Result<(), Failure> {
         return Ok(());
     }
     let things = counted(findings.len() as u64, "thing is", "things are");
-    let wants = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
+    let wants = |fix: Fix| findings.iter().any(|finding| finding.fix == fix);
     let mends: Vec<&str> = [
-        (Mend::Generate, "the command that made it, with --verify, makes again what is wrong"),
-        (Mend::Merge, "`papsynth merge` closes it when all shards are there"),
-        (Mend::Clean, "`papsynth clean --strays` takes away what does not belong there"),
+        (Fix::Generate, "the command that made it, with --verify, makes again what is wrong"),
+        (Fix::Merge, "`papsynth merge` closes it when all shards are there"),
+        (Fix::Clean, "`papsynth clean --strays` takes away what does not belong there"),
     ]
     .into_iter()
     .filter(|(mend, _)| wants(*mend))

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
-use papsynth_dataset::memory::{Fit, Need};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Home, Layout, Progress as Step, Run, Share};
+use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan};
+use papsynth_dataset::{Dataset, Error, FrameSummary, Layout, Location, Progress as Step, Run, Task};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -20,7 +20,7 @@ use crate::setup::Setup;
 pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     let account = args.profile.then(Account::open);
     let profile = account.as_ref().map(|account| account.profile.clone());
-    let home = Home::at(&args.out)?;
+    let home = Location::at(&args.out)?;
     let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     }
     let share = args.share.share()?;
     // Whole frames side by side keep every thread busy to the end; only where there are too few do threads share one.
-    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.of);
+    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(share.total);
     let few = usize::try_from(shards).ok().filter(|shards| *shards < setup.threads);
     let fit = fit(args, &setup, few, &layout)?;
     // A slide that cannot be drawn is found out before anything is written.
@@ -45,14 +45,14 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     }
     let stop = exit::watch()?;
     let dataset = Dataset::create_or_resume(&home, &setup.info(seed, &layout))?;
-    let at_once = fit.at_once;
+    let workers = fit.workers;
     let (threads, working) = match fit.shared {
         true => (setup.threads_of_a_frame(), setup.threads),
-        false => (Threads::One, at_once),
+        false => (Threads::One, workers),
     };
     let progress = Progress::start(args, count, working, fit.bytes)?;
     let check = check_of(args.verify);
-    let run = Run { frames, share, at_once, threads, check, stop, profile: profile.as_deref() };
+    let run = Run { frames, task: share, workers, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
         account.iter().for_each(|account| account.step(step));
         progress.step(step);
@@ -61,13 +61,13 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     progress.clear();
     let outcome = outcome.map_err(|error| setup.failure(error))?;
     if outcome.stopped {
-        let whole = outcome.kept + outcome.made;
+        let whole = outcome.present + outcome.written;
         let message = format!("stopped with {whole} frames whole; every file in {} is whole", args.out.display());
         return Err(Failure::stopped(message, "make"));
     }
     // What is whole is left alone, which a disk that cannot be written allows too.
     // What others are still making is merged by whoever comes last.
-    if share == Share::ALL && (outcome.made > 0 || args.verify || !dataset.is_finished()?) {
+    if share == Task::ALL && (outcome.written > 0 || args.verify || !dataset.is_finished()?) {
         dataset.finish().map_err(|error| damaged(&error))?;
     }
     progress.done(&outcome, share)?;
@@ -79,9 +79,9 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
 }
 
 /// How the run goes with the memory that it may use; of `few` shards, if there are fewer than threads.
-fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, Failure> {
+fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<MemoryPlan, Failure> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of(recipe, layout);
+    let need = MemoryEstimate::of(recipe, layout);
     let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
     memory::fit(&need, setup.threads, wanted, args.max_memory, |budget| {
         let source = if args.max_memory.is_some() { "--max-memory" } else { "80 % of what is available" };
@@ -123,7 +123,7 @@ impl Account {
 
     /// A frame is done, or was there.
     fn step(&self, step: Step) {
-        let Step::Made(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
+        let Step::Written(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
         let add = |sum: &AtomicU64, value: u64| sum.fetch_add(value, Ordering::Relaxed);
         add(&self.frames, 1);
         add(&self.pixels, (width * height * channels * planes_um.len()) as u64);

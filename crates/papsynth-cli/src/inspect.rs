@@ -17,7 +17,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), Failure> {
     } else {
         exit::print(&table(&args.dir.display().to_string(), &overview))?;
     }
-    let (frames, files) = (overview.defects.len(), overview.flaws.len());
+    let (frames, files) = (overview.damaged_shards.len(), overview.damaged_files.len());
     if frames + files == 0 {
         return Ok(());
     }
@@ -47,11 +47,8 @@ fn table(dir: &str, overview: &Overview) -> String {
         let known = overview.manifest.frames;
         row("merged", &format!("{known} frames are in objects.csv and coco.json; `papsynth generate` merges the rest"));
     }
-    for defect in overview.defects.iter().take(MOST) {
-        row("damaged", &format!("shard {}: {}", defect.shard, defect.message));
-    }
-    for flaw in &overview.flaws {
-        row("damaged", flaw);
+    for finding in overview.damaged_shards.iter().take(MOST).chain(&overview.damaged_files) {
+        row("damaged", &finding.to_string());
     }
     if overview.frames > 0 {
         let sizes = listed(overview.sizes.iter().map(|[width, height]| format!("{width} x {height} px")));

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use papsynth_dataset::memory::{Fit, Need, available, shown};
+use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan, available, format_bytes};
 
 use crate::exit::{self, Failure};
 
@@ -11,19 +11,19 @@ const SHARE: f64 = 0.8;
 
 /// How a run goes with the memory that may be used; `refuse` says why not even one frame fits.
 pub(crate) fn fit(
-    need: &Need,
+    need: &MemoryEstimate,
     threads: usize,
-    (at_once, shared): (usize, bool),
+    (workers, shared): (usize, bool),
     asked: Option<u64>,
     refuse: impl FnOnce(u64) -> Failure,
-) -> Result<Fit, Failure> {
+) -> Result<MemoryPlan, Failure> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number of bytes")]
     let budget = asked.or_else(|| available().map(|bytes| (bytes as f64 * SHARE) as u64));
     let may = budget.unwrap_or_default();
-    let Some(fit) = need.fit(at_once, shared, budget) else { return Err(refuse(may)) };
-    if (fit.at_once, fit.shared) != (at_once, shared) {
-        let may = shown(may as f64);
-        exit::note(format!("{} of {threads} threads make frames, so that they fit into {may}", fit.at_once));
+    let Some(fit) = need.plan(workers, shared, budget) else { return Err(refuse(may)) };
+    if (fit.workers, fit.shared) != (workers, shared) {
+        let may = format_bytes(may as f64);
+        exit::note(format!("{} of {threads} threads make frames, so that they fit into {may}", fit.workers));
     }
     Ok(fit)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use papsynth::key::Key;
 use papsynth::scene::Scene;
 use papsynth::{Error, Finished, Frame, Plane};
-use papsynth_dataset::{Picture, write_file, write_png};
+use papsynth_dataset::{RgbImage, write_file, write_png};
 
 use crate::args::{EngineArgs, Preview, Render};
 use crate::exit::{self, Failure};
@@ -36,8 +36,8 @@ pub(crate) fn run(args: &Preview) -> Result<(), Failure> {
 }
 
 /// A plane on the left, the same with its truth drawn over it on the right.
-fn beside(plane: &Plane, finished: &Finished) -> Picture {
-    let (plain, truth) = (Picture::plain(plane, finished), Picture::overlay(plane, finished));
+fn beside(plane: &Plane, finished: &Finished) -> RgbImage {
+    let (plain, truth) = (RgbImage::plain(plane, finished), RgbImage::overlay(plane, finished));
     let width = finished.scene.view.width;
     let mut rgb = Vec::with_capacity(truth.rgb.len() * 2);
     for (plain, drawn) in plain.rgb.chunks(3 * width).zip(truth.rgb.chunks(3 * width)) {
@@ -45,7 +45,7 @@ fn beside(plane: &Plane, finished: &Finished) -> Picture {
         rgb.extend([GAP_GREY; 3 * GAP]);
         rgb.extend_from_slice(drawn);
     }
-    Picture { width: 2 * width + GAP, rgb }
+    RgbImage { width: 2 * width + GAP, rgb }
 }
 
 const LARGEST_SCENE: u64 = 1 << 30;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use papsynth_dataset::{Outcome, Progress as Step, Share};
+use papsynth_dataset::{Outcome, Progress as Step, Task};
 use serde_json::json;
 
 use crate::args::Generate;
@@ -74,8 +74,8 @@ impl<'a> Progress<'a> {
     pub(crate) fn step(&self, step: Step) {
         let summary = match step {
             // What is there already takes no time and says nothing about the time left.
-            Step::Kept(_) => return self.bar.dec_length(1),
-            Step::Made(summary) => summary,
+            Step::Present(_) => return self.bar.dec_length(1),
+            Step::Written(summary) => summary,
         };
         self.bar.inc(1);
         if self.style == Style::Bar && self.bar.position() == 1 {
@@ -101,8 +101,8 @@ impl<'a> Progress<'a> {
     }
 
     /// Everything is done.
-    pub(crate) fn done(&self, outcome: &Outcome, share: Share) -> Result<(), Failure> {
-        let (dir, Outcome { made, kept, .. }) = (self.dir, outcome);
+    pub(crate) fn done(&self, outcome: &Outcome, share: Task) -> Result<(), Failure> {
+        let (dir, Outcome { written: made, present: kept, .. }) = (self.dir, outcome);
         match self.style {
             Style::Json => event(&json!({
                 "event": "done", "dir": dir, "made": made, "kept": kept, "peak_memory_bytes": memory::peak(),
@@ -112,8 +112,8 @@ impl<'a> Progress<'a> {
                 let (dir, frames) = (dir.display(), counted(*made, "frame", "frames"));
                 let there = if *kept > 0 { format!(", {kept} were there") } else { String::new() };
                 let next = match share {
-                    Share::ALL => format!("Look at: {dir}/contact-sheet.png"),
-                    Share { index, of } => {
+                    Task::ALL => format!("Look at: {dir}/contact-sheet.png"),
+                    Task { index, total: of } => {
                         format!("That was share {index} of {of}; when all are done: papsynth merge {dir} --frames …")
                     }
                 };

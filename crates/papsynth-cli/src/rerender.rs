@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Dataset, Layout, Outcome, Progress, images_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, Progress, image_paths, truth_difference};
 use toml::Table;
 
 use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
@@ -17,7 +17,8 @@ const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", 
 
 pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let source = Dataset::open(&args.dir)?;
-    let frames: Vec<u64> = images_of(&source)?.into_keys().collect();
+    source.check_inputs()?;
+    let frames: Vec<u64> = image_paths(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     let path = source.path().join("recipe.toml");
@@ -39,7 +40,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     let (layout, _) = args.layout.layout(0);
     let stop = exit::watch()?;
     let outcome = render(&after, seed, &runs(&frames), &layout, &args.out, stop)?;
-    if let Some(difference) = truth_differs(&args.dir, &args.out)? {
+    if let Some(difference) = truth_difference(&args.dir, &args.out)? {
         return Err(Failure::wrong(
             format!("the truth is another: {difference}"),
             "a finer grid (`optics.oversampling`) draws other masks; leave it as it was",
@@ -48,7 +49,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), Failure> {
     if args.quiet {
         return Ok(());
     }
-    let (out, dir, Outcome { made, kept, .. }) = (args.out.display(), args.dir.display(), outcome);
+    let (out, dir, Outcome { written: made, present: kept, .. }) = (args.out.display(), args.dir.display(), outcome);
     exit::print(&format!("{out}: {made} frames made, {kept} were there; the truth is that of {dir}\n"))
 }
 
@@ -66,8 +67,8 @@ pub(crate) fn convert(args: &Convert) -> Result<(), Failure> {
     if args.quiet {
         return Ok(());
     }
-    let there = if outcome.kept > 0 { format!(", {} were there", outcome.kept) } else { String::new() };
-    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.made, "frame", "frames")))
+    let there = if outcome.present > 0 { format!(", {} were there", outcome.present) } else { String::new() };
+    exit::print(&format!("{out}: {} written{there}\n", counted(outcome.written, "frame", "frames")))
 }
 
 /// The engine of the data set's recipe, with what is set over it or without.
@@ -104,12 +105,12 @@ pub(crate) fn render(
     stop: &AtomicBool,
 ) -> Result<Outcome, Failure> {
     let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
-    let mut sum = Outcome { kept: 0, made: 0, stopped: false };
+    let mut sum = Outcome { present: 0, written: 0, stopped: false };
     for frames in frames {
         let run = run_of(frames.clone(), setup.threads, stop);
         let outcome = dataset.generate(&setup.engine, &run, &|_| ()).map_err(|error| setup.failure(error))?;
-        sum.kept += outcome.kept;
-        sum.made += outcome.made;
+        sum.present += outcome.present;
+        sum.written += outcome.written;
         if outcome.stopped {
             let message = format!("stopped; every file in {} is whole", out.display());
             return Err(Failure::stopped(message, "make"));

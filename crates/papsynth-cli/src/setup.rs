@@ -9,7 +9,7 @@ use papsynth::model::Model;
 use papsynth::profile::Profile;
 use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
-use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Share};
+use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Task};
 
 use crate::args::{EngineArgs, threads};
 use crate::exit::{self, Failure};
@@ -73,10 +73,10 @@ impl Setup {
     }
 }
 
-/// A run of all these frames, `at_once` of them side by side, each made by one thread.
-pub(crate) fn run_of(frames: Range<u64>, at_once: usize, stop: &AtomicBool) -> Run<'_> {
-    let (share, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
-    Run { frames, share, at_once, threads, check, stop, profile: None }
+/// A run of all these frames, `workers` of them side by side, each made by one thread.
+pub(crate) fn run_of(frames: Range<u64>, workers: usize, stop: &AtomicBool) -> Run<'_> {
+    let (share, threads, check) = (Task::ALL, Threads::One, Check::Sizes);
+    Run { frames, task: share, workers, threads, check, stop, profile: None }
 }
 
 /// Threads of their own, as many as asked for, or one a core.

@@ -1,14 +1,14 @@
 //! Which share of the work is this process's: as given, or as a scheduler says in its environment.
 
 use clap::Args;
-use papsynth_dataset::Share;
+use papsynth_dataset::Task;
 
 use crate::exit::Failure;
 
 /// Which shards to make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shards {
-    Given(Share),
+    Given(Task),
     /// Those that the environment of a Slurm array or of a Kubernetes job says; of how many, where it does not say.
     Environment(Option<u64>),
 }
@@ -25,9 +25,9 @@ pub(crate) struct ShareArgs {
 
 impl ShareArgs {
     /// The share that is asked for: all where none is.
-    pub(crate) fn share(&self) -> Result<Share, Failure> {
+    pub(crate) fn share(&self) -> Result<Task, Failure> {
         match self.shard {
-            None => Ok(Share::ALL),
+            None => Ok(Task::ALL),
             Some(Shards::Given(share)) => Ok(share),
             Some(Shards::Environment(of)) => from_environment(of, |name| std::env::var(name).ok()),
         }
@@ -44,15 +44,15 @@ fn parse_share(text: &str) -> Result<Shards, String> {
             of => Ok(Shards::Environment(Some(of))),
         },
         Some((index, of)) => {
-            let share = Share { index: number(index)?, of: number(of)? };
-            if share.index < share.of { Ok(Shards::Given(share)) } else { Err(expected.to_owned()) }
+            let share = Task { index: number(index)?, total: number(of)? };
+            if share.index < share.total { Ok(Shards::Given(share)) } else { Err(expected.to_owned()) }
         }
         None => Err(expected.to_owned()),
     }
 }
 
 /// Slurm tells task, first and last task and step of an array; Kubernetes tells the index of a completion alone.
-fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) -> Result<Share, Failure> {
+fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) -> Result<Task, Failure> {
     let number = |name: &str| -> Result<Option<u64>, Failure> {
         let Some(text) = variable(name) else { return Ok(None) };
         let wrong = |_| Failure::input(format!("{name} is {text:?}; a whole number is expected"));
@@ -78,7 +78,7 @@ fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) 
         return Err(Failure::wrong(message, "give the share itself: --shard 0/4"));
     };
     match index < of {
-        true => Ok(Share { index, of }),
+        true => Ok(Task { index, total: of }),
         false => Err(Failure::input(format!("task {index} is none of {of}, which are counted from 0"))),
     }
 }
@@ -87,7 +87,7 @@ fn from_environment(of: Option<u64>, variable: impl Fn(&str) -> Option<String>) 
 mod tests {
     use super::*;
 
-    fn share(of: Option<u64>, variables: &[(&str, &str)]) -> Option<Share> {
+    fn share(of: Option<u64>, variables: &[(&str, &str)]) -> Option<Task> {
         let found = |name: &str| variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned());
         from_environment(of, found).ok()
     }
@@ -100,14 +100,14 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_MAX", "19"),
         ];
-        assert_eq!(share(None, &array), Some(Share { index: 3, of: 20 }));
+        assert_eq!(share(None, &array), Some(Task { index: 3, total: 20 }));
         // A repaired array: two of the twenty.
         let repaired = [array[0], ("SLURM_ARRAY_TASK_COUNT", "2"), ("SLURM_ARRAY_TASK_MIN", "3"), array[3]];
         assert_eq!(share(None, &repaired), None);
-        assert_eq!(share(Some(20), &repaired), Some(Share { index: 3, of: 20 }));
+        assert_eq!(share(Some(20), &repaired), Some(Task { index: 3, total: 20 }));
         let gaps = [array[0], ("SLURM_ARRAY_TASK_COUNT", "2"), ("SLURM_ARRAY_TASK_MIN", "0"), array[3]];
         assert_eq!(share(None, &gaps), None);
-        assert_eq!(share(Some(8), &[("JOB_COMPLETION_INDEX", "7")]), Some(Share { index: 7, of: 8 }));
+        assert_eq!(share(Some(8), &[("JOB_COMPLETION_INDEX", "7")]), Some(Task { index: 7, total: 8 }));
         assert_eq!(share(None, &[("JOB_COMPLETION_INDEX", "7")]), None);
         assert_eq!(share(Some(7), &[("JOB_COMPLETION_INDEX", "7")]), None);
         assert_eq!(share(Some(7), &[("JOB_COMPLETION_INDEX", "x")]), None);

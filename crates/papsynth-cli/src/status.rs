@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Dataset, Home, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Location, missing_shards};
 
 use crate::args::{Clean, Merge, Status, Verify, check_of};
 use crate::exit::{self, Failure};
@@ -18,7 +18,7 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
         let close = (!is_closed).then(|| format!("papsynth slide finalize {}", args.dir.display()));
         return tell(args, &runs(&missing), shards, close.as_deref());
     }
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
         return Err(Failure::wrong(
@@ -26,7 +26,7 @@ pub(crate) fn run(args: &Status) -> Result<(), Failure> {
             "only a slide, or a data set that was merged, knows it by itself",
         ));
     };
-    let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
+    let missing = missing_shards(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
     let close = format!("papsynth merge {} --frames {frames}", args.dir.display());
     tell(args, &missing, all, (!dataset.is_finished()?).then_some(&close))
@@ -52,8 +52,8 @@ fn tell(args: &Status, missing: &[Range<u64>], all: u64, close: Option<&str>) ->
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), Failure> {
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
-    let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
+    let missing = missing_shards(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {
         let shards = counted(count(&missing), "shard is", "shards are");
@@ -95,27 +95,27 @@ pub(crate) fn verify(args: &Verify) -> Result<(), Failure> {
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         return crate::slide::verify(&args.dir, args.json);
     }
-    let verdict = papsynth_dataset::verify(&Home::at(&args.dir)?, args.frames.map(|frames| 0..frames))?;
+    let report = papsynth_dataset::verify(&Location::at(&args.dir)?, args.frames.map(|frames| 0..frames))?;
     let dir = args.dir.display();
     if args.json {
-        let text = serde_json::to_string_pretty(&verdict).unwrap_or_default();
+        let text = serde_json::to_string_pretty(&report).unwrap_or_default();
         exit::print(&format!("{text}\n"))?;
-    } else if let Some(root) = &verdict.root {
-        let (frames, files) = (counted(verdict.frames, "frame", "frames"), counted(verdict.files, "file", "files"));
+    } else if let Some(root) = &report.root {
+        let (frames, files) = (counted(report.frames, "frame", "frames"), counted(report.files, "file", "files"));
         exit::print(&format!("{dir}: whole, {frames} in {files}\nroot {root}\n"))?;
     } else {
-        print_findings(&verdict.findings)?;
+        print_findings(&report.findings)?;
     }
-    judge(&args.dir, &verdict.findings)
+    judge(&args.dir, &report.findings)
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), Failure> {
-    let cleaned = papsynth_dataset::clean(&Home::at(&args.dir)?, args.strays)?;
-    let (dir, strays) = (args.dir.display(), counted(cleaned.strays, "other", "others"));
+    let cleaned = papsynth_dataset::clean(&Location::at(&args.dir)?, args.strays)?;
+    let (dir, strays) = (args.dir.display(), counted(cleaned.untracked, "other", "others"));
     let left = counted(cleaned.temporary, "file", "files");
     exit::print(&format!("{dir}: {left} of killed runs and {strays} removed\n"))?;
-    if cleaned.stayed > 0 {
-        let stay = counted(cleaned.stayed, "file stays", "files stay");
+    if cleaned.skipped > 0 {
+        let stay = counted(cleaned.skipped, "file stays", "files stay");
         exit::note(format!("{stay}: at work, another user's, or of a name that is no UTF-8"));
     }
     Ok(())

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), Failure> {
         "slurm" => slurm(args),
         _ => {
             let out = &generate.out;
-            if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
+            if !out.starts_with("/data") && !papsynth_dataset::Location::is_address(out) {
                 exit::note(format!(
                     "{} lies in the pod and is lost with it; the volume is mounted at /data, and addresses of object stores need none",
                     out.display()

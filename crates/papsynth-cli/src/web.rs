@@ -96,7 +96,7 @@ fn announcement(session: &Session, server: &Server) -> String {
 }
 
 fn results(summary: &Summary) -> String {
-    told([&summary.row, &summary.random], summary.claim.trials, "", &summary.breakdown)
+    told([&summary.row, &summary.random], summary.precision.trials, "", &summary.breakdown)
 }
 
 fn told<'a>(rows: impl IntoIterator<Item = &'a Row>, trials: u64, means: &str, breakdown: &[Group]) -> String {
@@ -133,5 +133,5 @@ fn pooled(folder: &std::path::Path, as_json: bool) -> Result<(), Failure> {
         true => String::new(),
         false => format!("Means over subjects, with intervals of 95 % by Student's t: {}.\n", means.join(", ")),
     };
-    exit::print(&told(rows, pool.claim.trials, &means, &pool.breakdown))
+    exit::print(&told(rows, pool.precision.trials, &means, &pool.breakdown))
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use papsynth_study::{Grey, StudyParams, Task};
+use papsynth_study::{Grey, StudyParams, TrialDesign};
 
 use super::values::{named, parse_pixel};
 
@@ -46,8 +46,8 @@ pub(crate) struct Study {
     #[arg(long, value_name = "NAME", default_value_t = StudyParams::default().subject)]
     pub(crate) subject: String,
     /// What is asked: of one patch whether it is real (the paper's), or of two which
-    #[arg(long, value_name = "NAME", value_parser = named(Task::ALL, Task::name), default_value = StudyParams::default().task.name())]
-    pub(crate) design: Task,
+    #[arg(long, value_name = "NAME", value_parser = named(TrialDesign::ALL, TrialDesign::name), default_value = StudyParams::default().task.name())]
+    pub(crate) design: TrialDesign,
     /// Trials that count
     #[arg(long, value_name = "N", default_value_t = StudyParams::default().trials)]
     pub(crate) trials: usize,

@@ -8,7 +8,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_BEGINS};
+use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_PREFIX};
 use papsynth_dataset::write_file;
 
 use crate::args::Calibrate;
@@ -22,10 +22,10 @@ const FILES: [(&str, &[u8], &str); 7] = [
     ("focus.svg", plot::BEGINS, "an older plot"),
     ("edge.svg", plot::BEGINS, "an older plot"),
     ("photon-transfer.svg", plot::BEGINS, "an older plot"),
-    ("optics.toml", RECIPE_BEGINS, "an older calibration"),
-    ("optics-gaussian.toml", RECIPE_BEGINS, "an older calibration"),
-    ("camera.toml", RECIPE_BEGINS, "an older calibration"),
-    (RECORD, Calibration::BEGINS, "an older calibration"),
+    ("optics.toml", RECIPE_PREFIX, "an older calibration"),
+    ("optics-gaussian.toml", RECIPE_PREFIX, "an older calibration"),
+    ("camera.toml", RECIPE_PREFIX, "an older calibration"),
+    (RECORD, Calibration::PREFIX, "an older calibration"),
 ];
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         found.camera = Some(camera);
     }
     if let Some(older) = older {
-        found.keep(older);
+        found.merge_older(older);
     }
     let optics = found.bright_field_toml();
     let optics = optics.map_err(|error| Failure::input(format!("--edge: {error}")))?;

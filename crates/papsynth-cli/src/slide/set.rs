@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use papsynth::Threads;
-use papsynth_dataset::memory::{Need, shown};
+use papsynth_dataset::memory::{MemoryEstimate, format_bytes};
 use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
+use papsynth_dataset::{Check, Task};
 
 use crate::args::{SlideFinalize, SlideMake, check_of};
 use crate::exit::{self, Failure};
@@ -38,15 +38,15 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
     let check = check_of(args.verify);
-    let run = SlideRun { share, threads, check, stop };
+    let run = SlideRun { task: share, threads, check, stop };
     let bar = Bar::start(args.quiet);
-    let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
-        let [done, all] = progress.done;
-        let what = if progress.kept { "was there" } else { "made" };
+    let stopped = set.generate(&slide, &run, &|progress: SlideProgress| {
+        let (done, all) = (progress.done, progress.total);
+        let what = if progress.present { "was there" } else { "made" };
         bar.say(
             done,
             all,
-            &format!("shard {}: {} objects and parts, {what}", SlideSet::name_of(progress.at), progress.objects),
+            &format!("shard {}: {} objects and parts, {what}", SlideSet::shard_name(progress.shard), progress.objects),
         );
     });
     bar.clear();
@@ -54,29 +54,30 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), Failure> {
         let message = format!("stopped; every file in {} is whole", args.out.display());
         return Err(Failure::stopped(message, "make"));
     }
-    if share == Share::ALL { close(&set, Check::Sizes, args.quiet) } else { Ok(()) }
+    if share == Task::ALL { close(&set, Check::Sizes, args.quiet) } else { Ok(()) }
 }
 
 /// As many threads as fit, each with a frame of its own.
 fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Failure> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of_slide(recipe, shard_px);
+    let need = MemoryEstimate::of_slide(recipe, shard_px);
     let fit = memory::fit(&need, setup.threads, (setup.threads, false), args.max_memory, |budget| {
-        let (frame_px, needed, may) = (recipe.scan.frame_px, shown(need.of_one_frame()), shown(budget as f64));
+        let (frame_px, needed, may) =
+            (recipe.scan.frame_px, format_bytes(need.of_one_frame()), format_bytes(budget as f64));
         let sides = format!("shards of {shard_px} pixels a side with frames of {frame_px}");
         let message = format!("{sides} need about {needed}; {may} may be used");
         let help = "--shard-px 2048 or less, or a smaller scan.frame_px, needs less; --max-memory allows more";
         Failure::wrong(message, help)
     });
-    Ok(fit?.at_once)
+    Ok(fit?.workers)
 }
 
 /// Numbers of the shards of a slide that are missing, row by row, how many there are in all, and whether it was closed.
 pub(crate) fn there(dir: &Path) -> Result<(Vec<u64>, u64, bool), Failure> {
     let set = SlideSet::open(dir)?;
     let missing: BTreeSet<[u32; 2]> = set.missing(Check::Sizes)?.into_iter().collect();
-    let numbers = (0_u64..).zip(set.all()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
-    Ok((numbers.collect(), set.all().count() as u64, missing.is_empty() && set.is_finished()?))
+    let numbers = (0_u64..).zip(set.all_shards()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
+    Ok((numbers.collect(), set.all_shards().count() as u64, missing.is_empty() && set.is_finished()?))
 }
 
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), Failure> {

@@ -330,7 +330,11 @@ fn flats_that_cannot_be_used_are_refused() {
     for name in PAIR {
         write_grey16(bench.path("sizes/10ms").join(name), &[900; 64 * 32], 64);
     }
-    refused(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "64 x 32 pixels, others 128 x 128", "one size"]);
+    refused(
+        &bench,
+        "--flat sizes --dark darks --bits 12",
+        &["10ms", "found 64 x 32 pixels, expected 128 x 128", "one size"],
+    );
     refused(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
     fs::remove_dir_all(bench.path("sizes/10ms")).unwrap();
     refused(&bench, "--flat sizes --dark darks", &["16 bits do not tell", "--bits"]);
@@ -371,8 +375,8 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     refused(&bench, "", &["--stack", "--edge", "--flat"]);
     refused(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
     refused(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
-    refused(&bench, "--stack two.tif", &["--stack two.tif: 2 planes; expected 3 or more"]);
-    refused(&bench, "--stack flat.tif", &["no dark, compact thing", "--window"]);
+    refused(&bench, "--stack two.tif", &["--stack two.tif: planes: found 2, expected 3 or more"]);
+    refused(&bench, "--stack flat.tif", &["no nucleus found", "--window"]);
     refused(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);
     refused(&bench, "--stack stack.tif --window 180,0,20,20", &["inside the image of 192 x 192", "--window X,Y,W,H"]);
     refused(&bench, "--stack stack.tif --window 1,1,4,4", &["at least 8 pixels"]);
@@ -391,11 +395,11 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     refused(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected one"]);
     write("one.tif", &planes[9..10]);
     refused(&bench, "--edge one.tif --line 0,0,4,0", &["line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
-    refused(&bench, "--edge one.tif --line 180,10,220,10", &["does not lie in"]);
+    refused(&bench, "--edge one.tif --line 180,10,220,10", &["extends beyond the"]);
     refused(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
     refused(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);
     write("even.tif", &[vec![5.0; 192 * 192]]);
-    refused(&bench, "--edge even.tif", &["no straight edge was found", "--line"]);
+    refused(&bench, "--edge even.tif", &["no straight edge found", "--line"]);
     refused(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
     refused(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);

@@ -69,7 +69,7 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     assert!(bench.good("status slide").out.ends_with("it is closed\n"));
     bench.good("verify slide");
     fs::write(bench.path("slide/other"), "x").unwrap();
-    refused(&bench, "verify slide", "other: is no file of the slide");
+    refused(&bench, "verify slide", "other: untracked: does not belong to the slide");
     assert!(bench.good("clean slide --strays").out.contains("1 other removed"));
     bench.good("verify slide");
     fs::remove_file(bench.path("slide/slide.json")).unwrap();
@@ -77,7 +77,7 @@ fn a_slide_made_in_shares_is_closed_and_verified() {
     bench.good(&make);
     bench.good("verify slide");
     fs::remove_file(bench.path("slide/slide.ome.zarr/0/c/0/1")).unwrap();
-    refused(&bench, "verify slide", "is missing");
+    refused(&bench, "verify slide", ": missing");
     bench.good(&format!("{make} --verify"));
     bench.good("verify slide");
     refused(&bench, &format!("{make} --seed 4"), "another seed");

@@ -171,7 +171,7 @@ fn images_are_read_back_only_from_files_that_are_as_recorded() {
     write(scratch.path(), &Layout { frames_per_shard: 2, ..Layout::new([Format::Huggingface]) }, &[frame(0, 1, 8, 1)]);
     let (name, mut bytes) = contents(&scratch.join("huggingface/data")).remove(0);
     let dataset = Dataset::open(scratch.path()).unwrap();
-    let place = dataset.places().unwrap()[0];
+    let place = dataset.frame_locations().unwrap()[0];
     let summary = dataset.summary(place).unwrap();
     let mut planes = 0;
     dataset.planes(&summary, 0, &mut |_, _| planes += 1).unwrap();

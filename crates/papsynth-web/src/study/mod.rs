@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use papsynth_study::{Answer, Exposure, Refusal, Session};
+use papsynth_study::{Answer, Exposure, Session, SessionError};
 use serde::Deserialize;
 
 use crate::error::Error;
@@ -82,12 +82,12 @@ fn answer(session: &mut Session, request: &Request) -> Result<Reply, Reply> {
     }
 }
 
-impl From<Refusal> for Reply {
-    fn from(refusal: Refusal) -> Self {
-        match refusal {
-            Refusal::Stale => Self::error(409, "this trial is not the current one"),
-            Refusal::Nonsense => Self::error(400, "invalid answer"),
-            Refusal::NotWritten(error) => Self::error(500, &format!("cannot save the study: {error}")),
+impl From<SessionError> for Reply {
+    fn from(error: SessionError) -> Self {
+        match error {
+            SessionError::Stale => Self::error(409, "this trial is not the current one"),
+            SessionError::Invalid => Self::error(400, "invalid answer"),
+            SessionError::NotWritten(error) => Self::error(500, &format!("cannot save the study: {error}")),
         }
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
-use papsynth_dataset::{Dataset, FramePlace, FrameSummary};
+use papsynth_dataset::{Dataset, FrameLocation, FrameSummary};
 use serde_json::{Value, json};
 
 use super::grid::Grid;
@@ -24,14 +24,14 @@ const MAX_CACHED_BYTES: usize = 1 << 28;
 
 pub(crate) struct DatasetSource {
     dataset: Dataset,
-    places: Vec<FramePlace>,
+    places: Vec<FrameLocation>,
     /// The frames that were used last, the most recent first.
     cached: Vec<Frame>,
 }
 
 /// A frame with the planes and objects that were requested.
 struct Frame {
-    place: FramePlace,
+    place: FrameLocation,
     summary: FrameSummary,
     grid: Grid,
     planes: BTreeMap<usize, Levels>,
@@ -52,7 +52,7 @@ impl DatasetSource {
     /// Returns a frame and moves it to the front of the cache.
     fn frame(&mut self, image: usize) -> Result<&mut Frame, Reply> {
         if self.places.is_empty() {
-            self.places = self.dataset.places()?;
+            self.places = self.dataset.frame_locations()?;
         }
         let place = *self.places.get(image).ok_or_else(|| {
             Reply::error(404, &format!("no image {image}: expected 0 to {}", self.places.len().saturating_sub(1)))
@@ -145,7 +145,7 @@ impl Frame {
 impl Source for DatasetSource {
     fn count(&mut self) -> Result<usize, Reply> {
         // A run may still be writing frames.
-        self.places = self.dataset.places()?;
+        self.places = self.dataset.frame_locations()?;
         Ok(self.places.len())
     }
 

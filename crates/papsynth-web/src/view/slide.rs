@@ -32,7 +32,7 @@ impl SlideSource {
         }
         let head = self.set.head();
         let whole = Grid::new(head.width_px as usize, head.height_px as usize, TILE);
-        Ok(Grid { levels: self.set.levels_there(), ..whole })
+        Ok(Grid { levels: self.set.written_levels(), ..whole })
     }
 }
 
@@ -50,7 +50,7 @@ impl Source for SlideSource {
         let (grid, head) = (self.grid(image)?, self.set.head());
         check_plane(plane, head.planes_um.len())?;
         let region = grid.region(at.level, at.row, at.column)?;
-        let values = self.set.picture(at.level, plane, region.rows.clone(), region.columns.clone()).map_err(reply_to)?;
+        let values = self.set.image(at.level, plane, region.rows.clone(), region.columns.clone()).map_err(reply_to)?;
         let white = u16::MAX >> 16_u32.saturating_sub(head.bits).min(15);
         png(&eight_bits(&values, white), region.width(), head.channels)
     }

@@ -126,7 +126,7 @@ fn labels_and_objects_at_a_pixel_match_the_ground_truth() {
                     .find(|own| object["id"] == own.id && object["part"] == serde_json::to_value(own.part).unwrap());
                 let own = own.unwrap();
                 assert_eq!(object["class"], own.class.as_str());
-                assert_eq!(object["front"], holds(&own.visible));
+                assert_eq!(object["visible"], holds(&own.visible));
                 let depth = object["depth_um"].as_f64().unwrap();
                 assert!((depth - own.depth_um).abs() < 1e-9 && depth <= before);
                 assert_eq!(object["defocus_um"].as_array().unwrap().len(), 3);

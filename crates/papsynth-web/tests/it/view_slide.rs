@@ -11,7 +11,7 @@ use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
+use papsynth_dataset::{Check, Task};
 use papsynth_web::Viewer;
 use serde_json::json;
 
@@ -28,11 +28,11 @@ fn an_incomplete_slide_is_shown() {
     let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512, objects_parquet: false };
     let set = SlideSet::create_or_resume(&path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
-    let make = |share: Share| {
-        let run = SlideRun { share, threads: Threads::All, check: Check::Sizes, stop: &stop };
-        assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    let make = |share: Task| {
+        let run = SlideRun { task: share, threads: Threads::All, check: Check::Sizes, stop: &stop };
+        assert!(!set.generate(&slide, &run, &|_| ()).unwrap());
     };
-    make(Share { index: 1, of: 2 });
+    make(Task { index: 1, total: 2 });
     let mut view = Viewer::open(&path).unwrap();
     assert_eq!(view.kind(), "slide");
     let image = ask(&mut view, "/image/0");
@@ -45,7 +45,7 @@ fn an_incomplete_slide_is_shown() {
         assert_eq!(status(&mut view, "1-0"), 200, "{layer}");
     }
     assert_eq!(get(&mut view, "/at/0/5/5").status, 404);
-    make(Share::ALL);
+    make(Task::ALL);
     set.finish(Check::Sizes).unwrap();
     let image = ask(&mut view, "/image/0");
     assert_eq!(image["levels"], json!(3));
