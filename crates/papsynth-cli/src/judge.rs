@@ -6,7 +6,7 @@ use std::path::Path;
 use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 use rayon::prelude::*;
 
 use crate::args;
@@ -28,9 +28,6 @@ const SAME_PIXEL: f64 = 0.01;
 /// Fewest fields of a side.
 const LEAST: usize = 2;
 
-/// Giveaways that are printed.
-const PRINTED: usize = 5;
-
 /// Fields of one side, each after the size of its pixels, µm.
 type Side = Vec<(f64, FieldFile)>;
 
@@ -43,7 +40,8 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
         few_slides(folder, side);
     }
     let nuclei_from = nuclei_from(args, &real, &synthetic)?;
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(Failure::input)?;
+    let gauge = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() })
+        .map_err(Failure::input)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(Failure::input)?;
     let report = pool(args.threads)?.install(|| {
@@ -55,7 +53,7 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), Failure> {
     for ((name, ..), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
-    exit::print(&told(&report, &args.out))
+    exit::print(&format!("{}{}: {}, {}\n", report.to_text(), args.out.display(), PAGE.0, NUMBERS.0))
 }
 
 /// The fields of both sides, of the groups that are asked for, with the sizes of their pixels.
@@ -137,7 +135,7 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
     Err(Failure::wrong(message, "all fields of both sides must have them"))
 }
 
-fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Failure> {
+fn measure(side: &Side, gauge: &Measurer, pixel_um: f64) -> Result<Vec<Field>, Failure> {
     let measure = |(own_um, file): &(f64, FieldFile)| {
         let factor = pixel_um / own_um;
         let picture = picture(file)?;
@@ -148,51 +146,18 @@ fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Fail
     fields.into_iter().collect()
 }
 
-pub(crate) fn picture(file: &FieldFile) -> Result<Picture, Failure> {
+pub(crate) fn picture(file: &FieldFile) -> Result<FieldImage, Failure> {
     let image = file.read(&Limits::default())?;
-    Ok(Picture {
+    Ok(FieldImage {
         name: file.name.clone(),
         group: file.group.clone(),
         grey: image.grey.iter().map(|g| f32::from(*g)).collect(),
         width: image.width,
         full_scale: f32::from(image.white),
         nuclei: match image.nuclei {
-            FieldNuclei::Unknown => Known::Nothing,
-            FieldNuclei::Points(points) => Known::Points(points),
-            FieldNuclei::Labels(labels) => Known::Masks(labels),
+            FieldNuclei::Unknown => NucleiAnnotation::None,
+            FieldNuclei::Points(points) => NucleiAnnotation::Points(points),
+            FieldNuclei::Labels(labels) => NucleiAnnotation::Masks(labels),
         },
     })
-}
-
-fn told(report: &Report, out: &Path) -> String {
-    let mut text = String::new();
-    for test in &report.two_sample {
-        let (name, r, verdict, [low, high]) = (&test.name, &test.result, &test.verdict, test.result.interval);
-        let halves = r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}"));
-        text.push_str(&format!(
-            "{name:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {halves}: {verdict}\n",
-            r.auc
-        ));
-        for g in r.giveaways.iter().take(PRINTED).filter(|g| g.importance > 0.0) {
-            text.push_str(&format!(
-                "    {:<42} real {:>9.4}  synthetic {:>9.4}\n",
-                g.feature, g.real[1], g.synthetic[1]
-            ));
-        }
-    }
-    for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
-        let of = test.result.descriptors.len();
-        text.push_str(&format!(
-            "{}: {outside} of {of} Q-Q slopes or shifts beyond real halves: {}\n",
-            test.name, test.verdict
-        ));
-    }
-    let [real, synthetic] = &report.fields;
-    text.push_str(&format!("{} real fields and {} synthetic ones: {}\n", real.len(), synthetic.len(), report.verdict));
-    for note in &report.notes {
-        text.push_str(&format!("note: {note}\n"));
-    }
-    text.push_str(&format!("{}: {}, {}\n", out.display(), PAGE.0, NUMBERS.0));
-    text
 }

@@ -1,11 +1,9 @@
 //! `papsynth match`: real fields in, the recipe of fields like them out.
 
-use std::sync::atomic::Ordering;
-
 use papsynth::{Engine, Inputs};
 use papsynth_dataset::write_file;
-use papsynth_judge::Picture;
-use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
+use papsynth_judge::{Control, FieldImage, Progress};
+use papsynth_match::{Error, Fit, Match, MatchParams, Origin, ParameterFit, PixelSize};
 use serde_json::json;
 
 use crate::args;
@@ -18,17 +16,6 @@ use crate::text_file::{can_write, may_replace};
 /// How files begin that may be replaced.
 const RECIPE: &[u8] = b"# Matched to ";
 const REPORT: &[u8] = b"{\n  \"match_report\":";
-
-/// Windows that are simulated at first, of a quick run, and of each recipe at most.
-const BUDGET: usize = 2000;
-const QUICK: usize = 336;
-const WINDOWS: usize = 8;
-
-/// Fewest recipes of a table.
-const LEAST_RECIPES: usize = 30;
-
-const ROUNDS: usize = 8;
-const QUICK_ROUNDS: usize = 3;
 
 /// Pixels of a 20x objective, µm: where the search for their size begins.
 const USUAL_PIXEL_UM: f64 = 0.33;
@@ -58,32 +45,20 @@ pub(crate) fn run(args: &args::Match) -> Result<(), Failure> {
             return Err(Failure::wrong(message, help));
         }
     };
-    let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
+    let fields: Vec<FieldImage> = files.iter().map(picture).collect::<Result<_, _>>()?;
     [Some(&args.out), args.report.as_ref()].into_iter().flatten().try_for_each(|out| can_write(out))?;
 
-    let windows = WINDOWS.min(fields.len()).max(1);
-    let budget = args.budget.unwrap_or(if args.quick { QUICK } else { BUDGET });
-    let recipes = (budget / windows).max(LEAST_RECIPES);
-    let params = MatchParams {
-        pixel,
-        table: TableParams { recipes, windows, seed: args.seed },
-        rounds: if args.quick { QUICK_ROUNDS } else { ROUNDS },
-    };
+    let usual = if args.quick { MatchParams::quick() } else { MatchParams::default() };
+    let simulations = args.budget.unwrap_or(usual.simulations);
+    let params = MatchParams { pixel, simulations, seed: args.seed, ..usual };
     let base = args.preset.recipe();
     let matching = Match::new(&params, &base).map_err(|e| refuse(&e, &args.real))?;
     let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
     let bar = Bar::start(args.quiet);
-    let tell = |step: Step| {
-        match step {
-            Step::Simulated(done, of) => bar.say(done as u64, of as u64, "simulated recipes"),
-            Step::Searched(done, of, distance) => {
-                bar.say(done as u64, of as u64, &format!("rounds of the search, distance {distance:.2}"));
-            }
-        }
-        !stop.load(Ordering::SeqCst)
-    };
+    let report = |p: Progress| bar.say(p.done as u64, p.total as u64, p.phase);
+    let control = Control { stop, report: &report };
     let fit =
-        pool(args.threads)?.install(|| matching.run(&fields, &make, &tell)).map_err(|e| refuse(&e, &args.real))?;
+        pool(args.threads)?.install(|| matching.run(&fields, &make, &control)).map_err(|e| refuse(&e, &args.real))?;
     bar.clear();
 
     if let Some(report) = &args.report {
@@ -113,7 +88,7 @@ fn told(fit: &Fit) -> String {
         fit.fields, fit.windows, fit.nuclei, fit.simulated, "parameter", "value", "95 % interval", "before"
     );
     let number = |value: f64| format!("{value:.3}");
-    let line = |a: &Answer| {
+    let line = |a: &ParameterFit| {
         let [low, high] = a.interval.map(number);
         let interval = format!("{low} to {high}");
         let origin = match a.origin {
@@ -124,9 +99,9 @@ fn told(fit: &Fit) -> String {
         let name = if a.unit.is_empty() { a.parameter.name() } else { format!("{}, {}", a.parameter.name(), a.unit) };
         format!("{name:<24} {:>10} {interval:>21} {:>10}  {origin}\n", number(a.value), number(a.before))
     };
-    text.extend(fit.answers.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
+    text.extend(fit.parameters.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
     let lost: Vec<String> =
-        fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
+        fit.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
     if !lost.is_empty() {
         text.push_str(&format!("not identified, left as they were: {}\n", lost.join(", ")));
     }

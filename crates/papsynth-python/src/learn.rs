@@ -1,7 +1,7 @@
 //! Learning of classes, and comparison of synthetic with real fields.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -101,17 +101,17 @@ pub(crate) fn judge(
         _ => return Err(wrong("real_nuclei, synthetic_nuclei: expected both or neither")),
     };
     let sides = [
-        pictures("real", &real, real_nuclei.as_deref(), full_scale)?,
-        pictures("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
+        field_images("real", &real, real_nuclei.as_deref(), full_scale)?,
+        field_images("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
     ];
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
+    let gauge = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;
     let report = py.detach(|| {
         pool.install(|| {
-            let measured = sides.map(|pictures| {
-                let fields: Vec<Result<Field, String>> = pictures
+            let measured = sides.map(|images| {
+                let fields: Vec<Result<Field, String>> = images
                     .par_iter()
                     .map(|picture| gauge.measure(picture).map_err(|error| format!("{}: {error}", picture.name)))
                     .collect();
@@ -124,7 +124,12 @@ pub(crate) fn judge(
     serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
 }
 
-fn pictures(side: &str, images: &[ArrayLike<'_>], nuclei: Option<&[ArrayLike<'_>]>, full_scale: f32) -> PyResult<Vec<Picture>> {
+fn field_images(
+    side: &str,
+    images: &[ArrayLike<'_>],
+    nuclei: Option<&[ArrayLike<'_>]>,
+    full_scale: f32,
+) -> PyResult<Vec<FieldImage>> {
     if images.len() < 2 {
         return Err(wrong(format!("{side}: expected 2 or more fields, found {}", images.len())));
     }
@@ -134,10 +139,10 @@ fn pictures(side: &str, images: &[ArrayLike<'_>], nuclei: Option<&[ArrayLike<'_>
     let one = |(number, image): (usize, &ArrayLike<'_>)| {
         let (grey, width) = pixels(&nth(side, number), image)?;
         let nuclei = match nuclei {
-            None => Known::Nothing,
-            Some(nuclei) => Known::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
+            None => NucleiAnnotation::None,
+            Some(nuclei) => NucleiAnnotation::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
         };
-        Ok(Picture { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
+        Ok(FieldImage { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
     };
     images.iter().enumerate().map(one).collect()
 }
