@@ -53,8 +53,8 @@ impl Limits {
     }
 }
 
-/// How a run fits into its budget: with at most `at_once` frames side by side. `too_large` is the error for a budget that
-/// is too small for one frame.
+/// How a run fits into its budget: with at most `at_once` frames side by side. `too_large` is the error for a budget
+/// that is too small for one frame.
 pub(crate) fn fit(
     need: &Need,
     threads: usize,
@@ -129,7 +129,8 @@ pub(crate) fn configure_allocator() {
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
 pub(crate) fn configure_allocator() {}
 
-/// Parses sizes like `2GiB`, `500MB`, `1.5G` and `1048576`. Units are powers of 1024 with an `i` or without a `B`, else of
+/// Parses sizes like `2GiB`, `500MB`, `1.5G` and `1048576`. Units are powers of 1024 with an `i` or without a `B`, else
+/// of
 /// 1000.
 pub(crate) fn parse_size(text: &str) -> Result<u64, String> {
     let wrong = || String::from("expected a size, for example 2GiB, 500MB or 1048576");

@@ -13,7 +13,8 @@ use crate::memory;
 use crate::setup::{Setup, run_of};
 use crate::words::{counted, size};
 
-/// Student's t of a two-sided 95 % interval for 1, 2, … degrees of freedom. Beyond the table, the normal distribution is used.
+/// Student's t of a two-sided 95 % interval for 1, 2, … degrees of freedom. Beyond the table, the normal distribution
+/// is used.
 const T: [f64; 15] = [12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26, 2.23, 2.20, 2.18, 2.16, 2.14, 2.13];
 
 pub(crate) fn run(args: &Plan) -> Result<(), ExitError> {

@@ -231,7 +231,8 @@ fn leaf(table: &Table) -> Vec<String> {
     path
 }
 
-/// Merges a table into another, field by field. A distribution, or a table of another kind, replaces the complete table.
+/// Merges a table into another, field by field. A distribution, or a table of another kind, replaces the complete
+/// table.
 fn merge(base: &mut Table, over: &Table) {
     const DISTRIBUTIONS: [&str; 4] = ["uniform", "normal", "log_normal", "choice"];
     for (name, value) in over {

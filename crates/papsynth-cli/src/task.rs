@@ -16,9 +16,9 @@ pub(crate) enum TaskArg {
 /// Which part of the work to do.
 #[derive(Debug, Args)]
 pub(crate) struct TaskArgs {
-    /// Do task I of N: write every N-th shard, beginning with shard I (0/4 to 3/4 write all). `auto` reads I and N from a
-    /// Slurm array, `auto/N` reads I from a Kubernetes job of N completions. When all tasks are done, run `papsynth merge`,
-    /// or `papsynth slide finalize` for a slide
+    /// Do task I of N: write every N-th shard, beginning with shard I (0/4 to 3/4 write all). `auto` reads I and N from
+    /// a Slurm array, `auto/N` reads I from a Kubernetes job of N completions. When all tasks are done, run `papsynth
+    /// merge`, or `papsynth slide finalize` for a slide
     #[arg(long, value_name = "I/N", value_parser = parse_task)]
     pub(crate) task: Option<TaskArg>,
 }
@@ -51,7 +51,8 @@ fn parse_task(text: &str) -> Result<TaskArg, String> {
     }
 }
 
-/// Reads the task from the environment. Slurm sets index, first and last index and count; Kubernetes sets the index only.
+/// Reads the task from the environment. Slurm sets index, first and last index and count; Kubernetes sets the index
+/// only.
 fn from_environment(count: Option<u64>, variable: impl Fn(&str) -> Option<String>) -> Result<Task, ExitError> {
     let number = |name: &str| -> Result<Option<u64>, ExitError> {
         let Some(text) = variable(name) else { return Ok(None) };

@@ -9,9 +9,9 @@ use super::values::{integer, parse_pixel};
 
 /// Measure a microscope and its camera on your own images.
 ///
-/// A focus stack of nuclei gives the blur as a function of focus and the condenser aperture; a straight edge gives the blur in
-/// focus; flat frames give gain and noise of the camera. Prints tables, and writes plots, sections of recipes, and
-/// `calibration.json` with all numbers.
+/// A focus stack of nuclei gives the blur as a function of focus and the condenser aperture; a straight edge gives the
+/// blur in focus; flat frames give gain and noise of the camera. Prints tables, and writes plots, sections of recipes,
+/// and `calibration.json` with all numbers.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("images").required(true).multiple(true).args(["stack", "edge", "flat"]), after_help = "\
 Examples:

@@ -12,9 +12,9 @@ use crate::task::TaskArgs;
 
 /// Generate images with ground truth.
 ///
-/// The same recipe, model and seed give the same pixels, labels and tables on any machine, for any number of threads and any
-/// split of the frames into ranges or tasks. Run the same command again to write missing frames; complete frames are not
-/// written again.
+/// The same recipe, model and seed give the same pixels, labels and tables on any machine, for any number of threads
+/// and any split of the frames into ranges or tasks. Run the same command again to write missing frames; complete
+/// frames are not written again.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("which").required(true).args(["frames", "range"]), after_help = "\
 Examples:
@@ -31,8 +31,8 @@ Examples:
 pub(crate) struct Generate {
     #[command(flatten)]
     pub(crate) engine: EngineArgs,
-    /// Folder of the data set: new, empty, or written by the same command; in builds with --features cloud also an object
-    /// store (s3://, gs:// or az:// with bucket and prefix)
+    /// Folder of the data set: new, empty, or written by the same command; in builds with --features cloud also an
+    /// object store (s3://, gs:// or az:// with bucket and prefix)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Number of frames to generate
@@ -48,8 +48,8 @@ pub(crate) struct Generate {
     /// Check the content of files that are already present, not only their sizes, and repair invalid files
     #[arg(long)]
     pub(crate) verify: bool,
-    /// Memory limit, for example 2GiB; fewer frames are generated at the same time if needed [default: 80 % of the available
-    /// memory, on Linux]
+    /// Memory limit, for example 2GiB; fewer frames are generated at the same time if needed [default: 80 % of the
+    /// available memory, on Linux]
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
     /// Print the time of each stage, and pixels and objects per second
@@ -93,8 +93,8 @@ pub(crate) struct Preview {
 
 /// Render one scene, which may have been edited or written by another program.
 ///
-/// `papsynth generate --scenes` writes the scene of each frame as JSON. An unchanged scene with the same recipe and model gives
-/// the same pixels. The image of a focus stack is the one with every object in focus.
+/// `papsynth generate --scenes` writes the scene of each frame as JSON. An unchanged scene with the same recipe and
+/// model gives the same pixels. The image of a focus stack is the one with every object in focus.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -10,10 +10,10 @@ use super::values::{integer, named, parse_pixel, preset_parser};
 
 /// Test whether synthetic fields can be distinguished from real ones, and list the distinguishing features.
 ///
-/// Classifiers are trained on nuclei, free cells and patches, and tested on fields outside the training set. The same test
-/// between halves of the real fields gives the result expected by chance. The report also has the Q-Q slopes of nuclear texture
-/// of the paper and statistics of complete fields. Writes report.html, a page without external files, and report.json with the
-/// same numbers.
+/// Classifiers are trained on nuclei, free cells and patches, and tested on fields outside the training set. The same
+/// test between halves of the real fields gives the result expected by chance. The report also has the Q-Q slopes of
+/// nuclear texture of the paper and statistics of complete fields. Writes report.html, a page without external files,
+/// and report.json with the same numbers.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -68,9 +68,9 @@ pub(crate) struct Judge {
 
 /// Find the recipe whose fields resemble real ones.
 ///
-/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are imaged, regressions predict
-/// parameters from statistics of fields, and a search minimizes the distance to the real fields. Every value has a 95 %
-/// interval. Parameters that the fields do not determine are listed and keep their values.
+/// Light and noise are measured. All other parameters are estimated by simulation: random recipes are imaged,
+/// regressions predict parameters from statistics of fields, and a search minimizes the distance to the real fields.
+/// Every value has a 95 % interval. Parameters that the fields do not determine are listed and keep their values.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

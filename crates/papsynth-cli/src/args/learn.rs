@@ -8,8 +8,8 @@ use super::values::parse_pixel;
 
 /// Learn a class of cells from real images and outlines.
 ///
-/// Reads nuclei with masks, and cytoplasm as outlines or label images, and writes a model file for `papsynth generate --model`.
-/// Properties without data keep the values of the base model.
+/// Reads nuclei with masks, and cytoplasm as outlines or label images, and writes a model file for `papsynth generate
+/// --model`. Properties without data keep the values of the base model.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("material").required(true).multiple(true)
     .args(["nuclei", "nucleus_outlines", "outlines", "labels"]), after_help = "\

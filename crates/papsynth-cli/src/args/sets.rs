@@ -16,9 +16,9 @@ pub(crate) fn check_of(verify: bool) -> Check {
 
 /// Check every file of a data set.
 ///
-/// Finds changed, truncated, missing and untracked files, missing frames, and masks, boxes, areas, tables and label images that
-/// contradict each other. Computes the merged files again and compares them. To repair frames, run `papsynth generate --verify`
-/// with the same recipe.
+/// Finds changed, truncated, missing and untracked files, missing frames, and masks, boxes, areas, tables and label
+/// images that contradict each other. Computes the merged files again and compares them. To repair frames, run
+/// `papsynth generate --verify` with the same recipe.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -49,8 +49,8 @@ pub(crate) struct Clean {
     /// Folder or object store of the data set
     #[arg(value_name = "DIR")]
     pub(crate) dir: PathBuf,
-    /// Also remove all files that do not belong to the data set; only after `papsynth merge`, because other tasks may still
-    /// write files before
+    /// Also remove all files that do not belong to the data set; only after `papsynth merge`, because other tasks may
+    /// still write files before
     #[arg(long)]
     pub(crate) untracked: bool,
 }

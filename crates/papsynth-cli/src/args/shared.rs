@@ -47,8 +47,8 @@ pub(crate) struct EngineArgs {
     pub(crate) threads: Option<u16>,
 }
 
-/// The number of threads of `--threads`, or of cores. More than 8 threads are limited to the number of cores, because more
-/// only slow a run down.
+/// The number of threads of `--threads`, or of cores. More than 8 threads are limited to the number of cores, because
+/// more only slow a run down.
 pub(crate) fn threads(asked: Option<u16>) -> usize {
     const ALWAYS_ALLOWED: usize = 8;
     static NOTE: Once = Once::new();
@@ -81,7 +81,8 @@ pub(crate) struct FileArgs {
     /// Label of a pixel with several objects, in formats with one label per pixel
     #[arg(long, value_name = "POLICY", value_parser = named(Flatten::ALL, Flatten::name), default_value = Flatten::Top.name())]
     pub(crate) flatten: Flatten,
-    /// Frames per shard, the group of frames that is written or repaired together [default: 1; 256 with webdataset and huggingface]
+    /// Frames per shard, the group of frames that is written or repaired together [default: 1; 256 with webdataset and
+    /// huggingface]
     #[arg(long, value_name = "N", value_parser = integer(1, 1_000_000_u64))]
     pub(crate) frames_per_shard: Option<u64>,
     /// Write the table of objects as CSV only, without Parquet

@@ -11,8 +11,8 @@ use crate::task::TaskArgs;
 
 /// Generate slides, which may be larger than memory, and regions of slides.
 ///
-/// `[scan]` of a recipe sets the size of a slide and the position of its deposit. Counts of cells and debris hold for a field in
-/// the full deposit.
+/// `[scan]` of a recipe sets the size of a slide and the position of its deposit. Counts of cells and debris hold for a
+/// field in the full deposit.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +34,8 @@ pub(crate) struct Slide {
 pub(crate) enum SlideVerb {
     /// Generate a slide, or one task of it. Complete shards are not written again.
     Make(SlideMake),
-    /// Finish a slide of several tasks: check that all shards are present, and write lower resolutions, thumbnail and card.
+    /// Finish a slide of several tasks: check that all shards are present, and write lower resolutions, thumbnail and
+    /// card.
     Finalize(SlideFinalize),
     /// Write a region of a slide as a PNG; of several planes the centre one.
     Tile(SlideTile),
@@ -67,7 +68,8 @@ pub(crate) struct SlideMake {
     pub(crate) no_parquet: bool,
     #[command(flatten)]
     pub(crate) task: TaskArgs,
-    /// Memory limit, for example 2GiB; fewer threads are used if needed [default: 80 % of the available memory, on Linux]
+    /// Memory limit, for example 2GiB; fewer threads are used if needed [default: 80 % of the available memory, on
+    /// Linux]
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub(crate) max_memory: Option<u64>,
     /// Check the content of files that are already present, not only their sizes, and repair invalid files

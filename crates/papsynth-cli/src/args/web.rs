@@ -9,8 +9,9 @@ use super::values::{integer, named, parse_pixel};
 
 /// Run a reader study: can observers distinguish real and synthetic images?
 ///
-/// A page on this machine shows patches of real and synthetic fields for a short time and asks which are real, as in the paper. It
-/// works offline, serves no other files, and saves every answer at once: run the same command again to continue.
+/// A page on this machine shows patches of real and synthetic fields for a short time and asks which are real, as in
+/// the paper. It works offline, serves no other files, and saves every answer at once: run the same command again to
+/// continue.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -94,8 +95,8 @@ pub(crate) struct Study {
 
 /// View a data set or a slide in the browser, with pan, zoom, focus and ground truth.
 ///
-/// The page is served on this machine only (127.0.0.1) and writes no files. Data sets and slides can be viewed while they are
-/// written.
+/// The page is served on this machine only (127.0.0.1) and writes no files. Data sets and slides can be viewed while
+/// they are written.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

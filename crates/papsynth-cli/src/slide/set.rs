@@ -76,7 +76,8 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Exit
     Ok(fit?.at_once)
 }
 
-/// Returns the numbers of the missing shards of a slide, row by row, the number of all shards, and whether it is finalized.
+/// Returns the numbers of the missing shards of a slide, row by row, the number of all shards, and whether it is
+/// finalized.
 pub(crate) fn progress_of(dir: &Path) -> Result<(Vec<u64>, u64, bool), ExitError> {
     let set = SlideSet::open(dir)?;
     let missing: BTreeSet<[u32; 2]> = set.missing(Check::Sizes)?.into_iter().collect();
