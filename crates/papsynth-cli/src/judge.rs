@@ -6,7 +6,7 @@ use std::path::Path;
 use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture, Report};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 use rayon::prelude::*;
 
 use crate::args;
@@ -157,16 +157,16 @@ fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, Exit
 
 pub(crate) fn picture(file: &FieldFile) -> Result<Picture, ExitError> {
     let image = file.read(&Limits::default())?;
-    Ok(Picture {
+    Ok(FieldImage {
         name: file.name.clone(),
         group: file.group.clone(),
         grey: image.grey.iter().map(|g| f32::from(*g)).collect(),
         width: image.width,
         full_scale: f32::from(image.white),
         nuclei: match image.nuclei {
-            FieldNuclei::Unknown => Known::Nothing,
-            FieldNuclei::Points(points) => Known::Points(points),
-            FieldNuclei::Labels(labels) => Known::Masks(labels),
+            FieldNuclei::Unknown => NucleiAnnotation::None,
+            FieldNuclei::Points(points) => NucleiAnnotation::Points(points),
+            FieldNuclei::Labels(labels) => NucleiAnnotation::Masks(labels),
         },
     })
 }

@@ -1,7 +1,5 @@
 //! `papsynth match`: the recipe whose fields resemble real fields.
 
-use std::sync::atomic::Ordering;
-
 use papsynth::{Engine, Inputs};
 use papsynth_judge::Picture;
 use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
@@ -118,7 +116,7 @@ fn summary(fit: &Fit) -> String {
         "before"
     );
     let number = |value: f64| format!("{value:.3}");
-    let line = |a: &Answer| {
+    let line = |a: &ParameterFit| {
         let [low, high] = a.interval.map(number);
         let interval = format!("{low} to {high}");
         let origin = match a.origin {
@@ -129,9 +127,9 @@ fn summary(fit: &Fit) -> String {
         let name = if a.unit.is_empty() { a.parameter.name() } else { format!("{}, {}", a.parameter.name(), a.unit) };
         format!("{name:<24} {:>10} {interval:>21} {:>10}  {origin}\n", number(a.value), number(a.before))
     };
-    text.extend(fit.answers.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
+    text.extend(fit.parameters.iter().filter(|a| a.origin != Origin::NotIdentified).map(line));
     let lost: Vec<String> =
-        fit.answers.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
+        fit.parameters.iter().filter(|a| a.origin == Origin::NotIdentified).map(|a| a.parameter.name()).collect();
     if !lost.is_empty() {
         text.push_str(&format!("not identified, unchanged: {}\n", lost.join(", ")));
     }

@@ -22,12 +22,12 @@ pub struct Setting {
     /// Whether the size of a pixel is sought.
     pub seek_pixel: bool,
     /// Standard deviations between fields that were measured beside their means.
-    pub spreads: Spreads,
+    pub field_sd: FieldSd,
 }
 
 /// Standard deviations between fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spreads {
+pub struct FieldSd {
     /// Of the bowl across.
     pub across: f64,
     /// Of the bowl down.
@@ -36,7 +36,7 @@ pub struct Spreads {
     pub noise: f64,
 }
 
-impl Default for Spreads {
+impl Default for FieldSd {
     fn default() -> Self {
         Self { across: 0.008, down: 0.008, noise: 0.03 }
     }
@@ -97,7 +97,7 @@ impl Setting {
         let mut values = Values([0.0; PARAMETERS.len()]);
         for (parameter, value) in [
             (P::Level, level),
-            (P::LevelSpread, spread(&base.background.level) * centre(&base.background.level)),
+            (P::LevelSd, spread(&base.background.level) * centre(&base.background.level)),
             (P::BowlAcross, x2),
             (P::BowlDown, y2),
             (P::Noise, noise.sqrt()),
@@ -107,21 +107,21 @@ impl Setting {
             (P::Pixel, centre(&base.field.pixel_um)),
             (P::Photons, photons / (photons + read * read).max(1e-9)),
             (P::Blur, centre(blur)),
-            (P::BlurSpread, spread(blur)),
+            (P::BlurSd, spread(blur)),
             (P::Depth, centre(&base.slide.depth_um)),
             (P::FieldCytoplasm, centre(&base.stain.field_cytoplasm) * centre(&base.stain.slide_cytoplasm)),
-            (P::FieldCytoplasmSpread, both(&base.stain.field_cytoplasm, &base.stain.slide_cytoplasm)),
+            (P::FieldCytoplasmSd, both(&base.stain.field_cytoplasm, &base.stain.slide_cytoplasm)),
             (P::FieldNucleus, centre(&base.stain.field_nucleus) * centre(&base.stain.slide_nucleus)),
-            (P::FieldNucleusSpread, both(&base.stain.field_nucleus, &base.stain.slide_nucleus)),
+            (P::FieldNucleusSd, both(&base.stain.field_nucleus, &base.stain.slide_nucleus)),
             (P::Texture, centre(&base.stain.field_texture)),
-            (P::TextureSpread, spread(&base.stain.field_texture)),
+            (P::TextureSd, spread(&base.stain.field_texture)),
             (P::CellCytoplasm, spread(&of_cells(|mix| &mix.cytoplasm_stain))),
             (P::CellNucleus, spread(&of_cells(|mix| &mix.nucleus_stain))),
             (P::Dome, centre(&base.nucleus.dome)),
             (P::Rim, centre(&base.nucleus.rim)),
             (P::Structure, 1.0),
             (P::Cells, counts / area),
-            (P::CellsSpread, first.map_or(0.3, |mix| spread(&mix.count))),
+            (P::CellsSd, first.map_or(0.3, |mix| spread(&mix.count))),
             (P::Superficial, superficial / (superficial + intermediate).max(1e-9)),
             (P::Size, centre(&of_cells(|mix| &mix.size))),
             (P::ClusterRadius, radius),
@@ -163,9 +163,9 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
     let either = |a: P, b: P| on(a) || on(b);
     let or_base = |parameter: P| if on(parameter) { get(parameter) } else { base.get(parameter) };
 
-    if either(P::Level, P::LevelSpread) {
+    if either(P::Level, P::LevelSd) {
         let level = or_base(P::Level) + TAKEN * or_base(P::Scatter);
-        r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 1.1);
+        r.background.level = cut(normal(level, or_base(P::LevelSd)), 0.05, 1.1);
     }
     if either(P::BowlAcross, P::BowlDown) {
         let off_centre = match &r.background.illumination {
@@ -173,20 +173,20 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
             Illumination::Border(_) => 0.0.into(),
         };
         r.background.illumination = Illumination::Bowl(Bowl {
-            x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
-            y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
+            x2: cut(normal(or_base(P::BowlAcross), setting.field_sd.across), 0.0, 0.45),
+            y2: cut(normal(or_base(P::BowlDown), setting.field_sd.down), 0.0, 0.45),
             off_centre,
         });
     }
     camera(&mut r, setting, &on, &or_base);
-    if either(P::Blur, P::BlurSpread) {
-        *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSpread)), 0.0, 10.0);
+    if either(P::Blur, P::BlurSd) {
+        *blur(&mut r.optics) = cut(log_normal(or_base(P::Blur), or_base(P::BlurSd)), 0.0, 10.0);
     }
     let stain = &mut r.stain;
     for (median, log_sd, of_field, of_slide) in [
-        (P::FieldCytoplasm, P::FieldCytoplasmSpread, &mut stain.field_cytoplasm, Some(&mut stain.slide_cytoplasm)),
-        (P::FieldNucleus, P::FieldNucleusSpread, &mut stain.field_nucleus, Some(&mut stain.slide_nucleus)),
-        (P::Texture, P::TextureSpread, &mut stain.field_texture, None),
+        (P::FieldCytoplasm, P::FieldCytoplasmSd, &mut stain.field_cytoplasm, Some(&mut stain.slide_cytoplasm)),
+        (P::FieldNucleus, P::FieldNucleusSd, &mut stain.field_nucleus, Some(&mut stain.slide_nucleus)),
+        (P::Texture, P::TextureSd, &mut stain.field_texture, None),
     ] {
         if either(median, log_sd) {
             *of_field = cut(log_normal(or_base(median), or_base(log_sd)), 0.0, 20.0);
@@ -279,7 +279,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
     let camera = &mut r.camera;
     camera.full_well_e = number(per_dn * LEVELS / (1.0 - glare));
     // A spread of all noise is laid on the reading alone.
-    let spread = (setting.spreads.noise / (1.0 - photons)).min(0.5);
+    let spread = (setting.field_sd.noise / (1.0 - photons)).min(0.5);
     camera.read_noise_e = if spread > 0.02 { log_normal(read, spread) } else { number(read) };
     camera.read_noise_rms_e = 0.0.into();
     camera.dsnu_e = 0.0.into();
@@ -288,7 +288,7 @@ fn camera(r: &mut Recipe, setting: &Setting, on: &impl Fn(P) -> bool, or_base: &
 }
 
 fn cells(r: &mut Recipe, area: f64, on: &impl Fn(P) -> bool, or_base: &impl Fn(P) -> f64) {
-    let found = on(P::Cells) || on(P::CellsSpread) || on(P::Superficial);
+    let found = on(P::Cells) || on(P::CellsSd) || on(P::Superficial);
     let (total, share) = (or_base(P::Cells) * area, or_base(P::Superficial));
     let base_total: f64 = r.cells.values().map(|mix| centre(&mix.count)).sum();
     let scale = total / base_total.max(1e-9);
@@ -300,7 +300,7 @@ fn cells(r: &mut Recipe, area: f64, on: &impl Fn(P) -> bool, or_base: &impl Fn(P
                 "intermediate" if on(P::Superficial) => (pair[0] + pair[1]) * (1.0 - share),
                 _ => centre(&mix.count),
             };
-            mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSpread)));
+            mix.count = counted(log_normal((own * scale).max(0.01), or_base(P::CellsSd)));
         } else {
             mix.count = counted(times(&mix.count, scale));
         }
@@ -445,7 +445,7 @@ mod tests {
             bits: 8,
             extended,
             seek_pixel: false,
-            spreads: Spreads::default(),
+            field_sd: FieldSd::default(),
         }
     }
 
@@ -472,7 +472,7 @@ mod tests {
         let values = Values::at(&std::array::from_fn(|i| 0.2 + 0.6 * (i as f64) / PARAMETERS.len() as f64));
         let made = recipe(&setting, &values, |_| true);
         let back = Setting { base: made, ..setting }.base_values();
-        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::CellsSpread)) {
+        for parameter in PARAMETERS.into_iter().filter(|p| !matches!(p, P::Pixel | P::Structure | P::CellsSd)) {
             let (a, b) = (values.get(parameter), back.get(parameter));
             assert!((a - b).abs() < 0.03 * a.abs() + 0.01, "{parameter:?}: {a} {b}");
         }

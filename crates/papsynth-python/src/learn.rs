@@ -1,7 +1,7 @@
 //! Classes of cells, learned from images and outlines, and how much synthetic fields are like real ones.
 
 use papsynth::learn::{Donors, LearnParams, Material, NucleusImage};
-use papsynth_judge::{Field, Gauge, GaugeParams, Judge, JudgeParams, Known, NucleiFrom, Picture};
+use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
@@ -104,7 +104,7 @@ pub(crate) fn judge(
         pictures("real", &real, real_nuclei.as_deref(), full_scale)?,
         pictures("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
     ];
-    let gauge = Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(wrong)?;
+    let gauge = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;
@@ -124,7 +124,12 @@ pub(crate) fn judge(
     serde_json::to_string(&report.map_err(wrong)?).map_err(wrong)
 }
 
-fn pictures(side: &str, images: &[Given<'_>], nuclei: Option<&[Given<'_>]>, full_scale: f32) -> PyResult<Vec<Picture>> {
+fn pictures(
+    side: &str,
+    images: &[Given<'_>],
+    nuclei: Option<&[Given<'_>]>,
+    full_scale: f32,
+) -> PyResult<Vec<FieldImage>> {
     if images.len() < 2 {
         return Err(wrong(format!("{side}: {} fields; expected 2 or more", images.len())));
     }
@@ -134,10 +139,10 @@ fn pictures(side: &str, images: &[Given<'_>], nuclei: Option<&[Given<'_>]>, full
     let one = |(number, image): (usize, &Given<'_>)| {
         let (grey, width) = pixels(&nth(side, number), image)?;
         let nuclei = match nuclei {
-            None => Known::Nothing,
-            Some(nuclei) => Known::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
+            None => NucleiAnnotation::None,
+            Some(nuclei) => NucleiAnnotation::Points(points(&nth(&format!("{side}_nuclei"), number), &nuclei[number])?),
         };
-        Ok(Picture { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
+        Ok(FieldImage { name: format!("{side}[{number}]"), group: String::new(), grey, width, full_scale, nuclei })
     };
     images.iter().enumerate().map(one).collect()
 }

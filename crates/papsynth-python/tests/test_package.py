@@ -448,7 +448,7 @@ def test_fields_are_judged():
     recipe = {"field": {"width_px": 640, "height_px": 480}}
     one, other = ([papsynth.render(recipe, seed=seed, index=index).image for index in range(6)] for seed in (1, 2))
     report = papsynth.judge(one, other, 0.25, quick=True)
-    assert report["verdict"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
+    assert report["conclusion"] and report == papsynth.judge(one, other, 0.25, quick=True, threads=1)
     for wrong in ((one[:1], other, 0.25), (one, other, -1.0), (one, [np.zeros(3)] * 3, 0.25), ([], other, 0.25)):
         with pytest.raises((ValueError, TypeError)):
             papsynth.judge(*wrong)

@@ -58,8 +58,8 @@ fn fields_of_another_seed_pass_and_different_fields_do_not() {
     }
     let report = json(&bench, "same/report.json");
     assert_eq!(report["judge_report"], 1);
-    assert_eq!(report["gauge"]["nuclei_from"], "masks");
-    assert_eq!(report["gauge"]["pixel_um"], 0.33);
+    assert_eq!(report["measurement"]["nuclei_from"], "masks");
+    assert_eq!(report["measurement"]["pixel_um"], 0.33);
     let names: Vec<&str> =
         report["two_sample"].as_array().unwrap().iter().map(|t| t["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"nuclei") && names.contains(&"patches"), "{names:?}");
@@ -80,7 +80,7 @@ fn fields_of_another_seed_pass_and_different_fields_do_not() {
         "--seed 2 --preset high-grade --set cells.high-grade.count=7 --set cells.intermediate.count=0",
     );
     for (other, test, verdict) in
-        [("noise", "patches", "told apart"), ("blurred", "patches", "told apart"), ("high", "nuclei", "told apart")]
+        [("noise", "patches", "distinguishable"), ("blurred", "patches", "distinguishable"), ("high", "nuclei", "distinguishable")]
     {
         let outcome = bench.good(&format!("judge a {other} --out {other}-report --quick"));
         let line = outcome.out.lines().find(|line| line.starts_with(test)).unwrap();
@@ -96,7 +96,7 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
     copies(&bench, "a", "slides", |grey, _, i| grey[i]);
     // Without nuclei, they are found automatically; the pixel size is that of the other side.
     let searched = bench.good("judge slides a --out searched --quick");
-    assert_eq!(json(&bench, "searched/report.json")["gauge"]["nuclei_from"], "search");
+    assert_eq!(json(&bench, "searched/report.json")["measurement"]["nuclei_from"], "search");
     assert!(searched.out.contains("nuclei"), "{}", searched.out);
     for index in 0..8 {
         fs::write(bench.path(&format!("slides/{index}.csv")), "y,x\n100,120.5\n").unwrap();
@@ -105,12 +105,12 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
     fs::write(bench.path("slides/frames.csv"), format!("frame,grade\n{groups}")).unwrap();
     bench.good("judge slides a --out points --quick --group N --pixel-um 0.25");
     let report = json(&bench, "points/report.json");
-    assert_eq!(report["gauge"]["nuclei_from"], "points");
-    assert_eq!(report["gauge"]["pixel_um"], 0.33);
+    assert_eq!(report["measurement"]["nuclei_from"], "points");
+    assert_eq!(report["measurement"]["pixel_um"], 0.33);
     assert_eq!(report["fields"][0], serde_json::json!(["0", "1", "2"]));
     assert_eq!(report["fields"][1].as_array().unwrap().len(), 8);
     bench.good("judge slides a --out points --quick --nuclei search");
-    assert_eq!(json(&bench, "points/report.json")["gauge"]["nuclei_from"], "search");
+    assert_eq!(json(&bench, "points/report.json")["measurement"]["nuclei_from"], "search");
     fs::create_dir(bench.path("slides/masks")).unwrap();
     for index in 0..8 {
         bench.grey_png(&format!("slides/masks/{index}.png"), 420, 320, |x, y| {
@@ -118,7 +118,7 @@ fn folders_may_hold_points_masks_groups_and_other_pixels() {
         });
     }
     bench.good("judge slides a --out masks --quick");
-    assert_eq!(json(&bench, "masks/report.json")["gauge"]["nuclei_from"], "masks");
+    assert_eq!(json(&bench, "masks/report.json")["measurement"]["nuclei_from"], "masks");
 }
 
 #[test]
