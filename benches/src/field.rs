@@ -10,7 +10,7 @@ use papsynth::model::Model;
 use papsynth::recipe::{Clusters, Law, Layout, Number, Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Error, Inputs, Plane, Threads};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Share};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Run, Task};
 
 use crate::{Size, Work};
 
@@ -131,8 +131,8 @@ pub fn default_files(folder: &Path) -> Work {
         let frames = index..index + 1;
         let run = Run {
             frames,
-            share: Share::ALL,
-            at_once: 1,
+            task: Task::ALL,
+            workers: 1,
             threads: Threads::One,
             check: Check::Sizes,
             stop: &stop,

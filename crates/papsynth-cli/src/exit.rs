@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
 /// Exit code for wrong usage, recipe or input: the same command fails again. Shells use 2 for usage.
 pub(crate) const INPUT: u8 = 2;
@@ -286,16 +286,24 @@ fn rendered(report: &ErrorReport) -> String {
     let renderer = if in_colour { Renderer::styled() } else { Renderer::plain() };
     let message = shortened(&escaped(&report.message));
     let mut group = Group::with_title(Level::ERROR.primary_title(message));
-    if let (Some(location), Some(excerpt)) = (&report.location, &report.excerpt) {
-        let origin = Origin::path(escaped(&location.file)).line(location.line).char_column(location.column);
+    let mut location = None;
+    if let (Some(place), Some(excerpt)) = (&report.location, &report.excerpt) {
+        let file = escaped(&place.file);
         let marked = AnnotationKind::Primary.span(excerpt.span.clone());
-        let snippet = Snippet::source(excerpt.text.as_str()).line_start(location.line).annotation(marked);
-        group = group.element(origin).element(snippet);
+        let snippet = Snippet::source(excerpt.text.as_str()).path(file.clone()).line_start(place.line);
+        group = group.element(snippet.annotation(marked));
+        // The renderer counts the column in the excerpt.
+        let column = excerpt.text[..excerpt.span.start].chars().count() + 1;
+        location = Some([column, place.column].map(|column| format!("{file}:{}:{column}", place.line)));
     }
     if let Some(help) = &report.help {
         group = group.element(Level::HELP.message(shortened(&escaped(help))));
     }
-    renderer.term_width(4 * EXCERPT_CHARS).render(&[group])
+    let text = renderer.term_width(4 * EXCERPT_CHARS).render(&[group]);
+    match location {
+        Some([in_excerpt, in_file]) => text.replacen(&in_excerpt, &in_file, 1),
+        None => text,
+    }
 }
 
 #[cfg(test)]
@@ -333,7 +341,7 @@ mod tests {
         let text = Arc::new(format!("{}here{}", "[".repeat(10_000), "]".repeat(1_000_000)));
         let report = ErrorReport::new("wrong").at("x.toml", &text, 10_000..10_004);
         let shown = rendered(&report);
-        assert!(shown.contains("x.toml:1:10001") && shown.contains("[here]") && shown.len() < 1000, "{shown}");
+        assert!(shown.contains("x.toml:1:10001\n") && shown.contains("[here]") && shown.len() < 1000, "{shown}");
         assert!(rendered(&ErrorReport::new("y".repeat(1_000_000))).len() < 2000);
     }
 

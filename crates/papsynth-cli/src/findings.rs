@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use papsynth_dataset::{Finding, Mend};
+use papsynth_dataset::{Finding, Fix};
 
 use crate::exit::{self, ExitError};
 use crate::words::counted;
@@ -27,11 +27,11 @@ pub(crate) fn check(dir: &Path, findings: &[Finding]) -> Result<(), ExitError> {
         return Ok(());
     }
     let problems = counted(findings.len() as u64, "problem", "problems");
-    let needs = |mend: Mend| findings.iter().any(|finding| finding.mend == mend);
+    let needs = |mend: Fix| findings.iter().any(|finding| finding.fix == mend);
     let repairs: Vec<&str> = [
-        (Mend::Generate, "to repair frames, run the command that wrote them with --verify"),
-        (Mend::Merge, "run `papsynth merge` when all shards are present"),
-        (Mend::Clean, "`papsynth clean --untracked` removes other files"),
+        (Fix::Generate, "to repair frames, run the command that wrote them with --verify"),
+        (Fix::Merge, "run `papsynth merge` when all shards are present"),
+        (Fix::Clean, "`papsynth clean --untracked` removes other files"),
     ]
     .into_iter()
     .filter(|(mend, _)| needs(*mend))

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
-use papsynth_dataset::memory::{Fit, Need};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Home, Layout, Progress as Step, Run, Share as Task};
+use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan};
+use papsynth_dataset::{Dataset, Error, FrameSummary, Layout, Location, Progress as Step, Run, Task};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -21,7 +21,7 @@ use crate::words::counted;
 pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     let timing = args.profile.then(Timing::start);
     let profile = timing.as_ref().map(|timing| timing.profile.clone());
-    let home = Home::at(&args.out)?;
+    let home = Location::at(&args.out)?;
     let setup = Setup::load(&args.engine, profile.clone())?;
     let seed = args.engine.seed;
     let frames = args.indices();
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     }
     let task = args.task.task()?;
     // One frame per thread is fastest; threads share a frame only if there are fewer shards than threads.
-    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(task.of);
+    let shards = count.div_ceil(layout.frames_per_shard).div_ceil(task.total);
     let few = usize::try_from(shards).ok().filter(|shards| *shards < setup.threads);
     let fit = fit(args, &setup, few, &layout)?;
     // Errors in the scene are reported before any file is written.
@@ -46,15 +46,15 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     }
     let stop = exit::stop_flag()?;
     let dataset = Dataset::create_or_resume(&home, &setup.info(seed, &layout))?;
-    let at_once = fit.at_once;
+    let workers = fit.workers;
     let (threads, working) = match fit.shared {
         true => (setup.threads_of_a_frame(), setup.threads),
-        false => (Threads::One, at_once),
+        false => (Threads::One, workers),
     };
     let progress = Progress::start(args, count, working, fit.bytes)?;
     let check = check_of(args.verify);
     let end = frames.end;
-    let run = Run { frames, share: task, at_once, threads, check, stop, profile: profile.as_deref() };
+    let run = Run { frames, task, workers: at_once, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
         timing.iter().for_each(|timing| timing.step(step));
         progress.step(step);
@@ -63,13 +63,13 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     progress.clear();
     let outcome = outcome.map_err(|error| setup.error(error))?;
     if outcome.stopped {
-        let complete = counted(outcome.kept + outcome.made, "complete frame", "complete frames");
+        let complete = counted(outcome.present + outcome.written, "complete frame", "complete frames");
         let message = format!("stopped with {complete}; every file in {} is complete", args.out.display());
         return Err(ExitError::stopped(message));
     }
     // A complete data set is not written again, so that it may lie on a read-only disk.
     // `papsynth merge` finishes the data set of several tasks.
-    if task == Task::ALL && (outcome.made > 0 || args.verify || !dataset.is_finished()?) {
+    if task == Task::ALL && (outcome.written > 0 || args.verify || !dataset.is_finished()?) {
         dataset.finish().map_err(|error| damaged(&error))?;
     }
     progress.done(&outcome, task, end)?;
@@ -81,9 +81,9 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
 }
 
 /// The parallelism that fits into memory. `few` is the number of shards if it is below the number of threads.
-fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<Fit, ExitError> {
+fn fit(args: &Generate, setup: &Setup, few: Option<usize>, layout: &Layout) -> Result<MemoryPlan, ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of(recipe, layout);
+    let need = MemoryEstimate::of(recipe, layout);
     let wanted = (few.map_or(setup.threads, |_| 1), few.is_some() && setup.threads > 1);
     memory::fit(&need, setup.threads, wanted, args.max_memory, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory; \
@@ -124,7 +124,7 @@ impl Timing {
 
     /// Counts a frame.
     fn step(&self, step: Step) {
-        let Step::Made(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
+        let Step::Written(FrameSummary { width, height, channels, planes_um, objects, .. }) = step else { return };
         let add = |sum: &AtomicU64, value: u64| sum.fetch_add(value, Ordering::Relaxed);
         add(&self.frames, 1);
         add(&self.pixels, (width * height * channels * planes_um.len()) as u64);

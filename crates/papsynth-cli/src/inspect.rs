@@ -17,7 +17,7 @@ pub(crate) fn run(args: &Inspect) -> Result<(), ExitError> {
     } else {
         exit::print(&table(&args.dir.display().to_string(), &overview))?;
     }
-    let (shards, files) = (overview.defects.len() as u64, overview.flaws.len() as u64);
+    let (shards, files) = (overview.damaged_shards.len() as u64, overview.damaged_files.len() as u64);
     let damaged: Vec<String> = [(shards, "shard", "shards"), (files, "file", "files")]
         .into_iter()
         .filter(|(count, ..)| *count > 0)
@@ -51,10 +51,10 @@ fn table(dir: &str, overview: &Overview) -> String {
         let merged = counted(overview.manifest.frames, "frame", "frames");
         row("merged", &format!("{merged}; `papsynth merge` adds the rest to objects.csv and coco.json"));
     }
-    for defect in overview.defects.iter().take(MAX_LISTED) {
+    for defect in overview.damaged_shards.iter().take(MAX_LISTED) {
         row("damaged", &format!("shard {}: {}", defect.shard, defect.message));
     }
-    for flaw in &overview.flaws {
+    for flaw in &overview.damaged_files {
         row("damaged", flaw);
     }
     if overview.frames > 0 {

@@ -2,16 +2,21 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use papsynth::recipe::diagnose::quoted;
 use papsynth_dataset::read::{FieldFile, FieldNuclei, Limits};
 use papsynth_dataset::{field_files, write_file};
-use papsynth_judge::{Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom};
+use papsynth_judge::{
+    Control, Error, Field, FieldImage, Judge, JudgeParams, Measurer, MeasurerParams, NucleiAnnotation, NucleiFrom,
+    Progress,
+};
 use rayon::prelude::*;
 
 use crate::args;
-use crate::exit::{self, ExitError};
+use crate::exit::{self, ErrorReport, ExitError};
 use crate::output_file::{Kind, check_folder};
+use crate::report::Bar;
 use crate::setup::pool;
 use crate::words::counted;
 
@@ -31,9 +36,6 @@ const SAME_PIXEL: f64 = 0.01;
 /// Smallest number of fields per side.
 const MIN_FIELDS: usize = 2;
 
-/// Features of a test that are printed at most.
-const MAX_PRINTED: usize = 5;
-
 /// Fields of one side, each with its pixel size, µm.
 type Side = Vec<(f64, FieldFile)>;
 
@@ -46,20 +48,27 @@ pub(crate) fn run(args: &args::Judge) -> Result<(), ExitError> {
         note_few_slides(folder, side);
     }
     let nuclei_from = nuclei_from(args, &real, &synthetic)?;
-    let gauge =
-        Gauge::new(&GaugeParams { pixel_um, nuclei_from, ..GaugeParams::default() }).map_err(ExitError::input)?;
+    let params = MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() };
+    let measurer = Measurer::new(&params).map_err(ExitError::input)?;
     let params = if args.quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed: args.seed, ..params }).map_err(ExitError::input)?;
-    let report = pool(args.threads)?.install(|| {
-        let (real, synthetic) = (measure(&real, &gauge, pixel_um)?, measure(&synthetic, &gauge, pixel_um)?);
-        judge.compare(&real, &synthetic).map_err(ExitError::input)
-    })?;
+    let stop = exit::stop_flag()?;
+    let bar = Bar::start(args.quiet);
+    let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
+    let control = Control { stop, report: &report };
+    let result = pool(args.threads)?.install(|| {
+        let real = measure(&real, &measurer, pixel_um, "measuring real fields", &control)?;
+        let synthetic = measure(&synthetic, &measurer, pixel_um, "measuring synthetic fields", &control)?;
+        judge.compare_with(&real, &synthetic, &control).map_err(|error| exit_error(&error, None))
+    });
+    bar.clear();
+    let report = result?;
     let mut numbers = serde_json::to_string_pretty(&report).unwrap_or_default();
     numbers.push('\n');
     for ((name, ..), text) in [(PAGE, report.to_html()), (NUMBERS, numbers)] {
         write_file(&args.out.join(name), text.as_bytes())?;
     }
-    exit::print(&summary(&report, &args.out))
+    exit::print(&format!("{}{}: {}, {}\n", report.to_text(), args.out.display(), PAGE.0, NUMBERS.0))
 }
 
 /// The fields of both sides that `--group` selects, with their pixel sizes.
@@ -144,18 +153,39 @@ fn nuclei_from(args: &args::Judge, real: &Side, synthetic: &Side) -> Result<Nucl
     Err(ExitError::with_help(message, "all fields of both sides need them"))
 }
 
-fn measure(side: &Side, gauge: &Gauge, pixel_um: f64) -> Result<Vec<Field>, ExitError> {
-    let measure = |(own_um, file): &(f64, FieldFile)| {
-        let factor = pixel_um / own_um;
-        let picture = picture(file)?;
-        let picture = if factor > 1.0 + SAME_PIXEL { picture.coarsened(factor) } else { picture };
-        gauge.measure(&picture).map_err(|error| ExitError::input(format!("{}: {error}", file.path().display())))
+/// Measures the fields of a side at the common pixel size.
+fn measure(
+    side: &Side,
+    measurer: &Measurer,
+    common_um: f64,
+    phase: &str,
+    control: &Control,
+) -> Result<Vec<Field>, ExitError> {
+    let done = AtomicUsize::new(0);
+    let measure = |(pixel_um, file): &(f64, FieldFile)| {
+        control.check().map_err(|error| exit_error(&error, None))?;
+        let factor = common_um / pixel_um;
+        let image = field_image(file)?;
+        let image = if factor > 1.0 + SAME_PIXEL { image.coarsened(factor) } else { image };
+        let field = measurer.measure_with(&image, control).map_err(|error| exit_error(&error, Some(file)))?;
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        (control.report)(Progress { phase, done, total: side.len() });
+        Ok(field)
     };
     let fields: Vec<Result<Field, ExitError>> = side.par_iter().map(measure).collect();
     fields.into_iter().collect()
 }
 
-pub(crate) fn picture(file: &FieldFile) -> Result<Picture, ExitError> {
+fn exit_error(error: &Error, file: Option<&FieldFile>) -> ExitError {
+    match (error, file) {
+        (Error::Stopped, _) => ExitError::interrupted(ErrorReport::new("stopped; no file was written")),
+        (other, Some(file)) => ExitError::input(format!("{}: {other}", file.path().display())),
+        (other, None) => ExitError::input(other),
+    }
+}
+
+/// Reads a field with its nuclei.
+pub(crate) fn field_image(file: &FieldFile) -> Result<FieldImage, ExitError> {
     let image = file.read(&Limits::default())?;
     Ok(FieldImage {
         name: file.name.clone(),
@@ -169,37 +199,4 @@ pub(crate) fn picture(file: &FieldFile) -> Result<Picture, ExitError> {
             FieldNuclei::Labels(labels) => NucleiAnnotation::Masks(labels),
         },
     })
-}
-
-fn summary(report: &Report, out: &Path) -> String {
-    let mut text = String::new();
-    for test in &report.two_sample {
-        let (name, r, verdict, [low, high]) = (&test.name, &test.result, &test.verdict, test.result.interval);
-        let halves = r.null_median().map_or("unknown (too few fields)".to_owned(), |auc| format!("{auc:.3}"));
-        text.push_str(&format!(
-            "{name:<22} AUC {:.3} ({low:.3} to {high:.3}), between real halves {halves}: {verdict}\n",
-            r.auc
-        ));
-        for g in r.giveaways.iter().take(MAX_PRINTED).filter(|g| g.importance > 0.0) {
-            text.push_str(&format!(
-                "    {:<42} real {:>9.4}  synthetic {:>9.4}\n",
-                g.feature, g.real[1], g.synthetic[1]
-            ));
-        }
-    }
-    for test in &report.moments {
-        let outside = test.result.descriptors.iter().filter(|d| !d.within).count();
-        let total = test.result.descriptors.len();
-        text.push_str(&format!(
-            "{}: {outside} of {total} Q-Q slopes or shifts are outside the range of real halves: {}\n",
-            test.name, test.verdict
-        ));
-    }
-    let [real, synthetic] = &report.fields;
-    text.push_str(&format!("{} real and {} synthetic fields: {}\n", real.len(), synthetic.len(), report.verdict));
-    for note in &report.notes {
-        text.push_str(&format!("note: {note}\n"));
-    }
-    text.push_str(&format!("{}: {}, {}\n", out.display(), PAGE.0, NUMBERS.0));
-    text
 }

@@ -1,13 +1,13 @@
 //! `papsynth match`: the recipe whose fields resemble real fields.
 
 use papsynth::{Engine, Inputs};
-use papsynth_judge::Picture;
-use papsynth_match::{Answer, Error, Fit, Match, MatchParams, Origin, PixelSize, Step, TableParams};
+use papsynth_judge::{Control, FieldImage, Progress};
+use papsynth_match::{Error, Fit, Match, MatchParams, Origin, ParameterFit, PixelSize};
 use serde_json::json;
 
 use crate::args;
 use crate::exit::{self, ErrorReport, ExitError};
-use crate::judge::{fields_of, picture};
+use crate::judge::{field_image, fields_of};
 use crate::output_file::{Kind, OutputFile, check_writable};
 use crate::report::Bar;
 use crate::setup::{pool, read_model};
@@ -16,17 +16,6 @@ use crate::words::counted;
 /// Output files, and the beginnings by which older ones are recognized.
 const RECIPE: Kind = Kind::Text(b"# Matched to ", "a recipe of papsynth match");
 const REPORT: Kind = Kind::Text(b"{\n  \"match_report\":", "a report of papsynth match");
-
-/// Number of simulations, with `--quick`, and of each recipe at most.
-const SIMULATIONS: usize = 2000;
-const QUICK_SIMULATIONS: usize = 336;
-const MAX_WINDOWS: usize = 8;
-
-/// Smallest number of recipes of a table.
-const MIN_RECIPES: usize = 30;
-
-const ROUNDS: usize = 8;
-const QUICK_ROUNDS: usize = 3;
 
 /// Pixel size of a 20x objective, µm: the start of the search for the pixel size.
 const DEFAULT_PIXEL_UM: f64 = 0.33;
@@ -54,33 +43,21 @@ pub(crate) fn run(args: &args::Match) -> Result<(), ExitError> {
             return Err(ExitError::with_help(message, help));
         }
     };
-    let fields: Vec<Picture> = files.iter().map(picture).collect::<Result<_, _>>()?;
+    let fields: Vec<FieldImage> = files.iter().map(field_image).collect::<Result<_, _>>()?;
     [Some(&args.out), args.report.as_ref()].into_iter().flatten().try_for_each(|out| check_writable(out))?;
 
-    let windows = MAX_WINDOWS.min(fields.len()).max(1);
-    let simulations = args.simulations.unwrap_or(if args.quick { QUICK_SIMULATIONS } else { SIMULATIONS });
-    let recipes = (simulations / windows).max(MIN_RECIPES);
-    let params = MatchParams {
-        pixel,
-        table: TableParams { recipes, windows, seed: args.seed },
-        rounds: if args.quick { QUICK_ROUNDS } else { ROUNDS },
-    };
+    let default = if args.quick { MatchParams::quick() } else { MatchParams::default() };
+    let simulations = args.simulations.unwrap_or(default.simulations);
+    let params = MatchParams { pixel, simulations, seed: args.seed, ..default };
     let base = args.preset.recipe();
     let matching = Match::new(&params, &base).map_err(|e| exit_error(&e, &args.real))?;
     let make = |recipe: &papsynth::recipe::Recipe| Engine::new(recipe, &model, &Inputs::default());
     let bar = Bar::start(args.quiet);
-    let tell = |step: Step| {
-        match step {
-            Step::Simulated(done, total) => bar.update(done as u64, total as u64, "recipes simulated"),
-            Step::Searched(done, total, distance) => {
-                bar.update(done as u64, total as u64, &format!("search rounds, distance {distance:.2}"));
-            }
-        }
-        !stop.load(Ordering::SeqCst)
-    };
-    let fit =
-        pool(args.threads)?.install(|| matching.run(&fields, &make, &tell)).map_err(|e| exit_error(&e, &args.real))?;
+    let report = |progress: Progress| bar.update(progress.done as u64, progress.total as u64, progress.phase);
+    let control = Control { stop, report: &report };
+    let fit = pool(args.threads)?.install(|| matching.run(&fields, &make, &control));
     bar.clear();
+    let fit = fit.map_err(|error| exit_error(&error, &args.real))?;
 
     if let Some(file) = report_file {
         let text = serde_json::to_string_pretty(&json!({ "match_report": 1, "fit": fit, "seed": args.seed }));

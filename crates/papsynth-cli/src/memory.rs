@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use papsynth_dataset::memory::{Fit, Need, available, shown};
+use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan, available, format_bytes};
 
 use crate::exit::{self, ExitError};
 
@@ -56,25 +56,25 @@ impl Limits {
 /// How a run fits into its budget: with at most `at_once` frames side by side. `too_large` is the error for a budget
 /// that is too small for one frame.
 pub(crate) fn fit(
-    need: &Need,
+    need: &MemoryEstimate,
     threads: usize,
-    (at_once, shared): (usize, bool),
+    (workers, shared): (usize, bool),
     asked: Option<u64>,
     too_large: impl FnOnce(Budget) -> ExitError,
-) -> Result<Fit, ExitError> {
+) -> Result<MemoryPlan, ExitError> {
     let limits = Limits::new(asked);
     let bytes = |threads: usize| limits.budget(threads).map(|budget| budget.bytes);
-    let all_on_one = if shared { need.fit(1, true, bytes(threads)).filter(|fit| fit.shared) } else { None };
+    let all_on_one = if shared { need.plan(1, true, bytes(threads)).filter(|fit| fit.shared) } else { None };
     // Each thread reserves addresses, so that fewer threads have a larger budget.
-    let separate = |frames: usize| need.fit(frames, false, bytes(frames)).filter(|fit| fit.at_once == frames);
+    let separate = |frames: usize| need.plan(frames, false, bytes(frames)).filter(|fit| fit.workers == frames);
     let Some(fit) = all_on_one.or_else(|| (1..=at_once).rev().find_map(separate)) else {
         let budget = limits.budget(1);
         return Err(too_large(budget.unwrap_or(Budget { bytes: 0, source: "the available memory" })));
     };
-    if (fit.at_once, fit.shared) != (at_once, shared)
-        && let Some(Budget { bytes, source }) = limits.budget(fit.at_once)
+    if (fit.workers, fit.shared) != (at_once, shared)
+        && let Some(Budget { bytes, source }) = limits.budget(fit.workers)
     {
-        let (used, may) = (fit.at_once, shown(bytes as f64));
+        let (used, may) = (fit.workers, format_bytes(bytes as f64));
         exit::note(format!("{used} of {threads} threads are used, to stay below {may} ({source})"));
     }
     Ok(fit)
@@ -83,7 +83,7 @@ pub(crate) fn fit(
 /// Checks that the address-space limit leaves room for a recipe and a model.
 pub(crate) fn check_addresses() -> Result<(), ExitError> {
     let Some(free) = free_addresses().filter(|free| *free < PROGRAM_ADDRESSES) else { return Ok(()) };
-    let [free, needed] = [free, PROGRAM_ADDRESSES].map(|bytes| shown(bytes as f64));
+    let [free, needed] = [free, PROGRAM_ADDRESSES].map(|bytes| format_bytes(bytes as f64));
     let message = format!("the address-space limit of the process leaves {free}; at least {needed} are needed");
     Err(ExitError::with_help(message, "raise the limit: `ulimit -v` shows it, in KiB"))
 }

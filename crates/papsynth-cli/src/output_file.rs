@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 
-use papsynth_dataset::{Picture, write_file};
+use papsynth_dataset::{RgbImage, write_file};
 use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, PixelDimensions, Unit};
 
 use crate::exit::ExitError;
@@ -72,8 +72,8 @@ impl<'a> OutputFile<'a> {
     }
 
     /// Writes an RGB image of 8 bits.
-    pub(crate) fn write_picture(self, picture: &Picture) -> Result<(), ExitError> {
-        self.write_png(&picture.rgb, picture.width, ColorType::Rgb, BitDepth::Eight, None)
+    pub(crate) fn write_rgb(self, image: &RgbImage) -> Result<(), ExitError> {
+        self.write_png(&image.rgb, image.width, ColorType::Rgb, BitDepth::Eight, None)
     }
 
     /// Writes grey levels, row by row with interleaved channels, in 8 bits if `bits` ≤ 8, else in 16.
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_of_papsynth_are_recognized_by_their_text_chunk() {
+    fn image_paths_papsynth_are_recognized_by_their_text_chunk() {
         let path = std::env::temp_dir().join(format!("papsynth-output-file-{}.png", std::process::id()));
         let check = |force| OutputFile::check(&path, Kind::Image, force);
         assert!(check(false).is_ok(), "no file");

@@ -52,7 +52,7 @@ fn sample(args: &Plan, setup: &Setup, layout: &Layout, scratch: &Scratch) -> Res
     let seconds = times.windows(2).skip(1).map(|pair| (pair[1] - pair[0]).as_secs_f64()).collect();
     let mut bytes = BTreeMap::new();
     for shard in frames.clone() {
-        let files = dataset.whole(shard, Check::Sizes)?.map_or_else(Vec::new, |record| record.files);
+        let files = dataset.complete_record(shard, Check::Sizes)?.map_or_else(Vec::new, |record| record.files);
         for file in files {
             *bytes.entry(format_of(&file.path).to_owned()).or_insert(0) += file.bytes;
         }

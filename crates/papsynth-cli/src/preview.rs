@@ -5,14 +5,15 @@ use std::path::Path;
 use papsynth::key::Key;
 use papsynth::scene::Scene;
 use papsynth::{Error, Finished, Frame, Plane};
-use papsynth_dataset::memory::Need;
-use papsynth_dataset::{Layout, Picture};
+use papsynth_dataset::memory::MemoryEstimate;
+use papsynth_dataset::{Layout, RgbImage};
 
 use crate::args::{EngineArgs, Preview, Render};
 use crate::exit::{self, ExitError};
 use crate::input_file;
 use crate::memory::{self, Budget};
 use crate::output_file::{Kind, OutputFile};
+use crate::report::Spinner;
 use crate::setup::Setup;
 use crate::words::counted;
 
@@ -35,13 +36,13 @@ pub(crate) fn run(args: &Preview) -> Result<(), ExitError> {
         }
     })?;
     let Some(plane) = shown else { return Ok(()) };
-    out.write_picture(&side_by_side(&plane, &finished))?;
+    out.write_rgb(&side_by_side(&plane, &finished))?;
     print_size(&args.out, &finished.scene)
 }
 
 /// A plane on the left, and the plane with outlines of its ground truth on the right.
-fn side_by_side(plane: &Plane, finished: &Finished) -> Picture {
-    let (plain, truth) = (Picture::plain(plane, finished), Picture::overlay(plane, finished));
+fn side_by_side(plane: &Plane, finished: &Finished) -> RgbImage {
+    let (plain, truth) = (RgbImage::plain(plane, finished), RgbImage::overlay(plane, finished));
     let width = finished.scene.view.width;
     let mut rgb = Vec::with_capacity(truth.rgb.len() * 2);
     for (plain, drawn) in plain.rgb.chunks(3 * width).zip(truth.rgb.chunks(3 * width)) {
@@ -49,7 +50,7 @@ fn side_by_side(plane: &Plane, finished: &Finished) -> Picture {
         rgb.extend([GAP_GREY; 3 * GAP]);
         rgb.extend_from_slice(drawn);
     }
-    Picture { width: 2 * width + GAP, rgb }
+    RgbImage { width: 2 * width + GAP, rgb }
 }
 
 /// Size limit of scenes, bytes.
@@ -72,7 +73,7 @@ pub(crate) fn render(args: Render) -> Result<(), ExitError> {
 /// Checks that one frame fits into memory.
 pub(crate) fn check_memory(setup: &Setup) -> Result<(), ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of(recipe, &Layout::default());
+    let need = MemoryEstimate::of(recipe, &Layout::default());
     let fit = memory::fit(&need, setup.threads, (1, false), None, |Budget { bytes, source }| {
         let help = "smaller fields, fewer cells, one plane, monochrome light and less oversampling need less memory";
         ExitError::with_help(format!("{} ({source})", need.too_large(recipe, bytes)), help)
@@ -85,6 +86,7 @@ fn image(setup: &Setup, scene: Scene, mut keep: impl FnMut(&Plane)) -> Result<Fi
         keep(plane);
         Ok(())
     };
+    let _spinner = Spinner::start("rendering");
     let finished = setup.engine.image::<Error>(scene, setup.threads_of_a_frame(), keep);
     finished.map_err(|error| setup.recipe.error(&error))
 }

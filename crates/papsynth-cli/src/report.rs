@@ -3,10 +3,11 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use papsynth_dataset::{Outcome, Progress as Step, Share as Task};
+use papsynth_dataset::{Outcome, Progress as Step, Task};
 use serde_json::json;
 
 use crate::args::Generate;
@@ -75,8 +76,8 @@ impl<'a> Progress<'a> {
     pub(crate) fn step(&self, step: Step) {
         let summary = match step {
             // Frames that are already present do not count towards the estimate.
-            Step::Kept(_) => return self.bar.dec_length(1),
-            Step::Made(summary) => summary,
+            Step::Present(_) => return self.bar.dec_length(1),
+            Step::Written(summary) => summary,
         };
         self.bar.inc(1);
         if self.style == Style::Bar && self.bar.position() == 1 {
@@ -106,7 +107,7 @@ impl<'a> Progress<'a> {
 
     /// Prints the result of a run of frames up to index `end`.
     pub(crate) fn done(&self, outcome: &Outcome, task: Task, end: u64) -> Result<(), ExitError> {
-        let (dir, Outcome { made: written, kept: present, .. }) = (self.dir, outcome);
+        let (dir, Outcome { written, present, .. }) = (self.dir, outcome);
         match self.style {
             Style::Json => event(&json!({
                 "event": "done", "dir": dir, "written": written, "present": present, "peak_memory_bytes": memory::peak(),
@@ -116,8 +117,8 @@ impl<'a> Progress<'a> {
                 let (dir, frames) = (dir.display(), frames_written(*written, *present));
                 let next = match task {
                     Task::ALL => format!("Look at: {dir}/contact-sheet.png"),
-                    Task { index, of } => format!(
-                        "Task {index} of {of} is done. When all tasks are done, run: papsynth merge {dir} --frames {end}"
+                    Task { index, total } => format!(
+                        "Task {index} of {total} is done. When all tasks are done, run: papsynth merge {dir} --frames {end}"
                     ),
                 };
                 exit::print(&format!("{dir}: {frames}\n{next}\n"))
@@ -126,11 +127,21 @@ impl<'a> Progress<'a> {
     }
 }
 
-/// Progress of work in steps.
+/// Progress of work in phases with steps.
 #[derive(Debug)]
 pub(crate) struct Bar {
     style: Style,
     bar: ProgressBar,
+    phase: Mutex<Phase>,
+}
+
+/// The current phase: its name, its steps, and the time of the bar at its begin.
+#[derive(Debug, Default)]
+struct Phase {
+    name: String,
+    done: u64,
+    total: u64,
+    begin: Duration,
 }
 
 impl Bar {
@@ -138,23 +149,38 @@ impl Bar {
         let style = Style::of(quiet, false);
         let bar = style.bar(0);
         bar.set_style(bar_style("", "{msg}, {elapsed} elapsed"));
-        Self { style, bar }
+        Self { style, bar, phase: Mutex::default() }
     }
 
-    /// Sets the number of steps that are done. Ignores broken pipes.
-    pub(crate) fn update(&self, done: u64, total: u64, what: &str) {
-        // A new phase has its own time.
-        if done <= 1 || self.bar.length() != Some(total) {
-            self.bar.reset_eta();
+    /// A bar on a terminal, and no lines elsewhere.
+    pub(crate) fn on_terminal() -> Self {
+        Self::start(!io::stderr().is_terminal())
+    }
+
+    /// Sets the number of completed steps. A phase with another name continues the former one if `done` increases and
+    /// `total` does not change. Ignores steps that arrive late, and broken pipes.
+    pub(crate) fn update(&self, done: u64, total: u64, name: &str) {
+        let mut phase = self.phase.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_later = done <= phase.done;
+        let is_repeated = phase.done == phase.total && done == 1;
+        if total != phase.total || (is_later && (name != phase.name || is_repeated)) {
+            *phase = Phase { name: name.to_owned(), done, total, begin: self.bar.elapsed() };
+            // The time before the first report of a phase belongs to the phase before.
+            self.bar.set_length(total);
+        } else if is_later {
+            return;
         }
-        self.bar.set_length(total);
+        (phase.done, phase.name) = (done, name.to_owned());
+        let spent = self.bar.elapsed().saturating_sub(phase.begin).as_secs_f64();
+        let left = match done < total && done > 1 && spent > 0.0 {
+            // The first report begins the phase, so `done − 1` steps took this time.
+            true => format!(", about {} left", duration((spent * (total - done) as f64 / (done - 1) as f64).round())),
+            false => String::new(),
+        };
         self.bar.set_position(done);
-        self.bar.set_message(escaped(what).into_owned());
-        if done > 0 {
-            self.bar.set_style(bar_style("", "{msg}, {elapsed} elapsed, about {eta} left"));
-        }
-        if self.style == Style::Lines && done > 0 {
-            print_line(&self.bar, what);
+        self.bar.set_message(format!("{}{left}", escaped(name)));
+        if self.style == Style::Lines && is_line_due(done, total) {
+            let _ = writeln!(io::stderr().lock(), "{} ({done} of {total}{left})", escaped(name));
         }
     }
 
@@ -176,16 +202,34 @@ impl FrameCounter {
         Self { bar: Bar::start(quiet), done: AtomicU64::new(0), total }
     }
 
-    pub(crate) fn step(&self, step: Step) {
-        let what = match step {
-            Step::Kept(_) => "frames already present",
-            Step::Made(_) => "frames written",
-        };
-        self.bar.update(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total, what);
+    pub(crate) fn step(&self) {
+        self.bar.update(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total, "frames");
     }
 
     pub(crate) fn clear(&self) {
         self.bar.clear();
+    }
+}
+
+/// The elapsed time of work without steps, on a terminal only.
+#[derive(Debug)]
+pub(crate) struct Spinner(ProgressBar);
+
+impl Spinner {
+    pub(crate) fn start(what: &'static str) -> Self {
+        let target =
+            if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} elapsed");
+        let bar = ProgressBar::with_draw_target(None, target).with_message(what);
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self(bar)
+    }
+}
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }
 
@@ -198,15 +242,16 @@ fn bar_style(before: &str, after: &str) -> ProgressStyle {
 fn print_line(bar: &ProgressBar, what: &str) {
     let (done, total) = (bar.position(), bar.length().unwrap_or_default());
     if is_line_due(done, total) {
-        let left = if done < total { format!(", about {} left", duration(bar.eta().as_secs())) } else { String::new() };
+        let left =
+            if done < total { format!(", about {} left", duration(bar.eta().as_secs_f64())) } else { String::new() };
         let _ = writeln!(io::stderr().lock(), "{} ({done} of {total}{left})", escaped(what));
     }
 }
 
-/// Whether a line is due: at most [`MAX_LINES`] in all, and always the last.
+/// Whether a line is due: about [`MAX_LINES`] in all, and always the first and the last.
 fn is_line_due(done: u64, total: u64) -> bool {
     let due = |done: u64| u128::from(done) * u128::from(MAX_LINES) / u128::from(total.max(1));
-    total <= MAX_LINES || due(done) > due(done.saturating_sub(1))
+    total <= MAX_LINES || done == 1 || due(done) > due(done.saturating_sub(1))
 }
 
 /// Prints an object on a line of standard output.
@@ -214,7 +259,9 @@ pub(crate) fn event(value: &serde_json::Value) -> Result<(), ExitError> {
     exit::print(&format!("{value}\n"))
 }
 
-fn duration(seconds: u64) -> String {
+fn duration(seconds: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let seconds = seconds as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
         (0, 0, s) => format!("{s} s"),
         (0, m, s) => format!("{m} min {s:02} s"),
@@ -227,18 +274,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_stay_few_and_the_last_step_has_one() {
+    fn lines_stay_few_and_the_last_step_has_a_line() {
         for total in [1, 7, 100, 101, 12_345, 1_000_000] {
             let lines = (1..=total).filter(|&done| is_line_due(done, total)).count();
-            assert!(lines as u64 <= MAX_LINES && lines as u64 >= MAX_LINES.min(total) / 2, "{total}: {lines}");
+            assert!(lines as u64 <= MAX_LINES + 1 && lines as u64 >= MAX_LINES.min(total) / 2, "{total}: {lines}");
             assert!(is_line_due(total, total));
         }
     }
 
     #[test]
     fn durations_have_units() {
-        assert_eq!(duration(9), "9 s");
-        assert_eq!(duration(69), "1 min 09 s");
-        assert_eq!(duration(3600 * 30 + 61), "30 h 01 min");
+        assert_eq!(duration(9.0), "9 s");
+        assert_eq!(duration(69.0), "1 min 09 s");
+        assert_eq!(duration(3600.0 * 30.0 + 61.0), "30 h 01 min");
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 use papsynth::recipe::Recipe;
-use papsynth_dataset::{Dataset, Layout, Outcome, images_of, truth_differs};
+use papsynth_dataset::{Dataset, Layout, Outcome, image_paths, truth_difference};
 use toml::Table;
 
 use crate::args::{Convert, EngineArgs, RecipeArgs, Rerender};
@@ -18,7 +18,8 @@ const IMAGING: [&str; 6] = ["background", "camera", "focus", "light", "optics", 
 
 pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
     let source = Dataset::open(&args.dir)?;
-    let frames: Vec<u64> = images_of(&source)?.into_keys().collect();
+    source.check_inputs()?;
+    let frames: Vec<u64> = image_paths(&source)?.into_keys().collect();
     let seed = source.identity().seed;
     let before = load(args, seed, false)?;
     let path = source.path().join("recipe.toml");
@@ -40,7 +41,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
     let (layout, _) = args.layout.layout(0);
     let stop = exit::stop_flag()?;
     let outcome = render(&after, seed, &ranges(&frames), &layout, &args.out, args.quiet, stop)?;
-    if let Some(difference) = truth_differs(&args.dir, &args.out)? {
+    if let Some(difference) = truth_difference(&args.dir, &args.out)? {
         return Err(ExitError::with_help(
             format!("the ground truth differs: {difference}"),
             "`optics.oversampling` changes masks; keep its value",
@@ -49,7 +50,7 @@ pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
     if args.quiet {
         return Ok(());
     }
-    let (out, dir, frames) = (args.out.display(), args.dir.display(), frames_written(outcome.made, outcome.kept));
+    let (out, dir, frames) = (args.out.display(), args.dir.display(), frames_written(outcome.written, outcome.present));
     exit::print(&format!("{out}: {frames}; the ground truth equals that of {dir}\n"))
 }
 
@@ -57,9 +58,9 @@ pub(crate) fn run(args: &Rerender) -> Result<(), ExitError> {
 pub(crate) fn convert(args: &Convert) -> Result<(), ExitError> {
     let layout = args.files.layout(args.format.clone());
     let stop = exit::stop_flag()?;
-    let total = Dataset::open(&args.dir)?.places()?.len() as u64;
+    let total = Dataset::open(&args.dir)?.frame_locations()?.len() as u64;
     let counter = FrameCounter::start(args.quiet, total);
-    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &|step| counter.step(step));
+    let outcome = papsynth_dataset::convert(&args.dir, &args.out, &layout, stop, &|_| counter.step());
     counter.clear();
     let outcome = outcome?;
     let out = args.out.display();
@@ -69,7 +70,7 @@ pub(crate) fn convert(args: &Convert) -> Result<(), ExitError> {
     if args.quiet {
         return Ok(());
     }
-    exit::print(&format!("{out}: {}\n", frames_written(outcome.made, outcome.kept)))
+    exit::print(&format!("{out}: {}\n", frames_written(outcome.written, outcome.present)))
 }
 
 /// The engine of the data set's recipe; with the options of the command line if `changed`.
@@ -107,14 +108,14 @@ pub(crate) fn render(
     stop: &AtomicBool,
 ) -> Result<Outcome, ExitError> {
     let dataset = Dataset::create_or_resume(out, &setup.info(seed, layout))?;
-    let mut sum = Outcome { kept: 0, made: 0, stopped: false };
+    let mut sum = Outcome { present: 0, written: 0, stopped: false };
     let counter = FrameCounter::start(quiet, frames.iter().map(|range| range.end - range.start).sum());
     for frames in frames {
         let run = run_of(frames.clone(), setup.threads, stop);
-        let outcome = dataset.generate(&setup.engine, &run, &|step| counter.step(step));
+        let outcome = dataset.generate(&setup.engine, &run, &|_| counter.step());
         let outcome = outcome.map_err(|error| setup.error(error))?;
-        sum.kept += outcome.kept;
-        sum.made += outcome.made;
+        sum.present += outcome.present;
+        sum.written += outcome.written;
         if outcome.stopped {
             return Err(ExitError::stopped(format!("stopped; every file in {} is complete", out.display())));
         }

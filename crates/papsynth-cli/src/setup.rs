@@ -9,7 +9,7 @@ use papsynth::model::Model;
 use papsynth::profile::Profile;
 use papsynth::{Engine, Threads};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
-use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Share};
+use papsynth_dataset::{Check, DatasetInfo, Layout, Run, Task};
 
 use crate::args::{EngineArgs, threads};
 use crate::exit::{self, ErrorReport, ExitError};
@@ -74,10 +74,10 @@ impl Setup {
     }
 }
 
-/// A run of all these frames with `at_once` frames at the same time, each on one thread.
-pub(crate) fn run_of(frames: Range<u64>, at_once: usize, stop: &AtomicBool) -> Run<'_> {
-    let (share, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
-    Run { frames, share, at_once, threads, check, stop, profile: None }
+/// A run of all these frames with this many frames at the same time, each on one thread.
+pub(crate) fn run_of(frames: Range<u64>, workers: usize, stop: &AtomicBool) -> Run<'_> {
+    let (task, threads, check) = (Share::ALL, Threads::One, Check::Sizes);
+    Run { frames, task, workers, threads, check, stop, profile: None }
 }
 
 /// A thread pool of the size given by `--threads`.

@@ -3,6 +3,7 @@
 use crate::args::{SlideTile, SlideVerb};
 use crate::exit::{self, ExitError};
 use crate::output_file::{Kind, OutputFile};
+use crate::report::Spinner;
 use crate::setup::Setup;
 
 #[cfg(feature = "zarr")]
@@ -37,7 +38,9 @@ fn tile(args: &SlideTile) -> Result<(), ExitError> {
     let out = OutputFile::check(&args.out, Kind::Image, args.force)?;
     let setup = Setup::load(&args.engine, None)?;
     let slide = setup.slide(args.engine.seed, args.slide)?;
+    let spinner = Spinner::start("rendering");
     let part = slide.picture(args.at, args.size, setup.threads_of_a_frame()).map_err(|e| setup.recipe.error(&e))?;
+    drop(spinner);
     let middle = part.planes.len() / 2;
     if part.planes.len() > 1 {
         let (planes, um) = (part.planes.len(), part.planes[middle].stage_um);

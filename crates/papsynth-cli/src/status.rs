@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use papsynth_dataset::{Check, Dataset, Home, shards_to_make};
+use papsynth_dataset::{Check, Dataset, Location, VerifyProgress, missing_shards};
 
 use crate::args::{Clean, Merge, Status, Verify, check_of};
 use crate::exit::{self, ExitError};
 use crate::findings::{check, print_findings};
+use crate::report::Bar;
 use crate::words::{counted, ranges};
 
 pub(crate) fn run(args: &Status) -> Result<(), ExitError> {
@@ -17,7 +18,7 @@ pub(crate) fn run(args: &Status) -> Result<(), ExitError> {
         let finish = (!is_finished).then(|| format!("papsynth slide finalize {}", args.dir.display()));
         return print_status(args, &ranges(&missing), shards, finish.as_deref());
     }
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
     let merged = dataset.merged_frames()?;
     let Some(frames) = args.frames.or((merged > 0).then_some(merged)) else {
         return Err(ExitError::with_help(
@@ -25,7 +26,7 @@ pub(crate) fn run(args: &Status) -> Result<(), ExitError> {
             "give the number of frames of the complete data set; slides and merged data sets record it",
         ));
     };
-    let missing = shards_to_make(&dataset, 0..frames, Check::Sizes)?;
+    let missing = missing_shards(&dataset, 0..frames, Check::Sizes)?;
     let all = frames.div_ceil(dataset.layout().frames_per_shard);
     let finish = format!("papsynth merge {} --frames {frames}", args.dir.display());
     print_status(args, &missing, all, (!dataset.is_finished()?).then_some(&finish))
@@ -52,8 +53,8 @@ fn print_status(args: &Status, missing: &[Range<u64>], all: u64, finish: Option<
 }
 
 pub(crate) fn merge(args: &Merge) -> Result<(), ExitError> {
-    let dataset = Dataset::open(&Home::at(&args.dir)?)?;
-    let missing = shards_to_make(&dataset, 0..args.frames, check_of(args.verify))?;
+    let dataset = Dataset::open(&Location::at(&args.dir)?)?;
+    let missing = missing_shards(&dataset, 0..args.frames, check_of(args.verify))?;
     let dir = args.dir.display();
     if !missing.is_empty() {
         let shards = counted(count(&missing), "shard is", "shards are");
@@ -99,7 +100,12 @@ pub(crate) fn verify(args: &Verify) -> Result<(), ExitError> {
     if papsynth_dataset::slide::SlideSet::is_in(&args.dir) {
         return crate::slide::verify(&args.dir, args.json);
     }
-    let report = papsynth_dataset::verify(&Home::at(&args.dir)?, args.frames.map(|frames| 0..frames))?;
+    let (location, frames) = (Location::at(&args.dir)?, args.frames.map(|frames| 0..frames));
+    let bar = Bar::on_terminal();
+    let count = |progress: VerifyProgress| bar.update(progress.done, progress.total, "shards checked");
+    let report = papsynth_dataset::verify_with_progress(&location, frames, &count);
+    bar.clear();
+    let report = report?;
     let dir = args.dir.display();
     if args.json {
         let text = serde_json::to_string_pretty(&report).unwrap_or_default();
@@ -114,12 +120,12 @@ pub(crate) fn verify(args: &Verify) -> Result<(), ExitError> {
 }
 
 pub(crate) fn clean(args: &Clean) -> Result<(), ExitError> {
-    let cleaned = papsynth_dataset::clean(&Home::at(&args.dir)?, args.untracked)?;
-    let (dir, untracked) = (args.dir.display(), counted(cleaned.strays, "untracked file", "untracked files"));
+    let cleaned = papsynth_dataset::clean(&Location::at(&args.dir)?, args.untracked)?;
+    let (dir, untracked) = (args.dir.display(), counted(cleaned.untracked, "untracked file", "untracked files"));
     let temporary = counted(cleaned.temporary, "temporary file", "temporary files");
     exit::print(&format!("{dir}: removed {temporary} and {untracked}\n"))?;
-    if cleaned.stayed > 0 {
-        let files = counted(cleaned.stayed, "file was", "files were");
+    if cleaned.skipped > 0 {
+        let files = counted(cleaned.skipped, "file was", "files were");
         exit::note(format!("{files} not removed: in use, of another user, or with a name that is not UTF-8"));
     }
     Ok(())

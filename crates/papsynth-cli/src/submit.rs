@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Submit) -> Result<(), ExitError> {
         "slurm" => slurm(args),
         _ => {
             let out = &generate.out;
-            if !out.starts_with("/data") && !papsynth_dataset::Home::is_address(out) {
+            if !out.starts_with("/data") && !papsynth_dataset::Location::is_address(out) {
                 exit::note(format!(
                     "{} is inside the pod and is deleted with it; write below /data, where the volume is mounted, or to an \
                      object store",

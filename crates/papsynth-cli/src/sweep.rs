@@ -4,7 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use papsynth_dataset::{Dataset, images_of, write_file};
+use papsynth_dataset::{Dataset, image_paths, write_file};
 
 use crate::args::Sweep;
 use crate::exit::{self, ExitError};
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Sweep) -> Result<(), ExitError> {
         let name = set_name(number);
         let out = args.out.join(&name);
         render(setup, args.engine.seed, std::slice::from_ref(&frames), &layout, &out, args.quiet, stop)?;
-        for (index, (slide, file)) in images_of(&Dataset::open(&out)?)? {
+        for (index, (slide, file)) in image_paths(&Dataset::open(&out)?)? {
             let fixed = [name.as_str(), &index.to_string(), &slide.to_string(), &file];
             let _ = table.write_record(fixed.into_iter().chain(values.iter().copied()));
         }

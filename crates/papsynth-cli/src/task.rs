@@ -1,7 +1,7 @@
 //! The task of this process: given on the command line, or read from the environment of a scheduler.
 
 use clap::Args;
-use papsynth_dataset::Share as Task;
+use papsynth_dataset::Task;
 
 use crate::exit::ExitError;
 
@@ -44,8 +44,8 @@ fn parse_task(text: &str) -> Result<TaskArg, String> {
             count => Ok(TaskArg::Environment(Some(count))),
         },
         Some((index, count)) => {
-            let task = Task { index: number(index)?, of: number(count)? };
-            if task.index < task.of { Ok(TaskArg::Given(task)) } else { Err(expected()) }
+            let task = Task { index: number(index)?, total: number(count)? };
+            if task.index < task.total { Ok(TaskArg::Given(task)) } else { Err(expected()) }
         }
         None => Err(expected()),
     }
@@ -77,7 +77,7 @@ fn from_environment(count: Option<u64>, variable: impl Fn(&str) -> Option<String
         return Err(ExitError::with_help(message, "give the task, for example --task 0/4"));
     };
     match index < count {
-        true => Ok(Task { index, of: count }),
+        true => Ok(Task { index, total: count }),
         false => {
             Err(ExitError::input(format!("task {index} is out of range: expected 0 to {}", count.saturating_sub(1))))
         }
@@ -101,14 +101,14 @@ mod tests {
             ("SLURM_ARRAY_TASK_MIN", "0"),
             ("SLURM_ARRAY_TASK_MAX", "19"),
         ];
-        assert_eq!(task(None, &array), Some(Task { index: 3, of: 20 }));
+        assert_eq!(task(None, &array), Some(Task { index: 3, total: 20 }));
         // A repaired array: two tasks of 20.
         let repaired = [array[0], ("SLURM_ARRAY_TASK_COUNT", "2"), ("SLURM_ARRAY_TASK_MIN", "3"), array[3]];
         assert_eq!(task(None, &repaired), None);
-        assert_eq!(task(Some(20), &repaired), Some(Task { index: 3, of: 20 }));
+        assert_eq!(task(Some(20), &repaired), Some(Task { index: 3, total: 20 }));
         let gaps = [array[0], ("SLURM_ARRAY_TASK_COUNT", "2"), ("SLURM_ARRAY_TASK_MIN", "0"), array[3]];
         assert_eq!(task(None, &gaps), None);
-        assert_eq!(task(Some(8), &[("JOB_COMPLETION_INDEX", "7")]), Some(Task { index: 7, of: 8 }));
+        assert_eq!(task(Some(8), &[("JOB_COMPLETION_INDEX", "7")]), Some(Task { index: 7, total: 8 }));
         assert_eq!(task(None, &[("JOB_COMPLETION_INDEX", "7")]), None);
         assert_eq!(task(Some(7), &[("JOB_COMPLETION_INDEX", "7")]), None);
         assert_eq!(task(Some(7), &[("JOB_COMPLETION_INDEX", "x")]), None);

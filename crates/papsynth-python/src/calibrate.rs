@@ -49,7 +49,7 @@ pub(crate) fn calibrate_microscope(
         windows.into_iter().map(|[left, top, width, height]| Window { left, top, width, height }).collect()
     });
     let instrument = pixel_um.map(|_| instrument);
-    let nuclei = windows.map_or(NucleiAt::Found, NucleiAt::Windows);
+    let nuclei = windows.map_or(NucleiAt::Detected, NucleiAt::Windows);
     let params = FocusParams { nuclei, step_um, instrument: instrument.clone() };
     let pool = pool::of(py, threads)?;
     let measured = py.detach(|| {
@@ -61,7 +61,7 @@ pub(crate) fn calibrate_microscope(
                 found.focus = Some(focus.map_err(|error| format!("stack: {error}"))?);
             }
             if let Some((image, width)) = &edge {
-                let edge = Edge::measure(image, *width, line.map_or(EdgeAt::Found, EdgeAt::Line));
+                let edge = Edge::measure(image, *width, line.map_or(EdgeAt::Detected, EdgeAt::Line));
                 found.edge = Some(edge.map_err(|error| format!("edge: {error}"))?);
             }
             let recipe = found.bright_field_toml().map_err(|error| format!("edge: {error}"))?;

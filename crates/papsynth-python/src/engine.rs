@@ -11,7 +11,7 @@ use papsynth::recipe::{Preset, Recipe, diagnose};
 use papsynth::scene::Scene;
 use papsynth::{Plane, Threads};
 use papsynth_dataset::Layout;
-use papsynth_dataset::memory::{Need, available};
+use papsynth_dataset::memory::{MemoryEstimate, available};
 use papsynth_dataset::read::{InputFile, Limits, read_inputs};
 use pyo3::exceptions::{PyFileNotFoundError, PyMemoryError, PyOSError, PyTypeError};
 use pyo3::prelude::*;
@@ -78,7 +78,7 @@ impl Engine {
         }
         let (inputs, map) =
             read_inputs(&mut recipe, &folder, &Limits::default()).map_err(|error| error::dataset(&error))?;
-        let need = Need::of(&recipe, &Layout::default());
+        let need = MemoryEstimate::of(&recipe, &Layout::default());
         if let Some(bytes) = available().filter(|bytes| need.of_one_frame() > *bytes as f64) {
             return Err(PyMemoryError::new_err(need.too_large(&recipe, bytes)));
         }

@@ -6,7 +6,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use papsynth::Threads;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Home, Layout, Progress, Run, Share, shards_to_make};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Location, Progress, Run, Task, missing_shards};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyList};
 
@@ -55,13 +55,20 @@ pub(crate) fn generate<'py>(
         map: made_by.map.as_ref(),
         layout: &layout,
     };
-    let dataset = py.detach(|| Home::at(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
+    let dataset = py.detach(|| Location::at(&out).and_then(|home| Dataset::create_or_resume(&home, &info)));
     let dataset = dataset.map_err(|error| error::dataset(&error))?;
     let stop = AtomicBool::new(false);
     let check = if verify { Check::Hashes } else { Check::Sizes };
-    let share = Share { index, of };
-    let run =
-        Run { frames: 0..frames, share, at_once: threads, threads: Threads::One, check, stop: &stop, profile: None };
+    let share = Task { index, total: of };
+    let run = Run {
+        frames: 0..frames,
+        task: share,
+        workers: threads,
+        threads: Threads::One,
+        check,
+        stop: &stop,
+        profile: None,
+    };
     let engine = &made_by.engine;
     let mut interrupted: Option<PyErr> = None;
     let progress = progress.map(Bound::unbind);
@@ -72,8 +79,8 @@ pub(crate) fn generate<'py>(
             let worker = scope.spawn(move || {
                 dataset.generate(engine, run, &|step| {
                     let done = match step {
-                        Progress::Kept(index) => index,
-                        Progress::Made(frame) => frame.index,
+                        Progress::Present(index) => index,
+                        Progress::Written(frame) => frame.index,
                     };
                     // Nobody listens any more where Python has stopped.
                     let _ = sender.send(done);
@@ -106,7 +113,7 @@ pub(crate) fn generate<'py>(
         papsynth_dataset::Error::Engine(error) => error::engine(py, &made_by.source, &error),
         other => error::dataset(&other),
     })?;
-    [("kept", outcome.kept), ("made", outcome.made)].into_py_dict(py)
+    [("kept", outcome.present), ("made", outcome.written)].into_py_dict(py)
 }
 
 fn layout(formats: Option<Vec<String>>, frames_per_shard: Option<u64>) -> PyResult<Layout> {
@@ -147,7 +154,8 @@ pub(crate) fn merge(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Strin
         let message = format!("{}: {} shards are missing: {}", out.display(), gaps.len(), some.join(", "));
         return Err(wrong(message));
     }
-    let summary = py.detach(|| Dataset::open(&Home::at(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
+    let summary =
+        py.detach(|| Dataset::open(&Location::at(&out)?)?.finish()).map_err(|error| error::dataset(&error))?;
     if summary.frames != frames {
         let message = format!("frames: {frames}; expected {}, which are there", summary.frames);
         return Err(wrong(message));
@@ -161,7 +169,7 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
     if frames == 0 || frames > MOST_FRAMES {
         return Err(wrong(format!("frames: {frames}; expected 1 to {MOST_FRAMES}")));
     }
-    let found = py.detach(|| shards_to_make(&Dataset::open(&Home::at(&out)?)?, 0..frames, Check::Sizes));
+    let found = py.detach(|| missing_shards(&Dataset::open(&Location::at(&out)?)?, 0..frames, Check::Sizes));
     Ok(found.map_err(|error| error::dataset(&error))?.into_iter().flatten().collect())
 }
 
@@ -169,14 +177,14 @@ pub(crate) fn missing(py: Python<'_>, out: PathBuf, frames: u64) -> PyResult<Vec
 #[pyfunction]
 #[pyo3(signature = (out, frames=None))]
 pub(crate) fn verify(py: Python<'_>, out: PathBuf, frames: Option<u64>) -> PyResult<Bound<'_, PyDict>> {
-    let verdict =
-        py.detach(|| Home::at(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
-    let verdict = verdict.map_err(|error| error::dataset(&error))?;
+    let report = py
+        .detach(|| Location::at(&out).and_then(|home| papsynth_dataset::verify(&home, frames.map(|frames| 0..frames))));
+    let report = report.map_err(|error| error::dataset(&error))?;
     let told = PyDict::new(py);
-    told.set_item("root", verdict.root)?;
-    told.set_item("frames", verdict.frames)?;
-    told.set_item("files", verdict.files)?;
-    let findings = verdict.findings.into_iter().map(|finding| (finding.path, finding.message));
+    told.set_item("root", report.root)?;
+    told.set_item("frames", report.frames)?;
+    told.set_item("files", report.files)?;
+    let findings = report.findings.into_iter().map(|finding| (finding.path, finding.message));
     told.set_item("findings", PyList::new(py, findings.collect::<Vec<_>>())?)?;
     Ok(told)
 }

@@ -18,10 +18,10 @@ mod support;
 mod table;
 
 pub use breakdown::Group;
-pub use design::{Answer, Grey, RANDOM, Side, Stage, StudyParams, Task};
+pub use design::{Answer, Grey, RANDOM, Side, Stage, StudyParams, TrialDesign};
 pub use error::Error;
-pub use results::{Claim, Exposures, Pool, Row, Summary};
+pub use results::{Exposures, Pool, Precision, Row, Summary};
 pub use saved::Exposure;
-pub use score::{CLAIM_HALF_WIDTH, Counts, Detection, Interval, Proportion, trials_for};
-pub use session::{Refusal, Session, State};
+pub use score::{Counts, DEFAULT_HALF_WIDTH, Detection, Interval, Proportion, trials_for};
+pub use session::{Session, SessionError, State};
 pub use table::{breakdown_table, table};

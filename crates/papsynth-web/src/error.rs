@@ -14,6 +14,9 @@ pub enum Error {
         /// What the system said.
         source: io::Error,
     },
+    /// The system clock shows a time before 1970 or after 9999, which HTTP cannot express.
+    #[error("the system clock is outside the years 1970 to 9999; set the date")]
+    Clock,
     /// A data set or slide cannot be read, or a folder holds nothing that is shown.
     #[error(transparent)]
     Dataset(Box<papsynth_dataset::Error>),
@@ -41,7 +44,7 @@ impl Error {
         match self {
             Self::Dataset(error) => error.is_io(),
             Self::Study(error) => error.is_io(),
-            Self::Listen { .. } => false,
+            Self::Listen { .. } | Self::Clock => false,
         }
     }
 }

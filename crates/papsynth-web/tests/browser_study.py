@@ -116,8 +116,8 @@ def check_results(folder, given, keys, showings, exposure_ms):
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["finished"] and summary["row"]["counts"] == counts, (summary["row"], counts)
     accuracy = summary["row"]["accuracy"]
-    assert accuracy["hits"] == counts["tp"] + counts["tn"] and accuracy["of"] == len(counted)
-    for ours, theirs in zip(wilson(accuracy["hits"], accuracy["of"]), accuracy["wilson_95"].values()):
+    assert accuracy["hits"] == counts["tp"] + counts["tn"] and accuracy["total"] == len(counted)
+    for ours, theirs in zip(wilson(accuracy["hits"], accuracy["total"]), accuracy["wilson_95"].values()):
         assert abs(ours - theirs) < 1e-9
     return summary, rows
 

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use papsynth::recipe::Preset;
-use papsynth_dataset::Home;
+use papsynth_dataset::Location;
 
 use crate::exit::{ExitError, escaped};
 
@@ -200,7 +200,7 @@ pub(crate) fn check_addresses(verb: &Verb, words: impl IntoIterator<Item = OsStr
     ) {
         return Ok(());
     }
-    match words.into_iter().find(|word| Home::is_address(Path::new(word))) {
+    match words.into_iter().find(|word| Location::is_address(Path::new(word))) {
         Some(word) => {
             let message = format!("{}: expected a folder or a file", Path::new(&word).display());
             let help = "generate, status, merge, verify and clean work on object stores";

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use papsynth_study::{Grey, StudyParams, Task};
+use papsynth_study::{Grey, StudyParams, TrialDesign};
 
 use super::values::{integer, named, parse_pixel};
 

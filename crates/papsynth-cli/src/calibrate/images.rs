@@ -19,7 +19,7 @@ const PAIR: usize = 2;
 pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result<Focus, ExitError> {
     let stack = Stack::read(&args.stack, &Limits::default())?;
     let planes: Vec<&[f32]> = stack.planes.iter().map(Vec::as_slice).collect();
-    let nuclei = if args.window.is_empty() { NucleiAt::Found } else { NucleiAt::Windows(args.window.clone()) };
+    let nuclei = if args.window.is_empty() { NucleiAt::Detected } else { NucleiAt::Windows(args.window.clone()) };
     let params = FocusParams { nuclei, step_um: args.step_um, instrument: instrument.cloned() };
     Focus::measure(&planes, stack.width, &params).map_err(|error| {
         let name = args.stack.first().map(|path| path.display().to_string()).unwrap_or_default();
@@ -51,7 +51,7 @@ pub(super) fn edge(args: &Calibrate, path: &Path) -> Result<(Edge, Vec<[f64; 2]>
         let message = format!("--edge {name}: {} images; expected 1", image.planes.len());
         return Err(ExitError::with_help(message, "give the image in which the edge is in focus"));
     };
-    let at = args.line.map_or(EdgeAt::Found, EdgeAt::Line);
+    let at = args.line.map_or(EdgeAt::Detected, EdgeAt::Line);
     let edge = Edge::measure(pixels, image.width, at).map_err(|error| {
         let help = match &error {
             Error::NoEdge => "give a line across or along a straight edge, in pixels: --line X0,Y0,X1,Y1",

@@ -8,7 +8,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_BEGINS};
+use papsynth_calibrate::{Calibration, Error, Instrument, RECIPE_PREFIX};
 use papsynth_dataset::write_file;
 
 use crate::args::Calibrate;
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), ExitError> {
         found.camera = Some(camera);
     }
     if let Some(older) = older {
-        found.keep(older);
+        found.merge_older(older);
     }
     let optics = found.bright_field_toml();
     let optics = optics.map_err(|error| ExitError::input(format!("--edge: {error}")))?;

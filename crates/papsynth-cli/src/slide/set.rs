@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use papsynth::Threads;
-use papsynth_dataset::memory::{Need, shown};
+use papsynth_dataset::memory::{MemoryEstimate, format_bytes};
 use papsynth_dataset::slide::{SlideInfo, SlideProgress, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share as Task};
+use papsynth_dataset::{Check, Task};
 
 use crate::args::{SlideFinalize, SlideMake, check_of};
 use crate::exit::{self, ExitError};
@@ -38,13 +38,13 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), ExitError> {
     let set = SlideSet::create_or_resume(&args.out, &slide, &info)?;
     let threads = if setup.threads == 1 { Threads::One } else { setup.threads_of_a_frame() };
     let check = check_of(args.verify);
-    let run = SlideRun { share: task, threads, check, stop };
+    let run = SlideRun { task, threads, check, stop };
     let bar = Bar::start(args.quiet);
-    let stopped = set.make(&slide, &run, &|progress: SlideProgress| {
-        let [done, all] = progress.done;
-        let what = if progress.kept { "already present" } else { "written" };
+    let stopped = set.generate(&slide, &run, &|progress: SlideProgress| {
+        let what = if progress.present { "already present" } else { "written" };
         let objects = counted(progress.objects, "object or part", "objects and parts");
-        bar.update(done, all, &format!("shard {}: {objects}, {what}", SlideSet::name_of(progress.at)));
+        let name = format!("shard {}: {objects}, {what}", SlideSet::shard_name(progress.shard));
+        bar.update(progress.done, progress.total, &name);
     });
     bar.clear();
     if stopped.map_err(|error| setup.error(error))? {
@@ -56,16 +56,19 @@ pub(super) fn make(mut args: SlideMake) -> Result<(), ExitError> {
     if args.quiet {
         return Ok(());
     }
-    let (Task { index, of }, out) = (task, args.out.display());
-    exit::print(&format!("Task {index} of {of} is done. When all tasks are done, run: papsynth slide finalize {out}\n"))
+    let (Task { index, total }, out) = (task, args.out.display());
+    exit::print(&format!(
+        "Task {index} of {total} is done. When all tasks are done, run: papsynth slide finalize {out}\n"
+    ))
 }
 
 /// The number of threads that fits into memory, each with one frame.
 fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, ExitError> {
     let recipe = &setup.recipe.recipe;
-    let need = Need::of_slide(recipe, shard_px);
+    let need = MemoryEstimate::of_slide(recipe, shard_px);
     let fit = memory::fit(&need, setup.threads, (setup.threads, false), args.max_memory, |Budget { bytes, source }| {
-        let (frame_px, needed, may) = (recipe.scan.frame_px, shown(need.of_one_frame()), shown(bytes as f64));
+        let (frame_px, needed, may) =
+            (recipe.scan.frame_px, format_bytes(need.of_one_frame()), format_bytes(bytes as f64));
         let message = format!(
             "a shard of {shard_px} x {shard_px} pixels with frames of {frame_px} x {frame_px} needs about {needed}; \
              {may} may be used ({source})"
@@ -73,7 +76,7 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Exit
         let help = "smaller --shard-px and scan.frame_px need less memory; --max-memory sets another limit";
         ExitError::with_help(message, help)
     });
-    Ok(fit?.at_once)
+    Ok(fit?.workers)
 }
 
 /// Returns the numbers of the missing shards of a slide, row by row, the number of all shards, and whether it is
@@ -81,8 +84,8 @@ fn fitting(args: &SlideMake, setup: &Setup, shard_px: u32) -> Result<usize, Exit
 pub(crate) fn progress_of(dir: &Path) -> Result<(Vec<u64>, u64, bool), ExitError> {
     let set = SlideSet::open(dir)?;
     let missing: BTreeSet<[u32; 2]> = set.missing(Check::Sizes)?.into_iter().collect();
-    let numbers = (0_u64..).zip(set.all()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
-    Ok((numbers.collect(), set.all().count() as u64, missing.is_empty() && set.is_finished()?))
+    let numbers = (0_u64..).zip(set.all_shards()).filter(|(_, at)| missing.contains(at)).map(|(number, _)| number);
+    Ok((numbers.collect(), set.all_shards().count() as u64, missing.is_empty() && set.is_finished()?))
 }
 
 pub(super) fn finalize(args: &SlideFinalize) -> Result<(), ExitError> {
@@ -102,7 +105,11 @@ fn finish(set: &SlideSet, check: Check, quiet: bool) -> Result<(), ExitError> {
 }
 
 pub(crate) fn verify(dir: &Path, json: bool) -> Result<(), ExitError> {
-    let findings = SlideSet::open(dir)?.verify()?;
+    let bar = Bar::on_terminal();
+    let set = SlideSet::open(dir)?;
+    let findings = set.verify_with_progress(&|progress| bar.update(progress.done, progress.total, "files checked"));
+    bar.clear();
+    let findings = findings?;
     if json {
         exit::print(&format!("{:#}\n", serde_json::json!({ "findings": findings })))?;
     } else if findings.is_empty() {

@@ -331,7 +331,7 @@ fn invalid_flats_are_rejected() {
     for name in PAIR {
         write_grey16(bench.path("sizes/10ms").join(name), &[900; 64 * 32], 64);
     }
-    rejected(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "64 x 32 pixels, others 128 x 128", "same size"]);
+    rejected(&bench, "--flat sizes --dark darks --bits 12", &["10ms", "found 64 x 32 pixels, expected 128 x 128", "same size"]);
     rejected(&bench, "--flat sizes --bits 12", &["--flat sizes: no dark frames", "--dark"]);
     fs::remove_dir_all(bench.path("sizes/10ms")).unwrap();
     rejected(&bench, "--flat sizes --dark darks", &["bit depth of the camera is unknown", "--bits"]);
@@ -372,8 +372,8 @@ fn invalid_stacks_and_edges_are_rejected() {
     rejected(&bench, "", &["--stack", "--edge", "--flat"]);
     rejected(&bench, "--stack end.tif", &["--stack end.tif: window ", "the stack's end", "both sides of focus"]);
     rejected(&bench, &format!("--stack end.tif --window {one}"), &["window 18,26,44,38", "the stack's end"]);
-    rejected(&bench, "--stack two.tif", &["--stack two.tif: 2 planes; expected 3 or more"]);
-    rejected(&bench, "--stack flat.tif", &["no dark, compact thing", "--window"]);
+    rejected(&bench, "--stack two.tif", &["--stack two.tif: planes: found 2, expected 3 or more"]);
+    rejected(&bench, "--stack flat.tif", &["no nucleus found", "--window"]);
     rejected(&bench, "--stack flat.tif --window 0,0,20,20", &["holds no detail"]);
     rejected(&bench, "--stack stack.tif --window 180,0,20,20", &["inside the image of 192 x 192", "--window X,Y,W,H"]);
     rejected(&bench, "--stack stack.tif --window 1,1,4,4", &["at least 8 pixels"]);
@@ -392,11 +392,11 @@ fn invalid_stacks_and_edges_are_rejected() {
     rejected(&bench, "--edge stack.tif", &["--edge stack.tif: 19 images; expected 1"]);
     write("one.tif", &planes[9..10]);
     rejected(&bench, "--edge one.tif --line 0,0,4,0", &["line 0,0,4,0", "192 x 192", "at least 8 pixels long"]);
-    rejected(&bench, "--edge one.tif --line 180,10,220,10", &["does not lie in"]);
+    rejected(&bench, "--edge one.tif --line 180,10,220,10", &["extends beyond the"]);
     rejected(&bench, "--edge one.tif --line 1,2,3", &["expected X0,Y0,X1,Y1"]);
     rejected(&bench, "--edge one.tif --line 1,2,3,inf", &["expected X0,Y0,X1,Y1"]);
     write("even.tif", &[vec![5.0; 192 * 192]]);
-    rejected(&bench, "--edge even.tif", &["no straight edge was found", "--line"]);
+    rejected(&bench, "--edge even.tif", &["no straight edge found", "--line"]);
     rejected(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
     rejected(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);

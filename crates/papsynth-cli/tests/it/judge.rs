@@ -51,8 +51,8 @@ fn fields_of_another_seed_pass_and_different_fields_do_not() {
     for pair in ["a b", "c d"] {
         let outcome = bench.good(&format!("judge {pair} --out same --quick"));
         let tests = outcome.out.lines().filter(|line| !line.contains(" synthetic fields: "));
-        wrong += tests.filter(|line| line.ends_with(": told apart")).count();
-        assert!(outcome.out.contains("8 real and 8 synthetic fields: "), "{}", outcome.out);
+        wrong += tests.filter(|line| line.ends_with(": distinguishable")).count();
+        assert!(outcome.out.contains("8 real fields and 8 synthetic fields: "), "{}", outcome.out);
         assert!(outcome.out.ends_with("same: report.html, report.json\n"), "{}", outcome.out);
         assert!(wrong <= 1, "{}", outcome.out);
     }
@@ -79,13 +79,15 @@ fn fields_of_another_seed_pass_and_different_fields_do_not() {
         "high",
         "--seed 2 --preset high-grade --set cells.high-grade.count=7 --set cells.intermediate.count=0",
     );
-    for (other, test, verdict) in
-        [("noise", "patches", "distinguishable"), ("blurred", "patches", "distinguishable"), ("high", "nuclei", "distinguishable")]
-    {
+    for (other, test, verdict) in [
+        ("noise", "patches", "distinguishable"),
+        ("blurred", "patches", "distinguishable"),
+        ("high", "nuclei", "distinguishable"),
+    ] {
         let outcome = bench.good(&format!("judge a {other} --out {other}-report --quick"));
         let line = outcome.out.lines().find(|line| line.starts_with(test)).unwrap();
         assert!(line.ends_with(&format!(": {verdict}")), "{other}: {}", outcome.out);
-        assert!(outcome.out.contains("synthetic fields: told apart"), "{other}: {}", outcome.out);
+        assert!(outcome.out.contains("synthetic fields: distinguishable"), "{other}: {}", outcome.out);
     }
 }
 

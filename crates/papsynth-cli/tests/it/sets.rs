@@ -176,7 +176,7 @@ fn conversion_changes_only_the_format() {
     bench.good("convert out --out converted --format qupath,stardist --flatten drop");
     assert_eq!(bench.files("direct"), bench.files("converted"));
     let run = bench.run("convert out --out converted --format yolo-seg");
-    assert!(run.code == 2 && run.err.contains("lies in files in another way"), "{}", run.err);
+    assert!(run.code == 2 && run.err.contains("was written with another layout"), "{}", run.err);
     assert_eq!(bench.run("convert out --out other").code, 2);
     assert_eq!(bench.run("convert none --out other --format cellpose").code, 2);
 }

@@ -69,7 +69,7 @@ fn a_slide_of_several_tasks_is_finalized_and_verified() {
     assert!(bench.good("status slide").out.ends_with("finished\n"));
     bench.good("verify slide");
     fs::write(bench.path("slide/other"), "x").unwrap();
-    rejected(&bench, "verify slide", "other: is no file of the slide");
+    rejected(&bench, "verify slide", "other: untracked: does not belong to the slide");
     assert!(bench.good("clean slide --untracked").out.contains("1 untracked file"));
     bench.good("verify slide");
     fs::remove_file(bench.path("slide/slide.json")).unwrap();
@@ -77,7 +77,7 @@ fn a_slide_of_several_tasks_is_finalized_and_verified() {
     bench.good(&make);
     bench.good("verify slide");
     fs::remove_file(bench.path("slide/slide.ome.zarr/0/c/0/1")).unwrap();
-    rejected(&bench, "verify slide", "is missing");
+    rejected(&bench, "verify slide", ": missing");
     bench.good(&format!("{make} --verify"));
     bench.good("verify slide");
     rejected(&bench, &format!("{make} --seed 4"), "another seed");

@@ -14,7 +14,7 @@ use papsynth::model::Model;
 use papsynth::scene::View;
 use papsynth::truth::{Group, Part};
 use papsynth_dataset::read::{GreyImage, Limits, label_map, read_label_map};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, FramePlace, Layout, convert, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Error, Flatten, Format, FrameLocation, Layout, convert, verify};
 use serde_json::Value;
 
 fn begin(path: &Path, layout: &Layout) -> Result<Dataset, Error> {
@@ -46,7 +46,7 @@ fn all(frames_per_shard: u64) -> Layout {
 }
 
 fn to(from: &Path, target: &Path, layout: &Layout) -> Result<u64, Error> {
-    convert(from, target, layout, &AtomicBool::new(false), &|_| ()).map(|outcome| outcome.made)
+    convert(from, target, layout, &AtomicBool::new(false), &|_| ()).map(|outcome| outcome.written)
 }
 
 fn json(path: &Path) -> Value {
@@ -73,12 +73,12 @@ fn what_is_converted_is_what_is_written_at_once() {
             .map(|index| if colour { colour_frame(index, planes, bits) } else { frame(index, planes, bits, 1) })
             .collect();
         let name = |what: &str| Scratch::new(&format!("{what}-{planes}-{bits}"));
-        let (folder, at_once, converted) = (name("folder"), name("at-once"), name("converted"));
+        let (folder, workers, converted) = (name("folder"), name("at-once"), name("converted"));
         write(folder.path(), &Layout::default(), &frames);
-        write(at_once.path(), &all(2), &frames);
+        write(workers.path(), &all(2), &frames);
         assert_eq!(to(folder.path(), converted.path(), &all(2)).unwrap(), 5);
-        assert!(contents(at_once.path()) == contents(converted.path()), "{planes} {bits}");
-        assert!(verify(at_once.path(), Some(0..5)).unwrap().findings.is_empty());
+        assert!(contents(workers.path()) == contents(converted.path()), "{planes} {bits}");
+        assert!(verify(workers.path(), Some(0..5)).unwrap().findings.is_empty());
         // By way of tar files, which have no noise-free images.
         let (tars, flat, twice) = (name("tars"), name("flat"), name("twice"));
         let layout = Layout { frames_per_shard: 3, ..Layout::new([Format::Webdataset]) };
@@ -107,7 +107,7 @@ fn every_format_gives_back_planes_and_truth_of_any_frame() {
             let layout = Layout { frames_per_shard: 3, ..Layout::new(formats.iter().copied()) };
             write(scratch.path(), &layout, &frames);
             let dataset = Dataset::open(scratch.path()).unwrap();
-            let places = dataset.places().unwrap();
+            let places = dataset.frame_locations().unwrap();
             assert_eq!(
                 places.iter().map(|place| (place.index, place.shard)).collect::<Vec<_>>(),
                 [(1, 0), (2, 0), (3, 1), (6, 2)]
@@ -135,7 +135,7 @@ fn every_format_gives_back_planes_and_truth_of_any_frame() {
                 assert_eq!([truth.width, truth.height], [WIDTH, HEIGHT]);
                 assert_eq!(truth.objects, frame.finished.truth.objects);
             }
-            let stranger = FramePlace { index: 4, shard: 1 };
+            let stranger = FrameLocation { index: 4, shard: 1 };
             assert!(dataset.summary(stranger).unwrap_err().to_string().contains("no frame 4"));
             assert!(dataset.truth(stranger).unwrap_err().to_string().contains("no image 4"));
         }
@@ -155,7 +155,7 @@ fn a_conversion_that_was_stopped_goes_on() {
         seen.store(true, std::sync::atomic::Ordering::Relaxed);
     });
     let outcome = outcome.unwrap();
-    assert_eq!((outcome.made, outcome.stopped), (2, true));
+    assert_eq!((outcome.written, outcome.stopped), (2, true));
     assert_eq!(to(folder.path(), tars.path(), &layout).unwrap(), 4);
     write(whole.path(), &layout, &frames);
     assert!(contents(tars.path()) == contents(whole.path()));
@@ -170,7 +170,7 @@ fn flat_labels_follow_the_policy_and_the_record_counts_what_they_lose() {
         write(scratch.path(), &layout, &frames);
         let truth = &frames[0].finished.truth;
         let dataset = begin(scratch.path(), &layout).unwrap();
-        let record = dataset.whole(0, Check::Hashes).unwrap().unwrap();
+        let record = dataset.complete_record(0, Check::Hashes).unwrap().unwrap();
         for (group, part) in [(Group::Cytoplasm, Part::Cytoplasm), (Group::Nucleus, Part::Nucleus)] {
             let group = group.name();
             let masks = scratch.join(&format!("cellpose/{group}/000000_masks.tif"));

@@ -78,7 +78,7 @@ fn records_that_point_outside_the_folder_are_refused() {
         assert!(problem.contains("outside"), "{path}: {problem}");
     }
     let newer = text.replacen("\"version\": 2", "\"version\": 3", 1);
-    assert!(ShardRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version is 3"));
+    assert!(ShardRecord::from_json(newer.as_bytes()).unwrap_err().to_string().contains("version: expected 2, found 3"));
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn a_data_set_with_damaged_files_is_looked_at_without_harm() {
     bytes[0] = b'[';
     fs::write(&coco, &bytes).unwrap();
     let overview = inspect(scratch.path(), Check::Hashes).unwrap();
-    assert!(overview.defects[0].message.contains("000000.coco.json has another content"));
+    assert!(overview.damaged_shards[0].to_string().contains("000000.coco.json: changed"));
     let error = dataset.finish().unwrap_err();
     assert!(!error.is_io() && error.to_string().contains("000000.coco.json"), "{error}");
     fs::write(scratch.join("manifest.json"), "[").unwrap();
@@ -113,16 +113,16 @@ fn records_of_impossible_frames_are_refused() {
     let good = ShardRecord::from_json(record).unwrap();
     type Lie = (fn(&mut ShardRecord), &'static str);
     let lies: [Lie; 12] = [
-        (|r| r.frames[0].width = usize::MAX, "pixels"),
-        (|r| r.frames[0].height = 0, "pixels"),
-        (|r| r.frames[0].height = 32_769, "pixels"),
+        (|r| r.frames[0].width = usize::MAX, "size"),
+        (|r| r.frames[0].height = 0, "size"),
+        (|r| r.frames[0].height = 32_769, "size"),
         (|r| r.frames[0].channels = usize::MAX, "channels"),
         (|r| r.frames[0].bits = 0, "bits"),
         (|r| r.frames[0].bits = u32::MAX, "bits"),
         (|r| r.frames[0].planes_um.clear(), "planes"),
         (|r| r.frames[0].planes_um.resize(1025, 0.0), "planes"),
         (|r| r.frames[0].index = u64::MAX, "shard"),
-        (|r| r.frames.push(r.frames[0].clone()), "order"),
+        (|r| r.frames.push(r.frames[0].clone()), "ascending"),
         (|r| r.layout.frames_per_shard = 0, "frames_per_shard"),
         (|r| r.layout.formats.clear(), "format"),
     ];
@@ -217,7 +217,7 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
     let go_on = |path: &std::path::Path| -> Result<(), papsynth_dataset::Error> {
         let dataset = Dataset::create_or_resume(path, &info)?;
         for frame in [frame(0, 1, 8, 1), frame(1, 2, 12, 70_000)] {
-            if dataset.whole(frame.finished.scene.key.index, Check::Hashes)?.is_none() {
+            if dataset.complete_record(frame.finished.scene.key.index, Check::Hashes)?.is_none() {
                 let mut writer = dataset.shard_writer(frame.finished.scene.key.index)?;
                 writer.begin(&frame.finished.scene)?;
                 frame.planes.iter().try_for_each(|plane| writer.write_plane(plane))?;
@@ -241,7 +241,7 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
         symlink(elsewhere.join("it"), scratch.join(name)).unwrap();
         let before = contents(elsewhere.path());
         let found = verify(scratch.path(), None);
-        assert!(found.as_ref().map_or(true, |verdict| verdict.root.is_none()), "{name}: {found:?}");
+        assert!(found.as_ref().map_or(true, |report| report.root.is_none()), "{name}: {found:?}");
         let to = Scratch::new("links-converted");
         let layout = Layout::new([Format::Cellpose]);
         let converted = convert(scratch.path(), to.path(), &layout, &AtomicBool::new(false), &|_| {});
@@ -254,7 +254,7 @@ fn links_in_a_data_set_are_followed_neither_to_read_nor_to_write() {
         let _ = clean(scratch.path(), true);
         assert_eq!(contents(elsewhere.path()), before, "{name}");
         // A link in the place of a file is replaced; behind one in the place of a folder nothing is done.
-        let mended = verify(scratch.path(), None).is_ok_and(|verdict| verdict.root.is_some());
+        let mended = verify(scratch.path(), None).is_ok_and(|report| report.root.is_some());
         assert!(mended != folders.contains(&name) && mended == gone_on.is_ok(), "{name}: {gone_on:?}");
     }
     // A link that looks like a file of a killed run goes; what it leads to stays.

@@ -11,7 +11,7 @@ use papsynth::recipe::{Preset, Recipe};
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Cleaned, Mend, Share, clean};
+use papsynth_dataset::{Check, Cleaned, Fix, Task, clean};
 
 const SEED: u64 = 11;
 
@@ -42,14 +42,14 @@ fn info<'a>(recipe: &'a Recipe, model: &'a Model) -> SlideInfo<'a> {
     SlideInfo { recipe, model, seed: SEED, shard_px: 512, objects_parquet: cfg!(feature = "parquet") }
 }
 
-fn make(path: &Path, engine: &Engine, share: Share, check: Check) -> SlideSet {
+fn make(path: &Path, engine: &Engine, task: Task, check: Check) -> SlideSet {
     let slide = engine.slide(SEED, 0).unwrap();
     let (recipe, model) = (recipe(), Model::builtin());
     let info = info(&recipe, &model);
     let set = SlideSet::create_or_resume(path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
-    let run = SlideRun { share, threads: Threads::All, check, stop: &stop };
-    assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    let run = SlideRun { task, threads: Threads::All, check, stop: &stop };
+    assert!(!set.generate(&slide, &run, &|_| ()).unwrap());
     set
 }
 
@@ -58,20 +58,20 @@ fn engine() -> Engine {
 }
 
 #[test]
-fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
+fn tasks_generate_the_same_slide_and_missing_shards_are_refused() {
     let (one, two) = (Folder::new("one"), Folder::new("two"));
     let engine = engine();
-    let whole = make(&one.0, &engine, Share::ALL, Check::Sizes);
+    let whole = make(&one.0, &engine, Task::ALL, Check::Sizes);
     let root = whole.finish(Check::Sizes).unwrap();
-    make(&two.0, &engine, Share { index: 1, of: 2 }, Check::Sizes);
+    make(&two.0, &engine, Task { index: 1, total: 2 }, Check::Sizes);
     let half = SlideSet::open(&two.0).unwrap();
     let gap = half.finish(Check::Sizes).unwrap_err().to_string();
-    assert!(gap.contains("3 of 6 shards are missing or damaged") && gap.contains("0000-0000"), "{gap}");
-    make(&two.0, &engine, Share { index: 0, of: 2 }, Check::Sizes);
+    assert!(gap.contains("missing or damaged shards: 3 of 6") && gap.contains("0000-0000"), "{gap}");
+    make(&two.0, &engine, Task { index: 0, total: 2 }, Check::Sizes);
     assert_eq!(half.finish(Check::Sizes).unwrap(), root);
     // What is read back is what the engine makes, in every level.
     let part = engine.slide(SEED, 0).unwrap().picture([100, 200], [900, 480], Threads::All).unwrap();
-    assert_eq!(whole.picture(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
+    assert_eq!(whole.image(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
     for (group, labels) in Group::ALL.into_iter().zip(&part.labels) {
         assert_eq!(whole.labels(group, 0, 200..680, 100..1000).unwrap(), labels.ids, "{}", group.name());
     }
@@ -80,8 +80,8 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
         let [width, height] = whole.level_px(level).unwrap();
         let [below_width, below_height] = whole.level_px(level - 1).unwrap();
         let (found, below) = (
-            whole.picture(level, 0, 0..height, 0..width).unwrap(),
-            whole.picture(level - 1, 0, 0..below_height, 0..below_width).unwrap(),
+            whole.image(level, 0, 0..height, 0..width).unwrap(),
+            whole.image(level - 1, 0, 0..below_height, 0..below_width).unwrap(),
         );
         let at = |x: usize, y: usize| u32::from(below[y.min(below_height - 1) * below_width + x.min(below_width - 1)]);
         for (i, value) in found.iter().enumerate() {
@@ -97,7 +97,7 @@ fn shares_make_the_same_slide_and_a_gap_is_no_slide() {
     let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
     let refused = refused.to_string();
-    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there, 256 here)"), "{refused}");
+    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there and 256 here)"), "{refused}");
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn what_asks_too_much_of_the_reach_begins_nothing() {
 fn whatever_is_wrong_is_found_and_mended() {
     let folder = Folder::new("wrong");
     let engine = engine();
-    let set = make(&folder.0, &engine, Share::ALL, Check::Sizes);
+    let set = make(&folder.0, &engine, Task::ALL, Check::Sizes);
     let root = set.finish(Check::Sizes).unwrap();
     assert_eq!(set.verify().unwrap(), []);
     let mut files = Vec::new();
@@ -173,9 +173,9 @@ fn whatever_is_wrong_is_found_and_mended() {
     fs::write(folder.0.join("objects/other.csv"), "x").unwrap();
     fs::write(folder.0.join("objects/.0000-0000.csv.0123456789abcdef.tmp"), "x").unwrap();
     let found = set.verify().unwrap();
-    assert!(found.len() == 2 && found.iter().all(|finding| finding.mend == Mend::Clean), "{found:?}");
-    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, strays: 0, stayed: 0 });
-    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, strays: 1, stayed: 0 });
+    assert!(found.len() == 2 && found.iter().all(|finding| finding.fix == Fix::Clean), "{found:?}");
+    assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, untracked: 0, skipped: 0 });
+    assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, untracked: 1, skipped: 0 });
     assert_eq!(set.verify().unwrap(), []);
     // What says the same in other bytes is not what was written.
     for name in ["shards/0000-0000.json", "upper.json"] {
@@ -183,13 +183,13 @@ fn whatever_is_wrong_is_found_and_mended() {
         bytes.push(b'\n');
         fs::write(folder.0.join(name), bytes).unwrap();
         let found = set.verify().unwrap();
-        assert!(found.len() == 1 && found[0].path == name && found[0].mend == Mend::Generate, "{found:?}");
-        make(&folder.0, &engine, Share::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
+        assert!(found.len() == 1 && found[0].path == name && found[0].mend == Fix::Generate, "{found:?}");
+        make(&folder.0, &engine, Task::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
         assert_eq!(set.verify().unwrap(), []);
     }
     let (slide, recipe_here, model) = (engine.slide(SEED, 0).unwrap(), recipe(), Model::builtin());
     let within = SlideSet::create_or_resume(&folder.0.join("objects/inner"), &slide, &info(&recipe_here, &model));
-    assert!(within.unwrap_err().to_string().contains("lies within"));
+    assert!(within.unwrap_err().to_string().contains("is inside the data set or slide"));
     // What the slide is made from is made anew from the records, if they are of this slide.
     let head = fs::read(folder.0.join("slide.json")).unwrap();
     for lost in [None, Some(&head[..head.len() / 2])] {
@@ -202,7 +202,7 @@ fn whatever_is_wrong_is_found_and_mended() {
         let other = SlideInfo { seed: SEED + 1, ..info(&recipe, &model) };
         let refused = SlideSet::create_or_resume(&folder.0, &slide, &other).unwrap_err().to_string();
         assert!(refused.contains("slide.json"), "{refused}");
-        make(&folder.0, &engine, Share::ALL, Check::Sizes);
+        make(&folder.0, &engine, Task::ALL, Check::Sizes);
         assert_eq!(set.verify().unwrap(), []);
     }
     // Before it is closed, what is a stray cannot be told.
@@ -216,7 +216,7 @@ fn whatever_is_wrong_is_found_and_mended() {
     fs::write(shard, bytes).unwrap();
     let refused = set.finish(Check::Hashes).unwrap_err().to_string();
     assert!(refused.contains("1 of 6 shards"), "{refused}");
-    make(&folder.0, &engine, Share::ALL, Check::Hashes);
+    make(&folder.0, &engine, Task::ALL, Check::Hashes);
     assert_eq!(set.finish(Check::Sizes).unwrap(), root);
     assert!(set.is_finished().unwrap());
     assert_eq!(set.verify().unwrap(), []);

@@ -11,7 +11,7 @@ use std::{fs, iter};
 use crate::support::{SEED, Scratch, contents, frame, recipe};
 use papsynth::model::Model;
 use papsynth_dataset::{
-    Check, Dataset, DatasetInfo, Error, Format, Home, Layout, Store, clean, shards_to_make, verify,
+    Check, Dataset, DatasetInfo, Error, Format, Layout, Location, Store, clean, missing_shards, verify,
 };
 
 const FRAMES: u64 = 5;
@@ -44,8 +44,8 @@ impl Memory {
         self.0.lock().unwrap().files.clone().into_iter().collect()
     }
 
-    fn home(&self) -> Home {
-        Home::in_store(self.clone()).unwrap()
+    fn home(&self) -> Location {
+        Location::in_store(self.clone()).unwrap()
     }
 }
 
@@ -92,11 +92,11 @@ fn layout(frames_per_shard: u64) -> Layout {
 }
 
 /// Makes what is missing of a data set, stack and images, and merges it.
-fn make(home: impl Into<Home>, layout: &Layout) -> Result<Dataset, Error> {
+fn make(home: impl Into<Location>, layout: &Layout) -> Result<Dataset, Error> {
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout };
     let dataset = Dataset::create_or_resume(home, &info)?;
     for shard in 0..FRAMES.div_ceil(layout.frames_per_shard) {
-        if dataset.whole(shard, Check::Sizes)?.is_some() {
+        if dataset.complete_record(shard, Check::Sizes)?.is_some() {
             continue;
         }
         let mut writer = dataset.shard_writer(shard)?;
@@ -186,18 +186,18 @@ fn what_is_wrong_in_a_store_is_found_and_mended() {
     // Without a manifest it is no data set, as in a folder.
     for (name, _) in expected.iter().filter(|(name, _)| name != "manifest.json") {
         store.0.lock().unwrap().files.remove(name);
-        let verdict = verify(store.home(), Some(0..FRAMES)).unwrap();
-        assert!(verdict.root.is_none() && !verdict.findings.is_empty(), "{name}");
+        let report = verify(store.home(), Some(0..FRAMES)).unwrap();
+        assert!(report.root.is_none() && !report.findings.is_empty(), "{name}");
         make(store.home(), &layout).unwrap();
         assert_eq!(store.files(), expected, "{name}");
     }
     store.0.lock().unwrap().files.insert("thesis.tex".to_owned(), b"years of work".to_vec());
     assert!(verify(store.home(), None).unwrap().findings.iter().any(|finding| finding.path == "thesis.tex"));
-    assert_eq!(clean(store.home(), true).unwrap().strays, 1);
+    assert_eq!(clean(store.home(), true).unwrap().untracked, 1);
     assert_eq!(store.files(), expected);
     let dataset = Dataset::open(store.home()).unwrap();
     let missing: Vec<u64> =
-        shards_to_make(&dataset, 0..FRAMES + 2, Check::Sizes).unwrap().into_iter().flatten().collect();
+        missing_shards(&dataset, 0..FRAMES + 2, Check::Sizes).unwrap().into_iter().flatten().collect();
     assert_eq!(missing, [FRAMES, FRAMES + 1]);
 }
 

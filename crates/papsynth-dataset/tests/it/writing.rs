@@ -12,7 +12,7 @@ use papsynth::Frame;
 use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth_dataset::read::{GreyImage, Limits, read_label_map};
-use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, Picture, ShardRecord, rle};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, FrameSummary, Layout, RgbImage, ShardRecord, rle};
 use serde_json::Value;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
@@ -79,7 +79,7 @@ fn a_single_plane_reads_back_in_8_and_in_12_bits() {
         check_labels(&scratch, &frame);
         assert_eq!((summary.most_layers, summary.truncated, summary.saturated), (2, 1, vec![0]));
         assert_eq!(summary.objects.values().sum::<u64>(), 6);
-        assert!(dataset.whole(3, Check::Hashes).unwrap().is_some());
+        assert!(dataset.complete_record(3, Check::Hashes).unwrap().is_some());
         let record = ShardRecord::from_json(&fs::read(scratch.join("shards/000003.json")).unwrap()).unwrap();
         assert_eq!(&record.identity, dataset.identity());
     }
@@ -281,7 +281,7 @@ fn bytes_depend_neither_on_order_nor_on_repetition() {
 #[test]
 fn pictures_show_every_object() {
     let frame = frame(0, 1, 8, 1);
-    let picture = Picture::overlay(&frame.planes[0], &frame.finished);
+    let picture = RgbImage::overlay(&frame.planes[0], &frame.finished);
     assert_eq!(picture.rgb.len(), WIDTH * HEIGHT * 3);
     let is_grey =
         |at: usize| picture.rgb[at * 3] == picture.rgb[at * 3 + 1] && picture.rgb[at * 3] == picture.rgb[at * 3 + 2];
@@ -345,7 +345,7 @@ fn what_does_not_fit_together_is_refused_and_leaves_no_frame() {
     refused(dataset.shard_writer(0).unwrap().begin(&scene).unwrap_err(), "0 planes");
     refused(dataset.shard_writer(1).unwrap().begin(&good.finished.scene).unwrap_err(), "shard 1 has the frames 1 to 1");
     refused(begin().commit().unwrap_err(), "is not finished");
-    assert!(dataset.whole(0, Check::Sizes).unwrap().is_none());
+    assert!(dataset.complete_record(0, Check::Sizes).unwrap().is_none());
     assert_eq!(dataset.finish().unwrap().frames, 0);
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }

@@ -8,7 +8,7 @@ use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Body, Bytes, Incoming};
@@ -78,8 +78,11 @@ impl Server {
     /// Listens at a port of 127.0.0.1, or at any free one if it is 0.
     ///
     /// # Errors
-    /// If the port is taken, or not allowed.
+    /// If the port is taken or not allowed, or the system clock is outside the years 1970 to 9999.
     pub fn bind(port: u16) -> Result<Self, Error> {
+        if !is_http_date(now()) {
+            return Err(Error::Clock);
+        }
         let bind = || {
             let listener = TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port)))?;
             listener.set_nonblocking(true)?;
@@ -152,6 +155,10 @@ async fn accept<S: Site + Send + 'static>(
             }
             Err(_) => continue,
         };
+        // hyper panics on a date that HTTP cannot express.
+        if !is_http_date(now()) {
+            continue;
+        }
         // Who comes while all places are taken is sent away.
         let Ok(place) = Arc::clone(&places).try_acquire_owned() else { continue };
         let shared = Arc::clone(shared);
@@ -200,6 +207,17 @@ async fn answer<S: Site>(shared: &Shared<S>, request: hyper::Request<Incoming>) 
     shared.site().reply(&request)
 }
 
+#[expect(clippy::disallowed_methods, reason = "checks the clock that hyper reads; it reaches no image")]
+fn now() -> SystemTime {
+    SystemTime::now()
+}
+
+/// Whether a time is in the years 1970 to 9999, the range of dates in HTTP.
+fn is_http_date(time: SystemTime) -> bool {
+    const END_S: u64 = 253_402_300_800;
+    time.duration_since(UNIX_EPOCH).is_ok_and(|since| since.as_secs() < END_S)
+}
+
 fn response(reply: Reply) -> Response<Full<Bytes>> {
     let body = match reply.body {
         std::borrow::Cow::Borrowed(body) => Bytes::from_static(body),
@@ -217,4 +235,16 @@ fn response(reply: Reply) -> Response<Full<Bytes>> {
         headers.insert(ALLOW, HeaderValue::from_static(allow));
     }
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_outside_1970_to_9999_are_no_http_dates() {
+        let after = |seconds| UNIX_EPOCH + Duration::from_secs(seconds);
+        assert!(is_http_date(UNIX_EPOCH) && is_http_date(after(253_402_300_799)));
+        assert!(!is_http_date(UNIX_EPOCH - Duration::from_nanos(1)) && !is_http_date(after(253_402_300_800)));
+    }
 }

@@ -3,7 +3,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use papsynth_study::{Answer, Exposure, Refusal, Session};
+use papsynth_study::{Answer, Exposure, Session, SessionError};
 use serde::Deserialize;
 
 use crate::error::Error;
@@ -84,12 +84,12 @@ fn answer(session: &mut Session, request: &Request) -> Result<Reply, Reply> {
     }
 }
 
-impl From<Refusal> for Reply {
-    fn from(refusal: Refusal) -> Self {
+impl From<SessionError> for Reply {
+    fn from(refusal: SessionError) -> Self {
         match refusal {
-            Refusal::Stale => Self::refusal(409, "this is not what is asked now"),
-            Refusal::Nonsense => Self::refusal(400, "this is nothing that the page sends"),
-            Refusal::NotWritten(error) => Self::refusal(500, &format!("it could not be kept: {error}")),
+            SessionError::Stale => Self::refusal(409, "this is not what is asked now"),
+            SessionError::Invalid => Self::refusal(400, "this is nothing that the page sends"),
+            SessionError::NotWritten(error) => Self::refusal(500, &format!("it could not be kept: {error}")),
         }
     }
 }

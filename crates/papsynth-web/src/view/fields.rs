@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use papsynth::truth::{Bounds, Group, Mask, ObjectTruth};
-use papsynth_dataset::{Dataset, FramePlace, FrameSummary};
+use papsynth_dataset::{Dataset, FrameLocation, FrameSummary};
 use serde_json::{Value, json};
 
 use super::grid::Grid;
@@ -24,14 +24,14 @@ const MOST_BYTES: usize = 1 << 28;
 
 pub(crate) struct Fields {
     dataset: Dataset,
-    places: Vec<FramePlace>,
+    places: Vec<FrameLocation>,
     /// The frames that were asked for last, the last of all first.
     kept: Vec<Frame>,
 }
 
 /// A frame, as far as it was needed.
 struct Frame {
-    place: FramePlace,
+    place: FrameLocation,
     summary: FrameSummary,
     grid: Grid,
     planes: BTreeMap<usize, Levels>,
@@ -52,7 +52,7 @@ impl Fields {
     /// The frame, first among those kept.
     fn frame(&mut self, picture: usize) -> Result<&mut Frame, Reply> {
         if self.places.is_empty() {
-            self.places = self.dataset.places()?;
+            self.places = self.dataset.frame_locations()?;
         }
         let place = *self.places.get(picture).ok_or_else(|| {
             Reply::refusal(404, &format!("there is no picture {picture}; there are {}", self.places.len()))
@@ -145,7 +145,7 @@ impl Frame {
 impl Source for Fields {
     fn count(&mut self) -> Result<usize, Reply> {
         // It may be growing.
-        self.places = self.dataset.places()?;
+        self.places = self.dataset.frame_locations()?;
         Ok(self.places.len())
     }
 

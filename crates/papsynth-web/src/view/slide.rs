@@ -32,7 +32,7 @@ impl Slide {
         }
         let head = self.set.head();
         let whole = Grid::new(head.width_px as usize, head.height_px as usize, TILE);
-        Ok(Grid { levels: self.set.levels_there(), ..whole })
+        Ok(Grid { levels: self.set.written_levels(), ..whole })
     }
 }
 
@@ -50,7 +50,7 @@ impl Source for Slide {
         let (grid, head) = (self.grid(picture)?, self.set.head());
         check_plane(plane, head.planes_um.len())?;
         let cut = grid.cut(at.level, at.row, at.column)?;
-        let values = self.set.picture(at.level, plane, cut.rows.clone(), cut.columns.clone()).map_err(refused)?;
+        let values = self.set.image(at.level, plane, cut.rows.clone(), cut.columns.clone()).map_err(refused)?;
         let white = u16::MAX >> 16_u32.saturating_sub(head.bits).min(15);
         png(&eight_bits(&values, white), cut.width(), head.channels)
     }

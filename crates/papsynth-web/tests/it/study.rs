@@ -1,11 +1,11 @@
 //! What is answered about a study, and what that tells.
 
-use papsynth_study::{Session, StudyParams, Task};
+use papsynth_study::{Session, StudyParams, TrialDesign};
 use papsynth_web::{JSON, LONGEST_BODY, Reply, Request, Site};
 
 use crate::support::Scratch;
 
-fn open(scratch: &Scratch, task: Task) -> Session {
+fn open(scratch: &Scratch, task: TrialDesign) -> Session {
     let params = StudyParams { trials: 4, training: 2, patch_px: 48, task, ..StudyParams::default() };
     let [real, synthetic, out] = ["real", "synthetic", "out"].map(|name| scratch.join(name));
     Session::open(&params, &real, &synthetic, &out).unwrap()
@@ -64,7 +64,7 @@ fn transcript(study: &mut Session, answer: &str) -> Vec<(String, Reply)> {
 
 #[test]
 fn nothing_that_is_sent_depends_on_what_is_real_but_the_pixels() {
-    for (task, answer) in [(Task::YesNo, "real"), (Task::TwoAlternatives, "left")] {
+    for (task, answer) in [(TrialDesign::YesNo, "real"), (TrialDesign::TwoAlternatives, "left")] {
         let scratch = Scratch::of_study(&format!("study-answers-{}", task.name()));
         let first = transcript(&mut open(&scratch, task), answer);
         // The same study, of which every truth is turned round: who reads all but pixels cannot know.
@@ -94,14 +94,14 @@ fn nothing_that_is_sent_depends_on_what_is_real_but_the_pixels() {
                 assert_eq!(one, other, "{target}");
             }
         }
-        assert_eq!(patches, if task == Task::YesNo { 6 } else { 12 });
+        assert_eq!(patches, if task == TrialDesign::YesNo { 6 } else { 12 });
     }
 }
 
 #[test]
 fn the_page_and_its_messages_name_no_file_and_no_truth() {
     let scratch = Scratch::of_study("study-words");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     let seen = transcript(&mut study, "synthetic");
     let lengths: std::collections::BTreeSet<usize> =
         seen.iter().filter(|(target, _)| target.starts_with("/patch/")).map(|(_, reply)| reply.body.len()).collect();
@@ -126,7 +126,7 @@ fn the_page_and_its_messages_name_no_file_and_no_truth() {
 #[test]
 fn only_known_things_are_answered() {
     let scratch = Scratch::of_study("study-routes");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     for target in [
         "/index.html",
         "//",
@@ -166,7 +166,7 @@ fn only_known_things_are_answered() {
 #[test]
 fn nonsense_is_refused_without_a_change() {
     let scratch = Scratch::of_study("study-nonsense");
-    let mut study = open(&scratch, Task::YesNo);
+    let mut study = open(&scratch, TrialDesign::YesNo);
     let before = state(&mut study);
     let name = before["patches"][0].as_str().unwrap().to_owned();
     for body in [

@@ -86,7 +86,7 @@ fn a_study_survives_its_server_and_ends_with_results() {
     assert_eq!(result["row"]["counts"], json!({ "tp": 3, "fp": 3, "tn": 0, "fn": 0 }));
     assert_eq!(result["row"]["accuracy"]["value"], 0.5);
     assert_eq!(result["exposure"]["median_ms"], 2000.5);
-    assert_eq!(result["claim"], json!({ "half_width": 0.05, "trials": 384 }));
+    assert_eq!(result["precision"], json!({ "half_width": 0.05, "trials": 384 }));
     let finished = Arc::clone(&second.finished);
     while finished.load(Ordering::SeqCst) == 0 {
         std::thread::yield_now();

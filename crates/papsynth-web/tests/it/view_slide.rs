@@ -11,7 +11,7 @@ use papsynth::model::Model;
 use papsynth::truth::Group;
 use papsynth::{Engine, Inputs, Threads};
 use papsynth_dataset::slide::{SlideInfo, SlideRun, SlideSet};
-use papsynth_dataset::{Check, Share};
+use papsynth_dataset::{Check, Task};
 use papsynth_web::View;
 use serde_json::json;
 
@@ -28,11 +28,11 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
     let info = SlideInfo { recipe: &recipe, model: &model, seed: SEED, shard_px: 512, objects_parquet: false };
     let set = SlideSet::create_or_resume(&path, &slide, &info).unwrap();
     let stop = AtomicBool::new(false);
-    let make = |share: Share| {
-        let run = SlideRun { share, threads: Threads::All, check: Check::Sizes, stop: &stop };
-        assert!(!set.make(&slide, &run, &|_| ()).unwrap());
+    let make = |share: Task| {
+        let run = SlideRun { task: share, threads: Threads::All, check: Check::Sizes, stop: &stop };
+        assert!(!set.generate(&slide, &run, &|_| ()).unwrap());
     };
-    make(Share { index: 1, of: 2 });
+    make(Task { index: 1, total: 2 });
     let mut view = View::open(&path).unwrap();
     assert_eq!(view.kind(), "slide");
     let picture = ask(&mut view, "/picture/0");
@@ -45,7 +45,7 @@ fn a_slide_is_shown_as_far_as_it_is_made() {
         assert_eq!(status(&mut view, "1-0"), 200, "{layer}");
     }
     assert_eq!(get(&mut view, "/at/0/5/5").status, 404);
-    make(Share::ALL);
+    make(Task::ALL);
     set.finish(Check::Sizes).unwrap();
     let picture = ask(&mut view, "/picture/0");
     assert_eq!(picture["levels"], json!(3));

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use papsynth_dataset::{Mend, ShardRecord};
+use papsynth_dataset::{Fix, ShardRecord};
 use sha2::{Digest, Sha256};
 
 use super::{fill, is_found, look, make};
@@ -136,8 +136,8 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
     let coco = "shards/000000.coco.json";
     // The mending itself is not what is found.
     lie(&scratch, 0, coco, &[of(coco), b"\n"].concat());
-    let verdict = look(scratch.path());
-    assert!(verdict.root.is_some(), "{verdict:?}");
+    let report = look(scratch.path());
+    assert!(report.root.is_some(), "{report:?}");
     restore(&scratch, &files);
 
     let mut lies: Vec<(&str, Vec<u8>)> = Vec::new();
@@ -216,10 +216,10 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
     lies.extend(lies_of_zarr(&files));
     for (number, (name, bytes)) in lies.iter().enumerate() {
         lie(&scratch, 0, name, bytes);
-        let verdict = look(scratch.path());
-        assert!(verdict.root.is_none(), "lie {number} in {name}");
+        let report = look(scratch.path());
+        assert!(report.root.is_none(), "lie {number} in {name}");
         // Two files that differ are both suspect; the first is named.
-        assert!(verdict.findings.iter().all(|finding| finding.mend == Mend::Generate), "{verdict:?}");
+        assert!(report.findings.iter().all(|finding| finding.fix == Fix::Generate), "{report:?}");
         restore(&scratch, &files);
     }
     assert!(look(scratch.path()).root.is_some());
@@ -254,8 +254,8 @@ fn a_record_that_lies_is_found() {
         let shard = u64::from(record(1).unwrap().files.iter().any(|file| file.path == *name));
         lie_in_record(&scratch, shard, |record| record.files.retain(|file| file.path != *name));
         fs::remove_file(scratch.join(name)).unwrap();
-        let verdict = look(scratch.path());
-        assert!(is_found(&verdict, name), "{name}: {verdict:?}");
+        let report = look(scratch.path());
+        assert!(is_found(&report, name), "{name}: {report:?}");
         restore(&scratch, &files);
     }
     assert!(look(scratch.path()).root.is_some());
@@ -319,9 +319,9 @@ fn what_is_merged_is_made_again_and_compared() {
         }
         for (name, bytes) in lies {
             lie_in_merged(&scratch, name, bytes.as_deref());
-            let verdict = look(scratch.path());
-            assert!(is_found(&verdict, name), "{name}: {verdict:?}");
-            assert!(verdict.findings.iter().all(|finding| finding.mend == Mend::Generate), "{verdict:?}");
+            let report = look(scratch.path());
+            assert!(is_found(&report, name), "{name}: {report:?}");
+            assert!(report.findings.iter().all(|finding| finding.fix == Fix::Generate), "{report:?}");
             // What makes it again mends it.
             fill(scratch.path(), frames_per_shard);
             assert_eq!(contents(scratch.path()), files, "{name}");
@@ -355,9 +355,9 @@ fn categories_are_those_of_the_recipe_everywhere() {
     let head = format!("{}{seal}", head.replace("\"mucus\"", "\"sulcum\""));
     let hash = sha256(format!("{head}\"}}").as_bytes());
     fs::write(scratch.join("manifest.json"), format!("{head}{hash}\",\"files\":{list}")).unwrap();
-    let verdict = look(scratch.path());
-    assert!(is_found(&verdict, "manifest.json"), "{verdict:?}");
-    assert!(verdict.findings[0].message.contains("categories"), "{verdict:?}");
+    let report = look(scratch.path());
+    assert!(is_found(&report, "manifest.json"), "{report:?}");
+    assert!(report.findings[0].message.contains("categories"), "{report:?}");
 }
 
 #[test]
@@ -375,6 +375,6 @@ fn tables_that_no_record_lists_are_missing_although_this_build_writes_none() {
     let head = format!("{}{seal}", head.replace(flatten, &format!("{flatten},\"objects_parquet\":true")));
     let hash = sha256(format!("{head}\"}}").as_bytes());
     fs::write(scratch.join("manifest.json"), format!("{head}{hash}\",\"files\":{list}")).unwrap();
-    let verdict = papsynth_dataset::verify(scratch.path(), None).unwrap();
-    assert!((0..2).all(|shard| is_found(&verdict, &format!("objects/{shard:06}.parquet"))), "{verdict:?}");
+    let report = papsynth_dataset::verify(scratch.path(), None).unwrap();
+    assert!((0..2).all(|shard| is_found(&report, &format!("objects/{shard:06}.parquet"))), "{report:?}");
 }

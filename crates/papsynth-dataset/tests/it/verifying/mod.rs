@@ -9,7 +9,7 @@ use std::path::Path;
 
 use crate::support::{SEED, Scratch, frame, recipe};
 use papsynth::model::Model;
-use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, Verdict, verify};
+use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, VerifyReport, verify};
 
 /// A data set in all formats, of a stack and two images.
 fn make(name: &str) -> Scratch {
@@ -25,7 +25,7 @@ fn fill(path: &Path, frames_per_shard: usize) {
     let dataset = Dataset::create_or_resume(path, &info).unwrap();
     let frames = [frame(0, 2, 8, 1), frame(1, 1, 8, 1), frame(2, 1, 12, 1)];
     for (shard, frames) in (0..).zip(frames.chunks(frames_per_shard)) {
-        if dataset.whole(shard, Check::Hashes).unwrap().is_some() {
+        if dataset.complete_record(shard, Check::Hashes).unwrap().is_some() {
             continue;
         }
         let mut writer = dataset.shard_writer(shard).unwrap();
@@ -39,11 +39,11 @@ fn fill(path: &Path, frames_per_shard: usize) {
     dataset.finish().unwrap();
 }
 
-fn look(path: &Path) -> Verdict {
+fn look(path: &Path) -> VerifyReport {
     verify(path, Some(0..3)).unwrap()
 }
 
 /// Whether the finding is about this file, or about the record or manifest that names it.
-fn is_found(verdict: &Verdict, name: &str) -> bool {
-    verdict.root.is_none() && verdict.findings.iter().any(|finding| finding.path == name)
+fn is_found(report: &VerifyReport, name: &str) -> bool {
+    report.root.is_none() && report.findings.iter().any(|finding| finding.path == name)
 }

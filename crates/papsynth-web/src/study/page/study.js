@@ -276,7 +276,7 @@ async function result() {
   rows.rows[1].className = "random";
   const { hits, of } = summary.row.accuracy;
   element("verdict").textContent = `${hits} of ${of} answers were right; guessing gives about ${Math.round(of / 2)}.`;
-  const { half_width, trials } = summary.claim;
+  const { half_width, trials } = summary.precision;
   element("claim").textContent =
     `To know a fraction to ±${Math.round(100 * half_width)} points takes ${trials} trials, of one subject or of several pooled.`;
   const groups = element("breakdown").tBodies[0];
@@ -285,7 +285,7 @@ async function result() {
   for (const { side, parameter, value, correct } of summary.breakdown) {
     const row = groups.insertRow();
     const name = `${side}: ${parameter}`;
-    const texts = [name === before ? "" : name, value, `${correct.hits} of ${correct.of}`, interval(correct.wilson_95)];
+    const texts = [name === before ? "" : name, value, `${correct.hits} of ${correct.total}`, interval(correct.wilson_95)];
     if (name !== before) row.className = "begins";
     before = name;
     for (const text of texts) cell(row, text);
