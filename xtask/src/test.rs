@@ -53,7 +53,7 @@ pub(crate) struct Torture {
 
 pub(crate) fn torture(workspace: &Workspace, numbers: &Torture) -> Result<()> {
     for (package, filter) in [
-        ("papsynth-cli", "sets::whatever_is_killed"),
+        ("papsynth-cli", "sets::the_next_run_completes"),
         ("papsynth-cli", "sets::a_full_disk"),
         ("papsynth-dataset", "verifying::damage::every_"),
         ("papsynth-cli", "hostile::"),

@@ -104,7 +104,7 @@ pub(crate) fn judge(
         field_images("real", &real, real_nuclei.as_deref(), full_scale)?,
         field_images("synthetic", &synthetic, synthetic_nuclei.as_deref(), full_scale)?,
     ];
-    let gauge = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
+    let measurer = Measurer::new(&MeasurerParams { pixel_um, nuclei_from, ..MeasurerParams::default() }).map_err(wrong)?;
     let params = if quick { JudgeParams::quick() } else { JudgeParams::default() };
     let judge = Judge::new(&JudgeParams { seed, ..params }).map_err(wrong)?;
     let pool = pool::of(py, threads)?;
@@ -113,7 +113,7 @@ pub(crate) fn judge(
             let measured = sides.map(|images| {
                 let fields: Vec<Result<Field, String>> = images
                     .par_iter()
-                    .map(|picture| gauge.measure(picture).map_err(|error| format!("{}: {error}", picture.name)))
+                    .map(|image| measurer.measure(image).map_err(|error| format!("{}: {error}", image.name)))
                     .collect();
                 fields.into_iter().collect::<Result<Vec<Field>, String>>()
             });
