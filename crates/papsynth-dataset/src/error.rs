@@ -89,10 +89,13 @@ pub enum Problem {
     /// The file, or a folder on the way to it, is a link.
     #[error("is or lies behind a symbolic link; links in a data set are not followed")]
     Link,
+    /// The path is a pipe, device or socket.
+    #[error("is a pipe, device or socket; expected a regular file")]
+    NotAFile,
     /// The file is of another format.
-    #[error("is neither a PNG nor a TIFF file")]
+    #[error("is not a PNG, JPEG or TIFF file")]
     Format,
-    /// The "PNG" or "TIFF" file ends before its image does.
+    /// The "PNG", "JPEG" or "TIFF" file ends before its image does.
     #[error("the {0} file is truncated: it ends before its image does")]
     Truncated(&'static str),
     /// The file does not follow its format.
@@ -148,7 +151,7 @@ pub enum Problem {
     #[error("{0}")]
     Unfit(String),
     /// A folder without anything to read.
-    #[error("holds no PNG or TIFF file")]
+    #[error("the folder has no PNG, JPEG or TIFF file")]
     NoImages,
     /// A line of a table.
     #[error("line {line}: {message}")]

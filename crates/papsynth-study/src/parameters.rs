@@ -24,7 +24,7 @@ pub(crate) type Parameters = BTreeMap<String, Value>;
 struct Row {
     part: String,
     kind: String,
-    stain: f64,
+    mean_absorbance: f64,
     bbox_x_px: f64,
     bbox_y_px: f64,
     bbox_width_px: f64,
@@ -68,13 +68,13 @@ impl Objects {
         };
         let numbers = [
             ("field_cells_per_mm2", Some(cells(&self.0) / area_mm2)),
-            ("field_most_layers", Some(f64::from(frame.summary.most_layers))),
+            ("field_most_layers", Some(f64::from(frame.summary.max_overlap))),
             ("patch_cells", Some(part("cytoplasm").count() as f64)),
             ("patch_nuclei", Some(part("nucleus").count() as f64)),
             ("patch_debris", Some(shown.iter().filter(|row| row.kind != "cell").count() as f64)),
             ("patch_defocus_um", mean(part("cytoplasm").filter_map(|row| defocus(&row).map(f64::abs)))),
-            ("patch_cytoplasm_stain", mean(part("cytoplasm").map(|row| row.stain))),
-            ("patch_nucleus_stain", mean(part("nucleus").map(|row| row.stain))),
+            ("patch_cytoplasm_stain", mean(part("cytoplasm").map(|row| row.mean_absorbance))),
+            ("patch_nucleus_stain", mean(part("nucleus").map(|row| row.mean_absorbance))),
         ];
         let known = numbers.into_iter().filter_map(|(name, value)| Some((name, value.filter(|v| v.is_finite())?)));
         known.map(|(name, value)| (name.to_owned(), Value::Number(value))).collect()
@@ -124,15 +124,16 @@ mod tests {
                 height: 1000,
                 pixel_um: 0.25,
                 bits: 8,
+                training_bits: 8,
                 channels: 1,
                 slide: 0,
                 planes_um: vec![-1.0, 0.0, 1.0],
-                saturated: Vec::new(),
-                floored: Vec::new(),
+                saturated_px: Vec::new(),
+                clipped_px: Vec::new(),
                 objects: BTreeMap::new(),
                 truncated: 0,
-                most_layers: 3,
-                lost_px: BTreeMap::new(),
+                max_overlap: 3,
+                occluded_px: BTreeMap::new(),
             },
             recipe: Arc::new(recipe.into_iter().collect()),
         }
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn a_patch_knows_what_lies_on_it() {
-        let table = "image,part,kind,stain,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um,other\n\
+        let table = "image,part,kind,mean_absorbance,bbox_x_px,bbox_y_px,bbox_width_px,bbox_height_px,defocus_um,other\n\
             0,cytoplasm,cell,0.2,100,100,50,50,1;-2;3,a\n\
             0,nucleus,cell,0.6,120,120,10,10,1;-2;3,a\n\
             0,cytoplasm,cell,0.4,190,0,50,300,1;4;3,a\n\

@@ -38,7 +38,7 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
         let _ = writeln!(text, "| `{what}` | {about} |");
     };
     for format in formats {
-        let place = if *format == Format::Folder { "images/, labels/, noise-free/" } else { format.name() };
+        let place = if *format == Format::Folder { "images/, preview/, labels/, noise-free/" } else { format.name() };
         row(place, format.about());
     }
     row("shards/*.coco.json", "COCO, with amodal and visible masks and everything else that is known of every object");
@@ -52,13 +52,21 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
     row("splits.csv", "train, val and test, drawn by field and by slide (fields of a slide share stain and light)");
     row("manifest.json, shards/*.json", "every file with its size and SHA-256; `papsynth verify` checks them");
     if formats.iter().any(|format| format.is_flat()) {
-        let lost: u64 = summary.lost_px.values().sum();
+        let lost: u64 = summary.occluded_px.values().sum();
         let policy = dataset.layout.flatten.name();
         let _ = writeln!(
             text,
             "\nFormats with one label a pixel follow the policy `{policy}` where objects overlap; {lost} pixels of masks are not shown \
              in them ({}).",
-            summary.lost_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
+            summary.occluded_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
+        );
+    }
+    if !summary.empty_splits.is_empty() {
+        let empty = summary.empty_splits.join(" and ");
+        let _ = writeln!(
+            text,
+            "\nNo slide is in the split {empty}: the data set has too few slides for splits by slide. Generate more frames, set fewer \
+             fields per slide in the recipe, or use the splits by field in `splits.csv`."
         );
     }
     text.push_str("\n## What is in it\n\n| category | objects |\n|---|---|\n");
@@ -175,7 +183,7 @@ const OBJECTS: &[(&str, &str, &str)] = &[
     ("class", "sc:Text", "class of the cell, else the kind"),
     ("bethesda", "sc:Text", "Bethesda category of the class"),
     ("depth_um", "sc:Float", "depth in micrometres, positive towards the objective"),
-    ("stain", "sc:Float", "mean decadic absorbance"),
+    ("mean_absorbance", "sc:Float", "mean decadic absorbance"),
     ("area_um2", "sc:Float", "area of the whole object in square micrometres"),
     ("area_px", "sc:Integer", "pixels of the complete mask"),
 ];

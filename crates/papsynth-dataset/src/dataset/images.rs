@@ -13,7 +13,7 @@ use crate::error::{Error, Problem};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
+use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
 use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
 use crate::truth::FrameSummary;
 
@@ -64,8 +64,7 @@ impl Dataset {
     }
 
     fn with_planes(&self) -> Option<Format> {
-        let mut formats = self.layout.formats.iter().copied();
-        formats.find(|format| format.has_planes() && format.needs().is_none())
+        self.layout.best_format(true).filter(|format| format.needs().is_none())
     }
 
     /// Hands over the planes of a frame, one after the other: row by row, the channels of a pixel side by side, levels of 0 to [`FrameSummary::white`].
@@ -106,8 +105,10 @@ impl Dataset {
 /// The image that shows a frame in one plane: of a stack the one with everything in focus or, where that was not written, the middle
 /// plane.
 pub(super) fn picture(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
-    let (image, all_in_focus) = dataset.images_of(frame, shard);
-    let name = all_in_focus.unwrap_or(image);
+    let seed = dataset.identity.seed;
+    let sharp = frame.is_stack().then(|| dataset.layout.sharp_image(seed, shard, frame)).flatten();
+    let best = || dataset.layout.best_format(false).map(|format| format.image(seed, shard, frame));
+    let name = sharp.map(|(name, _)| name).or_else(best).unwrap_or_default();
     let path = dataset.folder.path(&name);
     let (mut number, mut middle) = (0, None);
     pages(dataset, &name, frame, shard, &mut |page| {
@@ -130,6 +131,7 @@ pub(super) fn pages(
 ) -> Result<(), Error> {
     if !name.ends_with(names::ZARR_GROUP) {
         let mut files = images(dataset, name, shard)?.into_iter();
+        let take = &mut |page| take(to_camera(page, frame.bits));
         let read = files.try_for_each(|file| LevelImage::pages(&file, &LIMITS, take));
         return read.map_err(Error::input(&dataset.folder.path(name)));
     }

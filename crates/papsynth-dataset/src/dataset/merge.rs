@@ -89,12 +89,15 @@ impl Whole {
             whole.summary.frames += record.frames.len() as u64;
             for frame in record.frames {
                 add(&mut whole.summary.objects, frame.objects);
-                add(&mut whole.summary.lost_px, frame.lost_px);
+                add(&mut whole.summary.occluded_px, frame.occluded_px);
                 splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
             }
             whole.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
         whole.splits.extend(splits);
+        let is_empty = |split: &Split| !whole.splits.contains(split);
+        let empty = Split::ALL.into_iter().filter(is_empty).map(|split| split.name().to_owned());
+        whole.summary.empty_splits = empty.collect();
         Ok(whole)
     }
 }

@@ -44,7 +44,9 @@ pub struct Summary {
     /// Shards that were begun, but of which a file is missing or of another size: they are not in the merged files.
     pub damaged: Vec<u64>,
     /// Pixels of masks, by group, that formats with one label a pixel do not show.
-    pub lost_px: BTreeMap<String, u64>,
+    pub occluded_px: BTreeMap<String, u64>,
+    /// Names of the splits by slide without frames ("train", "val", "test"). Small data sets have few slides.
+    pub empty_splits: Vec<String>,
     /// SHA-256 of the manifest that was written, which names every file with its own: two data sets with the same are the same.
     pub root: String,
 }

@@ -177,7 +177,7 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
     for (key, until, value) in [
         ("area", ',', "7"),
         ("bbox", ']', "[1,2,3,4"),
-        ("front_area", ',', "7"),
+        ("visible_area", ',', "7"),
         ("category_id", ',', "9"),
         ("image_id", ',', "1"),
         ("object_id", ',', "77"),
@@ -189,12 +189,12 @@ fn what_does_not_fit_together_is_found_although_every_hash_is_right() {
         lies.push((coco, [&text[..from], value, &text[to..]].concat().into_bytes()));
     }
     // The complete mask as what lies in front, with its area: it overlaps the cell that is nearer.
-    let (from, to) = first("front", '}');
+    let (from, to) = first("visible", '}');
     let (area, _) = first("area", ',');
     let area = text[area..].split(',').next().unwrap();
     let front = text[from..to].replace(text[from..to].split("\"counts\":").nth(1).unwrap(), counts);
     let lied = [&text[..from], &front, &text[to..]].concat();
-    let at = lied.find("\"front_area\":").unwrap() + 13;
+    let at = lied.find("\"visible_area\":").unwrap() + 15;
     let end = at + lied[at..].find(',').unwrap();
     lies.push((coco, [&lied[..at], area, &lied[end..]].concat().into_bytes()));
     // Tar files.
@@ -234,9 +234,9 @@ fn a_record_that_lies_is_found() {
         |record| record.frames[0].planes_um[1] = 9.0,
         |record| record.frames[1].pixel_um = 0.5,
         |record| record.frames[1].width = 71,
-        |record| record.frames[1].lost_px.values_mut().for_each(|px| *px += 1),
+        |record| record.frames[1].occluded_px.values_mut().for_each(|px| *px += 1),
         |record| record.frames[1].objects.values_mut().for_each(|count| *count += 1),
-        |record| record.frames[0].saturated[1] = 0,
+        |record| record.frames[0].saturated_px[1] = 0,
         |record| drop(record.frames.pop()),
     ];
     for (number, change) in lies.into_iter().enumerate() {
