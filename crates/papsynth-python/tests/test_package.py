@@ -46,7 +46,7 @@ def test_truth_agrees_with_itself(frame):
     assert len(frame) == len(frame.masks) == len(table["id"]) == len(frame.boxes) == len(frame.rle) > 0
     assert all(len(column) == len(frame) for column in table.values())
     assert np.array_equal(frame.masks.sum(axis=(1, 2)), table["area_px"])
-    assert np.array_equal(frame.visible_masks.sum(axis=(1, 2)), table["front_area_px"])
+    assert np.array_equal(frame.visible_masks.sum(axis=(1, 2)), table["visible_area_px"])
     assert not (frame.visible_masks & ~frame.masks).any()
     for mask, box in zip(frame.masks, frame.boxes):
         if mask.any():

@@ -215,7 +215,7 @@ fn own_document(
     if saturated.is_empty() {
         saturated.resize(frame.planes_um.len(), Mask::default());
     }
-    let counted = frame.clone().counted(truth, &saturated, frame.floored.clone(), layout.flatten);
+    let counted = frame.clone().counted(truth, &saturated, frame.clipped_px.clone(), layout.flatten);
     check(counted == *frame, format!("image {index}: the summary in the record differs"))?;
     let files = layout.images_of(identity.seed, *shard, frame);
     let own = Document::of_frame(truth, frame, &saturated, &document.categories, files)

@@ -13,7 +13,7 @@ use crate::error::{Error, Problem};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
+use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
 use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
 use crate::truth::FrameSummary;
 
@@ -64,8 +64,7 @@ impl Dataset {
     }
 
     fn with_planes(&self) -> Option<Format> {
-        let mut formats = self.layout.formats.iter().copied();
-        formats.find(|format| format.has_planes() && format.needs().is_none())
+        self.layout.best_format(true).filter(|format| format.needs().is_none())
     }
 
     /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved,
@@ -107,8 +106,10 @@ impl Dataset {
 /// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing,
 /// the central plane.
 pub(super) fn display_image(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
-    let (image, edf) = dataset.image_paths(frame, shard);
-    let name = edf.unwrap_or(image);
+    let seed = dataset.identity.seed;
+    let edf = frame.is_stack().then(|| dataset.layout.edf_image(seed, shard, frame)).flatten();
+    let best = || dataset.layout.best_format(false).map(|format| format.image(seed, shard, frame));
+    let name = edf.map(|(name, _)| name).or_else(best).unwrap_or_default();
     let path = dataset.folder.path(&name);
     let (mut number, mut central) = (0, None);
     pages(dataset, &name, frame, shard, &mut |page| {
@@ -131,6 +132,7 @@ pub(super) fn pages(
 ) -> Result<(), Error> {
     if !name.ends_with(names::ZARR_GROUP) {
         let mut files = images(dataset, name, shard)?.into_iter();
+        let take = &mut |page| take(to_camera(page, frame.bits));
         let read = files.try_for_each(|file| LevelImage::pages(&file, &LIMITS, take));
         return read.map_err(Error::input(&dataset.folder.path(name)));
     }

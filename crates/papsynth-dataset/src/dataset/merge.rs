@@ -90,12 +90,15 @@ impl CompleteShards {
             complete.summary.frames += record.frames.len() as u64;
             for frame in record.frames {
                 add(&mut complete.summary.objects, frame.objects);
-                add(&mut complete.summary.lost_px, frame.lost_px);
+                add(&mut complete.summary.occluded_px, frame.occluded_px);
                 splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
             }
             complete.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
         complete.splits.extend(splits);
+        let is_empty = |split: &Split| !complete.splits.contains(split);
+        let empty = Split::ALL.into_iter().filter(is_empty).map(|split| split.name().to_owned());
+        complete.summary.empty_splits = empty.collect();
         Ok(complete)
     }
 }

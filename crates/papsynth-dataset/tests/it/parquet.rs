@@ -85,7 +85,7 @@ fn the_table_says_what_the_csv_says_and_has_the_masks() {
         });
         assert_eq!(printed.collect::<Vec<_>>(), line);
     }
-    let masks = rows(&scratch.join("objects.parquet"), &["rle", "front_rle", "image_width_px", "image_height_px"]);
+    let masks = rows(&scratch.join("objects.parquet"), &["rle", "visible_rle", "image_width_px", "image_height_px"]);
     let objects = frames.iter().flat_map(|frame| &frame.finished.truth.objects);
     assert_eq!(objects.clone().count(), masks.len());
     for (row, object) in masks.iter().zip(objects) {

@@ -176,7 +176,7 @@ fn inconsistent_files_with_correct_hashes_are_found() {
     for (key, until, value) in [
         ("area", ',', "7"),
         ("bbox", ']', "[1,2,3,4"),
-        ("front_area", ',', "7"),
+        ("visible_area", ',', "7"),
         ("category_id", ',', "9"),
         ("image_id", ',', "1"),
         ("object_id", ',', "77"),
@@ -188,12 +188,12 @@ fn inconsistent_files_with_correct_hashes_are_found() {
         forgeries.push((coco, [&text[..from], value, &text[to..]].concat().into_bytes()));
     }
     // The complete mask as the visible mask: it overlaps a nearer cell.
-    let (from, to) = first("front", '}');
+    let (from, to) = first("visible", '}');
     let (area, _) = first("area", ',');
     let area = text[area..].split(',').next().unwrap();
-    let front = text[from..to].replace(text[from..to].split("\"counts\":").nth(1).unwrap(), counts);
-    let forged = [&text[..from], &front, &text[to..]].concat();
-    let at = forged.find("\"front_area\":").unwrap() + 13;
+    let visible = text[from..to].replace(text[from..to].split("\"counts\":").nth(1).unwrap(), counts);
+    let forged = [&text[..from], &visible, &text[to..]].concat();
+    let at = forged.find("\"visible_area\":").unwrap() + 15;
     let end = at + forged[at..].find(',').unwrap();
     forgeries.push((coco, [&forged[..at], area, &forged[end..]].concat().into_bytes()));
     // Tar files.
@@ -233,9 +233,9 @@ fn forged_records_are_found() {
         |record| record.frames[0].planes_um[1] = 9.0,
         |record| record.frames[1].pixel_um = 0.5,
         |record| record.frames[1].width = 71,
-        |record| record.frames[1].lost_px.values_mut().for_each(|px| *px += 1),
+        |record| record.frames[1].occluded_px.values_mut().for_each(|px| *px += 1),
         |record| record.frames[1].objects.values_mut().for_each(|count| *count += 1),
-        |record| record.frames[0].saturated[1] = 0,
+        |record| record.frames[0].saturated_px[1] = 0,
         |record| drop(record.frames.pop()),
     ];
     for (number, change) in forgeries.into_iter().enumerate() {
