@@ -192,8 +192,8 @@ impl<'a> OpenShard<'a> {
         Ok(levels(to_camera(image, frame.bits), frame.channels))
     }
 
-    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells whether a target
-    /// format has these images.
+    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells
+    /// whether a target format has these images.
     fn check_depth(&self, from: Format, frame: &FrameSummary, uses: impl Fn(Format) -> bool) -> Result<(), Error> {
         let deep = self.target.formats.iter().find(|format| format.depth() == Depth::Camera && uses(**format));
         match deep {
