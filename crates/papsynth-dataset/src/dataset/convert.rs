@@ -119,7 +119,7 @@ struct OpenShard<'a> {
 impl<'a> OpenShard<'a> {
     fn open(source: &'a Dataset, target: &'a Layout, shard: u64) -> Result<Self, Error> {
         let record = record(source, shard)?;
-        if let Some((path, message)) = source.folder.first_flaw(&record.files, Check::Hashes)? {
+        if let Some((path, message)) = source.folder.first_defect(&record.files, Check::Hashes)? {
             return refuse(source, format!("{path}: {message}; `papsynth verify` lists all findings"));
         }
         Ok(Self { source, target, record, document: source.document(shard)? })
