@@ -80,8 +80,8 @@ impl ShardWriter<'_> {
         let follows = self.done.last().is_none_or(|last| last.index < frame.index);
         let range = format!("shard {} contains frames {start} to {} in ascending order", self.shard, end - 1);
         frame.due((start..end).contains(&frame.index) && follows, range)?;
-        if let Some(open) = &self.frame {
-            return Err(frame.wrong(format!("frame {} is not finished yet", open.frame.index)));
+        if let Some(begun) = &self.frame {
+            return Err(frame.wrong(format!("frame {} is not finished yet", begun.frame.index)));
         }
         let (pixels, planes) = (frame.width * frame.height, frame.planes_um.len());
         let few = format!("pixels {pixels}, planes {planes}; expected at least 1 of each");
@@ -98,16 +98,16 @@ impl ShardWriter<'_> {
     /// # Errors
     /// If it is not the next plane, its size differs from the scene, or a file cannot be written.
     pub fn write_plane(&mut self, plane: &Plane) -> Result<(), Error> {
-        let open = self.frame.as_mut().ok_or_else(|| not_started(self.dataset, self.shard))?;
-        open.check_plane(plane)?;
+        let begun = self.frame.as_mut().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check_plane(plane)?;
         for sink in &mut self.sinks {
-            sink.plane(plane, &open.frame, &self.files)?;
+            sink.plane(plane, &begun.frame, &self.files)?;
         }
-        if !open.frame.is_stack() {
-            open.levels.clone_from(&plane.grey);
+        if !begun.frame.is_stack() {
+            begun.levels.clone_from(&plane.grey);
         }
-        open.saturated.push(plane.saturated.clone());
-        open.clipped_px.push(plane.clipped_px);
+        begun.saturated.push(plane.saturated.clone());
+        begun.clipped_px.push(plane.clipped_px);
         Ok(())
     }
 
@@ -116,7 +116,7 @@ impl ShardWriter<'_> {
     /// # Errors
     /// If planes are missing, a size differs from the scene, or a file cannot be written.
     pub fn end(&mut self, finished: &Finished) -> Result<&FrameSummary, Error> {
-        let OpenFrame { frame, .. } = self.frame.as_ref().ok_or_else(|| not_started(self.dataset, self.shard))?;
+        let OpenFrame { frame, .. } = self.frame.as_ref().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         let key = finished.scene.key;
         let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
         frame.due(same, format!("the ground truth belongs to another scene, of frame {}", key.index))?;
@@ -129,9 +129,9 @@ impl ShardWriter<'_> {
 
     /// As [`end`](Self::end), with the grey levels of the extended-depth-of-field image of a stack.
     pub(crate) fn end_with(&mut self, truth: &Truth, edf: Vec<u16>) -> Result<&FrameSummary, Error> {
-        let open = self.frame.take().ok_or_else(|| not_started(self.dataset, self.shard))?;
-        open.check(truth, &edf)?;
-        let OpenFrame { frame, saturated, clipped_px, levels } = open;
+        let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
+        begun.check(truth, &edf)?;
+        let OpenFrame { frame, saturated, clipped_px, levels } = begun;
         let levels = if edf.is_empty() { levels } else { edf };
         let Dataset { identity, layout, categories, .. } = self.dataset;
         let frame = frame.counted(truth, &saturated, clipped_px, layout.flatten);
@@ -153,8 +153,8 @@ impl ShardWriter<'_> {
     /// # Errors
     /// If a frame is not ended, or a file cannot be written.
     pub fn commit(self) -> Result<Vec<FrameSummary>, Error> {
-        if let Some(open) = &self.frame {
-            return Err(open.frame.wrong("is not finished"));
+        if let Some(begun) = &self.frame {
+            return Err(begun.frame.wrong("is not finished"));
         }
         let mut files = self.files;
         for sink in self.sinks {
@@ -197,7 +197,7 @@ fn check_folders(dataset: &Dataset, shard: u64) -> Result<(), Error> {
     folders.into_iter().try_for_each(|name| dataset.folder.no_link(name))
 }
 
-fn not_started(dataset: &Dataset, shard: u64) -> Error {
+fn not_begun(dataset: &Dataset, shard: u64) -> Error {
     Error::Frame { index: dataset.frames_of_shard(shard).start, message: "no frame was started".to_owned() }
 }
 
