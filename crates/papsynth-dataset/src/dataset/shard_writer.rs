@@ -48,7 +48,7 @@ pub struct ShardWriter<'a> {
 struct OpenFrame {
     frame: FrameSummary,
     saturated: Vec<Mask>,
-    floored: Vec<usize>,
+    clipped_px: Vec<usize>,
     /// Grey levels of a single plane.
     levels: Vec<u16>,
 }
@@ -89,7 +89,7 @@ impl ShardWriter<'_> {
         for sink in &mut self.sinks {
             sink.begin(&frame, &self.files)?;
         }
-        self.frame = Some(OpenFrame { frame, saturated: Vec::new(), floored: Vec::new(), levels: Vec::new() });
+        self.frame = Some(OpenFrame { frame, saturated: Vec::new(), clipped_px: Vec::new(), levels: Vec::new() });
         Ok(())
     }
 
@@ -107,7 +107,7 @@ impl ShardWriter<'_> {
             begun.levels.clone_from(&plane.grey);
         }
         begun.saturated.push(plane.saturated.clone());
-        begun.floored.push(plane.clipped_px);
+        begun.clipped_px.push(plane.clipped_px);
         Ok(())
     }
 
@@ -131,10 +131,10 @@ impl ShardWriter<'_> {
     pub(crate) fn end_with(&mut self, truth: &Truth, edf: Vec<u16>) -> Result<&FrameSummary, Error> {
         let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         begun.check(truth, &edf)?;
-        let OpenFrame { frame, saturated, floored, levels } = begun;
+        let OpenFrame { frame, saturated, clipped_px, levels } = begun;
         let levels = if edf.is_empty() { levels } else { edf };
         let Dataset { identity, layout, categories, .. } = self.dataset;
-        let frame = frame.counted(truth, &saturated, floored, layout.flatten);
+        let frame = frame.counted(truth, &saturated, clipped_px, layout.flatten);
         let files = self.dataset.image_paths(&frame, self.shard);
         let document = Document::of_frame(truth, &frame, &saturated, categories, files)
             .map_err(|category| frame.wrong(format!("the recipe has no category `{category}`")))?;
