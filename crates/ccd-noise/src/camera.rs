@@ -31,7 +31,7 @@ pub struct Camera {
 pub(crate) const ROUNDING: f64 = 1.0 / 12.0;
 
 impl Camera {
-    /// Creates a camera from validated parameters.
+    /// Validates the parameters and creates a camera.
     ///
     /// # Errors
     ///

@@ -96,9 +96,9 @@ fn by_inversion(means: &[f32; BLOCK], high: &[u32; BLOCK], low: &[u32; BLOCK]) -
     counts
 }
 
-/// Ahrens and Dieter's method PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate except for the missing
-/// skewness. A K below µ is rejected with a probability of nearly (µ - K)³/6µ², 0.13/√µ on average, and replaced by a
-/// deviate from the remaining probability above µ.
+/// Ahrens and Dieter's method PD (doi:10.1145/355993.355997): K = ⌊µ + √µ·z⌋ is a Poisson deviate except for the
+/// missing skewness. A K below µ is rejected with a probability of nearly (µ - K)³/6µ², 0.13/√µ on average. A deviate
+/// from the remaining probability above µ replaces it.
 #[inline(always)]
 fn from_normals(
     means: &[f32; BLOCK],
@@ -133,8 +133,8 @@ fn from_normals(
     counts
 }
 
-/// Returns the deviate of a pixel that the squeeze test did not accept: `count` if it passes the quotient test, otherwise
-/// a deviate from the excess of the Poisson distribution over that of the proposals.
+/// Returns the deviate of a pixel that failed the squeeze test: `count` if it passes the quotient test, otherwise a
+/// deviate from the excess of the Poisson distribution over that of the proposals.
 #[cold]
 #[inline(never)]
 #[expect(clippy::cast_possible_truncation, reason = "counts below 2²⁴ are exact in single precision")]

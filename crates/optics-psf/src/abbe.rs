@@ -106,7 +106,7 @@ struct Plane {
 }
 
 impl Abbe {
-    /// Creates the integration from validated parameters. Samples are [`Microscope::pitch_um`] apart.
+    /// Validates the parameters and creates the integration. Samples are [`Microscope::pitch_um`] apart.
     ///
     /// # Errors
     ///

@@ -216,7 +216,7 @@ impl FocusParams {
 pub struct DepthOfFocus(FocusParams);
 
 impl DepthOfFocus {
-    /// Creates the model from validated parameters.
+    /// Validates the parameters and creates the model.
     ///
     /// # Errors
     ///

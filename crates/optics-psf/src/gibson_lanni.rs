@@ -55,7 +55,7 @@ pub struct GibsonLanni {
 const NODES: (usize, f64) = (24, 4.0);
 
 impl GibsonLanni {
-    /// Creates the model from validated parameters.
+    /// Validates the parameters and creates the model.
     ///
     /// # Errors
     ///

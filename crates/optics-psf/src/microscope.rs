@@ -10,7 +10,7 @@ pub struct Microscope {
 }
 
 impl Microscope {
-    /// Creates a microscope from validated parameters.
+    /// Validates the parameters and creates a microscope.
     ///
     /// # Errors
     ///

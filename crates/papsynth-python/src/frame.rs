@@ -378,8 +378,8 @@ fn restored_truth([width, height]: [usize; 2], planes: usize, objects: Vec<Pickl
 fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: usize) -> PyResult<ObjectTruth> {
     let (
         (id, group, kind, class, bethesda, traits),
-        (cluster, centre_um, depth_um, stain, tint, rotation_deg, area_um2, truncated),
-        (amodal, front),
+        (cluster, centre_um, depth_um, mean_absorbance, tint, rotation_deg, area_um2, truncated),
+        (amodal, visible),
         (defocus_um, detectability),
     ) = object;
     let unknown = |what: &str, name: &str| damaged(&format!("object {id}: unknown {what} `{name}`"));
@@ -406,13 +406,13 @@ fn restored_object(object: PickledObject, [width, height]: [usize; 2], planes: u
         cluster,
         centre_um,
         depth_um,
-        stain,
+        mean_absorbance,
         tint: named.transpose()?,
         rotation_deg,
         area_um2,
         truncated,
         amodal: mask(&amodal)?,
-        front: mask(&front)?,
+        visible: mask(&visible)?,
         defocus_um,
         detectability,
     })

@@ -101,8 +101,8 @@ pub(super) fn measure(
     })
 }
 
-/// Returns the variance of an image of mean 0 after subtraction of the mean of a square around each pixel. The result is
-/// divided by 1 - 1/side², the variance that remains of white noise.
+/// Returns the variance of an image of mean 0 after subtraction of the mean of a square around each pixel. The result
+/// is divided by 1 - 1/side², the variance that remains of white noise.
 fn variance_without_shading(image: &[f64], width: usize, side: usize) -> f64 {
     let (height, around) = (image.len() / width, side / 2);
     let area = (side * side) as f64;

@@ -96,7 +96,7 @@ const FALLEN: f64 = 0.8;
 const DARK_CLIPPED: f64 = 0.005;
 
 impl PhotonTransfer {
-    /// Creates an empty measurement from validated parameters.
+    /// Validates the parameters and creates an empty measurement.
     ///
     /// # Errors
     ///

@@ -181,7 +181,7 @@ impl<'a> OpenShard<'a> {
             return Ok(Vec::new());
         }
         let Self { source, record, .. } = self;
-        let Some((name, format)) = source.layout.sharp_image(source.identity.seed, record.shard, frame) else {
+        let Some((name, format)) = source.layout.edf_image(source.identity.seed, record.shard, frame) else {
             let layout = &source.layout;
             return refuse(source, format!("{layout} does not contain the extended-depth-of-field image of a stack"));
         };

@@ -127,7 +127,7 @@ impl Layout {
     }
 
     /// Returns the path of the all-in-focus image of a stack, and its format; one with the bit depth of the camera if there is one.
-    pub(crate) fn sharp_image(&self, seed: u64, shard: u64, frame: &FrameSummary) -> Option<(String, Format)> {
+    pub(crate) fn edf_image(&self, seed: u64, shard: u64, frame: &FrameSummary) -> Option<(String, Format)> {
         let images = self.formats.iter().filter_map(|format| match format.has_planes() {
             true => Some((format.all_in_focus(seed, shard, frame)?, *format)),
             false => Some((format.image(seed, shard, frame), *format)),

@@ -145,13 +145,13 @@ impl Annotation {
     /// # Errors
     /// If a mask is invalid, or differs from its box or areas.
     pub(crate) fn object(&self) -> Result<ObjectTruth, Problem> {
-        let (amodal, front) = (self.segmentation.mask()?, self.visible.mask()?);
+        let (amodal, visible) = (self.segmentation.mask()?, self.visible.mask()?);
         let wrong =
             |what: &str| Problem::broken("COCO", format!("annotation {}: {what} differs from the mask", self.id));
         let claims: [(&str, bool); 4] = [
             ("area", self.area == amodal.area()),
             ("bbox", self.bbox == box_of(&amodal)),
-            ("visible_area", self.visible_area == front.area()),
+            ("visible_area", self.visible_area == visible.area()),
             ("centroid", self.centroid == amodal.centroid()),
         ];
         if let Some((what, _)) = claims.into_iter().find(|(_, holds)| !holds) {
@@ -173,13 +173,13 @@ impl Annotation {
             cluster: self.cluster,
             centre_um: self.centre_um,
             depth_um: self.depth_um,
-            stain: self.mean_absorbance,
+            mean_absorbance: self.mean_absorbance,
             tint: tint.transpose()?,
             rotation_deg: self.rotation_deg,
             area_um2: self.area_um2,
             truncated: self.truncated,
             amodal,
-            front,
+            visible,
             defocus_um: self.defocus_um.clone(),
             detectability: self.detectability.clone(),
         })

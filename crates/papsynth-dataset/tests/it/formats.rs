@@ -178,7 +178,7 @@ fn formats_for_training_and_previews_have_8_bits() {
         assert!(verify(scratch.path(), Some(0..1)).unwrap().findings.is_empty());
         let levels = match planes {
             1 => frame.planes[0].grey.clone(),
-            _ => frame.finished.sharp(),
+            _ => frame.finished.all_in_focus_levels(),
         };
         let expected: Vec<u8> = levels.iter().map(|v| (f64::from(*v) * 255.0 / 4095.0).round() as u8).collect();
         assert!(*expected.iter().max().unwrap() > 200);

@@ -79,6 +79,8 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
         slide: index / 16,
+        attempts: 1,
+        cells: Default::default(),
         fusion: None,
         view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
@@ -141,12 +143,12 @@ fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &
         cluster: 1,
         centre_um: [3.25, 7.5],
         depth_um,
-        stain: 0.3,
+        mean_absorbance: 0.3,
         tint: (part == Part::Cytoplasm).then_some(Tint::Cyanophilic),
         rotation_deg: 12.5,
         area_um2: amodal.area() as f64 / 16.0,
         truncated: amodal.bounds().is_some_and(|b| b.x == 0),
-        front: Mask::default(),
+        visible: Mask::default(),
         amodal,
         defocus_um: planes.iter().map(|z| z - depth_um).collect(),
         detectability: planes.iter().map(|z| 10.0 / (1.0 + (z - depth_um).abs())).collect(),
@@ -211,7 +213,7 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
             // Plane z has z saturated pixels.
             let run = Run { y: 0, x0: 3, x1: 3 + z as u32 };
             let saturated = Mask::from_runs(if z > 0 { vec![run] } else { Vec::new() });
-            Plane { index: z, stage_um, channels, grey, noise_free, saturated, floored: 0 }
+            Plane { index: z, stage_um, channels, grey, noise_free, saturated, clipped_px: 0 }
         })
         .collect();
     Frame { planes, finished: Finished { scene, truth, all_in_focus } }
