@@ -168,14 +168,14 @@ pub fn recipe(setting: &Setting, values: &Values, fitted: impl Fn(P) -> bool) ->
         r.background.level = cut(normal(level, or_base(P::LevelSpread)), 0.05, 1.1);
     }
     if either(P::BowlAcross, P::BowlDown) {
-        let off_centre = match &r.background.illumination {
-            Illumination::Bowl(Bowl { off_centre, .. }) => off_centre.clone(),
+        let centre_offset = match &r.background.illumination {
+            Illumination::Quadratic(Quadratic { centre_offset, .. }) => centre_offset.clone(),
             Illumination::Border(_) => 0.0.into(),
         };
-        r.background.illumination = Illumination::Bowl(Bowl {
-            x2: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
-            y2: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
-            off_centre,
+        r.background.illumination = Illumination::Quadratic(Quadratic {
+            falloff_x: cut(normal(or_base(P::BowlAcross), setting.spreads.across), 0.0, 0.45),
+            falloff_y: cut(normal(or_base(P::BowlDown), setting.spreads.down), 0.0, 0.45),
+            centre_offset,
         });
     }
     camera(&mut r, setting, &on, &or_base);

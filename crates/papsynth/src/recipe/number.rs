@@ -9,39 +9,39 @@ use serde::{Deserialize, Serialize};
 
 use crate::random;
 
-/// How many standard deviations a normal or log-normal reaches to either side of its middle.
+/// Number of standard deviations at which normal and log-normal distributions are cut on both sides.
 ///
-/// Every distribution of a recipe is bounded, so that a recipe can be checked before anything is drawn.
+/// All distributions are bounded, so that a recipe can be checked before anything is drawn.
 pub const REACH_SD: f64 = 4.0;
 
 /// A number of a recipe.
 ///
 /// ```toml
-/// count = 30                                    # always 30
-/// count = { uniform = [20, 40] }                # anything from 20 to 40
+/// depth = 3                                     # always 3
+/// depth = { uniform = [2, 4] }                  # uniform from 2 to 4
 /// size  = { normal = [1.0, 0.1] }               # mean, standard deviation
 /// stain = { log_normal = [1.0, 0.44] }          # median, standard deviation of the logarithm
-/// depth = { choice = [2, 4, 8] }                # one of these
+/// depth = { choice = [2, 4, 8] }                # one of these values
 /// size  = { normal = [1.0, 0.3], min = 0.5 }    # cut off below (or above, with max)
 /// ```
 ///
-/// Normal and log-normal are cut at 4 standard deviations to either side.
+/// Normal and log-normal distributions are cut at 4 standard deviations.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Number {
-    /// Always this value.
+    /// A fixed value.
     Fixed(f64),
-    /// One of a family, cut to `min..=max`.
+    /// A distribution, cut to `min..=max`.
     Drawn {
-        /// The family.
+        /// The distribution.
         law: Law,
-        /// Nothing below this is drawn.
+        /// Smallest value.
         min: f64,
-        /// Nothing above this is drawn.
+        /// Largest value.
         max: f64,
     },
 }
 
-/// The families of distributions a recipe knows.
+/// A distribution of a recipe.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Law {
     /// Uniform between two values.
@@ -54,7 +54,7 @@ pub enum Law {
     Choice(Vec<f64>),
 }
 
-/// A number of things: a value that is written out must be whole, one that is drawn from a range is rounded.
+/// A count. A fixed value and the values of `choice` must be integers; values of other distributions are rounded.
 pub type Count = Number;
 
 impl From<f64> for Number {
@@ -70,25 +70,25 @@ impl From<i32> for Number {
 }
 
 impl Number {
-    /// Uniform between `low` and `high`.
+    /// Returns a uniform distribution between `low` and `high`.
     #[must_use]
     pub fn uniform(low: f64, high: f64) -> Self {
         Self::law(Law::Uniform(low, high))
     }
 
-    /// Normal with a mean and a standard deviation, cut at 4 of them.
+    /// Returns a normal distribution with a mean and a standard deviation, cut at 4 standard deviations.
     #[must_use]
     pub fn normal(mean: f64, sd: f64) -> Self {
         Self::law(Law::Normal(mean, sd))
     }
 
-    /// Log-normal with a median and the standard deviation of the logarithm, cut at 4 of them.
+    /// Returns a log-normal distribution with a median and the standard deviation of the logarithm, cut at 4 standard deviations.
     #[must_use]
     pub fn log_normal(median: f64, log_sd: f64) -> Self {
         Self::law(Law::LogNormal(median, log_sd))
     }
 
-    /// One of these values, all equally likely.
+    /// Returns a distribution of equally likely values.
     #[must_use]
     pub fn choice(values: impl Into<Vec<f64>>) -> Self {
         Self::law(Law::Choice(values.into()))
@@ -98,7 +98,7 @@ impl Number {
         Self::Drawn { law, min: f64::NEG_INFINITY, max: f64::INFINITY }
     }
 
-    /// Cuts the number below, and moves it by whole standard deviations no further than that.
+    /// Returns the number, cut below `floor`.
     #[must_use]
     pub fn at_least(self, floor: f64) -> Self {
         match self {
@@ -107,7 +107,7 @@ impl Number {
         }
     }
 
-    /// Cuts the number above.
+    /// Returns the number, cut above `ceiling`.
     #[must_use]
     pub fn at_most(self, ceiling: f64) -> Self {
         match self {
@@ -116,7 +116,7 @@ impl Number {
         }
     }
 
-    /// The smallest and the largest value that can be drawn.
+    /// Returns the smallest and the largest value that can be drawn.
     #[must_use]
     pub fn bounds(&self) -> [f64; 2] {
         match self {
@@ -130,8 +130,7 @@ impl Number {
 
     /// Draws a value.
     pub fn draw<R: Rng + ?Sized>(&self, rng: &mut R) -> f64 {
-        /// Tries before a cut-off tail is left to the uniform law between its bounds: reached only when nearly
-        /// the whole distribution is cut off.
+        /// Tries before the value is drawn uniformly between the bounds, if nearly the complete distribution is cut off.
         const TRIES: usize = 1000;
         match self {
             Self::Fixed(value) => *value,
@@ -184,8 +183,7 @@ impl Number {
         if weights > 0.0 { sum / weights } else { of(0.5 * (low + high)) }
     }
 
-    /// What is wrong with this number where something is counted: what is written out must be whole, what is drawn from a
-    /// range is rounded.
+    /// Returns a message if the number is not a valid [`Count`].
     pub(crate) fn fraction(&self) -> Option<String> {
         let written: &[f64] = match self {
             Self::Fixed(value) => &[*value],
@@ -193,10 +191,10 @@ impl Number {
             Self::Drawn { .. } => &[],
         };
         let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
-        Some(format!("{value} is not a whole number"))
+        Some(format!("{value} is not an integer"))
     }
 
-    /// What is wrong with this number, if it must lie within `low..=high`.
+    /// Returns a message if the number is invalid or not within `low..=high`.
     pub(crate) fn problem(&self, low: f64, high: f64) -> Option<String> {
         if let Self::Drawn { law, min, max } = self {
             if let Some(problem) = law.problem() {
@@ -208,14 +206,14 @@ impl Number {
         }
         let [least, most] = self.bounds();
         if !least.is_finite() || !most.is_finite() {
-            return Some(format!("{self} is not a finite number; expected {}", range(low, high)));
+            return Some(format!("{self} is not finite: expected {}", range(low, high)));
         }
         if least > most {
-            return Some(format!("{self} leaves nothing to draw between `min` and `max`"));
+            return Some(format!("{self} has no value between `min` and `max`"));
         }
         if least < low || most > high {
-            let reach = if least < most { format!(", which reaches from {least} to {most}") } else { String::new() };
-            return Some(format!("{self}{reach} is outside {}", range(low, high)));
+            let reach = if least < most { format!(" (from {least} to {most})") } else { String::new() };
+            return Some(format!("{self}{reach} is out of range: expected {}", range(low, high)));
         }
         None
     }
@@ -273,19 +271,21 @@ impl Law {
         let number = |value: &f64| value.is_finite();
         match self {
             Self::Uniform(low, high) if !number(low) || !number(high) => {
-                Some("`uniform` needs two finite numbers".to_owned())
+                Some("expected two finite numbers in `uniform`".to_owned())
             }
             Self::Uniform(low, high) if low > high => {
-                Some(format!("`uniform = [{low}, {high}]` has its ends swapped; write [{high}, {low}]"))
+                Some(format!("`uniform = [{low}, {high}]` has its bounds swapped: expected [{high}, {low}]"))
             }
-            Self::Normal(mean, sd) if !number(mean) || !number(sd) || *sd < 0.0 => {
-                Some(format!("`normal = [{mean}, {sd}]` needs a finite mean and a standard deviation of 0 or more"))
-            }
+            Self::Normal(mean, sd) if !number(mean) || !number(sd) || *sd < 0.0 => Some(format!(
+                "`normal = [{mean}, {sd}]`: expected a finite mean and a standard deviation of at least 0"
+            )),
             Self::LogNormal(median, sd) if !number(median) || *median <= 0.0 || !number(sd) || *sd < 0.0 => {
-                Some(format!("`log_normal = [{median}, {sd}]` needs a median above 0 and a deviation of 0 or more"))
+                Some(format!(
+                    "`log_normal = [{median}, {sd}]`: expected a median above 0 and a standard deviation of at least 0"
+                ))
             }
             Self::Choice(values) if values.is_empty() || values.iter().any(|v| !v.is_finite()) => {
-                Some("`choice` needs at least one number, all of them finite".to_owned())
+                Some("expected at least one number in `choice`, and finite numbers".to_owned())
             }
             _ => None,
         }
@@ -345,12 +345,12 @@ impl Serialize for Number {
     }
 }
 
-/// Whole numbers print without a fraction: `planes = 21`, not `21.0`.
+/// Writes integers without a fraction: `planes = 21`, not `21.0`.
 fn serialize_plain<S: Serializer>(value: f64, serializer: S) -> Result<S::Ok, S::Error> {
-    /// Whole numbers up to 2⁵³ are exact in f64.
+    /// Integers up to 2⁵³ are exact in f64.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     if value.fract() == 0.0 && value.abs() < EXACT {
-        #[expect(clippy::cast_possible_truncation, reason = "whole and below 2⁵³")]
+        #[expect(clippy::cast_possible_truncation, reason = "an integer below 2⁵³")]
         let whole = value as i64;
         serializer.serialize_i64(whole)
     } else {
@@ -366,7 +366,7 @@ impl<'de> Deserialize<'de> for Number {
 
 struct NumberVisitor;
 
-/// The names that stand for a distribution, as error messages list them.
+/// Keys of a distribution.
 const LAWS: &[&str] = &["uniform", "normal", "log_normal", "choice", "min", "max"];
 
 impl<'de> Visitor<'de> for NumberVisitor {
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_has_its_mean_and_spread() {
+    fn a_normal_distribution_has_its_mean_and_standard_deviation() {
         let mut rng = Key { seed: 2, index: 0 }.stream("test", 0, "number");
         let number = Number::normal(5.0, 2.0);
         let n = 10_000;
@@ -523,7 +523,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn invalid_numbers_have_a_message() {
         assert!(parse("{ unifrom = [1, 2] }").unwrap_err().contains("unknown field `unifrom`"));
         assert!(parse("{ min = 2 }").unwrap_err().contains("expected one of `uniform`"));
         assert!(parse("{ uniform = [1, 2], choice = [1] }").unwrap_err().contains("found two"));
@@ -532,9 +532,9 @@ mod tests {
         assert!(parse("nan").unwrap().problem(0.0, 9.0).unwrap().contains("finite"));
         assert!(parse("inf").unwrap().problem(0.0, 9.0).is_some());
         assert!(parse("{ normal = [1, -1] }").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("reaches from -3 to 5"));
+        assert!(parse("{ normal = [1, 1] }").unwrap().problem(0.0, 9.0).unwrap().contains("(from -3 to 5)"));
         assert!(parse("{ choice = [] }").unwrap().problem(0.0, 9.0).is_some());
-        assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("nothing to draw"));
-        assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("outside 0 to 9"));
+        assert!(parse("{ normal = [1, 1], min = 8 }").unwrap().problem(0.0, 9.0).unwrap().contains("no value between"));
+        assert!(parse("-1").unwrap().problem(0.0, 9.0).unwrap().contains("out of range: expected 0 to 9"));
     }
 }

@@ -93,36 +93,33 @@ pub(super) fn draw_cells(
     Ok(Cells { objects, field: weights.field, region: weights.region, counts })
 }
 
-/// Returns how many cells of each class to place: those requested, or fewer of each class where they cannot fit.
+/// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not fit.
 fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
-    let mut wanted = requested.to_vec();
-    for in_margin in [false, true] {
-        // Of a group only the first cell keeps its distance.
-        let first = |(mix, count): (&CellMix, &usize)| match mix.group.form {
+    /// Fraction of the cells that fit which is placed in a crowded field, so that each class gets places.
+    const CROWDED: f64 = 0.9;
+    let mut counts = [0; 2];
+    for (mix, count) in recipe.cells.values().zip(requested) {
+        // Only the first cell of a group keeps its distance.
+        counts[usize::from(mix.count.is_density())] += match mix.group.form {
             GroupForm::Single => *count,
             _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
         };
-        let of_area = |mix: &CellMix| mix.count.is_density() == in_margin;
-        let cells = recipe.cells.values().zip(requested).filter(|(mix, _)| of_area(mix));
-        let count: usize = cells.map(first).sum();
-        if count < 2 {
-            continue;
-        }
-        places.check_tries(count, in_margin)?;
-        match places.check(count, in_margin) {
-            Ok(()) => {}
-            Err(cause) if crowding == Crowding::Error => return Err(cause),
-            Err(_) => {
-                let fraction = places.room(in_margin) / count as f64;
-                for (mix, wanted) in recipe.cells.values().zip(&mut wanted) {
-                    if of_area(mix) {
-                        *wanted = random::count((*wanted as f64 * fraction).ceil());
-                    }
-                }
-            }
-        }
     }
-    Ok(wanted)
+    let [in_field, in_both] = counts;
+    for (count, in_margin) in [(in_field, false), (in_both, true)] {
+        places.check_tries(count, in_margin)?;
+    }
+    if in_field + in_both < 2 {
+        return Ok(requested.to_vec());
+    }
+    match places.check(in_field, in_both) {
+        Err(fraction) if crowding == Crowding::LeaveOut => {
+            let fewer = |count: &usize| random::count((*count as f64 * CROWDED * fraction).ceil());
+            Ok(requested.iter().map(fewer).collect())
+        }
+        Err(_) => Err(places.no_room(in_field, in_both)),
+        Ok(()) => Ok(requested.to_vec()),
+    }
 }
 
 /// A class of cells of a recipe.

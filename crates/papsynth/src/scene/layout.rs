@@ -209,7 +209,7 @@ impl Places {
     }
 
     /// Returns about how many cells fit into the field, or into the field and its margin.
-    pub(super) fn room(&self, in_margin: bool) -> f64 {
+    fn room(&self, in_margin: bool) -> f64 {
         let disc = core::f64::consts::FRAC_PI_4 * self.spacing_um * self.spacing_um;
         let area = self.area_um2(in_margin);
         // A cell at the edge of the possible places takes only part of its disc from them.
@@ -223,14 +223,29 @@ impl Places {
         region.size_um[0] * region.size_um[1] * sampler.possible_share()
     }
 
-    /// Checks whether `count` cells fit, before the search starts.
-    pub(super) fn check(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
-        let room = self.room(in_margin);
-        if count as f64 > room {
-            let (spacing_um, area_um2) = (self.spacing_um, self.area_um2(in_margin));
-            return Err(Cause::NoRoom { count, spacing_um, area_um2, room });
+    /// Returns the number of cells in the field, of those in the field and of those in the field and its margin.
+    fn count_in_field(&self, in_field: usize, in_both: usize) -> f64 {
+        in_field as f64 + in_both as f64 * (self.area_um2(false) / self.area_um2(true)).min(1.0)
+    }
+
+    /// Checks whether so many cells fit into the field, and into the field and its margin, before the search starts.
+    ///
+    /// # Errors
+    /// If they do not: the fraction of them that fits.
+    pub(super) fn check(&self, in_field: usize, in_both: usize) -> Result<(), f64> {
+        let fraction = (self.room(false) / self.count_in_field(in_field, in_both))
+            .min(self.room(true) / (in_field + in_both) as f64);
+        if fraction < 1.0 { Err(fraction) } else { Ok(()) }
+    }
+
+    /// Returns the error about cells that do not fit.
+    pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> Cause {
+        Cause::NoRoom {
+            count: random::count(self.count_in_field(in_field, in_both)),
+            spacing_um: self.spacing_um,
+            area_um2: self.area_um2(false),
+            room: self.room(false),
         }
-        Ok(())
     }
 
     /// Checks whether the search takes a bearable number of tries.

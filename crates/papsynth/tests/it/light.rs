@@ -384,7 +384,7 @@ fn apertures_beyond_their_medium_are_refused_by_name() {
     let text = problems(&|recipe| {
         recipe.light = Light::Monochrome(Monochrome { wavelength_um: 0.0.into(), bandwidth_um: 0.01.into() });
     });
-    assert!(text.contains("light.wavelength_um: 0 is outside 0.4 to 0.7"), "{text}");
+    assert!(text.contains("light.wavelength_um: 0 is out of range: expected 0.4 to 0.7"), "{text}");
     let text = problems(&|recipe| {
         recipe.optics = Optics::gaussian();
         colour(recipe, Mixing::Spectral, Rendition::Raw);
