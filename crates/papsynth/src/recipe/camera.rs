@@ -44,7 +44,7 @@ section! {
 
 section! {
     /// Camera (Eq. 13, g_po and g_g): the linear model of EMVA 1288. Values apply to one pixel of the sensor.
-    pub struct Camera, drawn as pub SceneCamera {
+    pub struct CameraSection, drawn as pub SceneCamera {
         /// Pixel size of the sensor. Used if `field.magnification` is given.
         pixel_um: Number (undrawn) = 6.45, 1..=100, "µm";
         /// Bit depth of grey levels.
@@ -119,17 +119,17 @@ impl CameraPreset {
 
     /// Returns the camera. The sources of its values are documented in `ccd_noise::CameraParams`.
     #[must_use]
-    pub fn camera(self) -> Camera {
+    pub fn camera(self) -> CameraSection {
         let (pixel_um, params) = match self {
             Self::Paper => (6.45, CameraParams::paper()),
             Self::Orca05g => (6.45, CameraParams::orca_05g()),
             Self::Scmos => (6.5, CameraParams::scmos()),
         };
-        Camera { pixel_um: pixel_um.into(), ..Camera::of(&params) }
+        CameraSection { pixel_um: pixel_um.into(), ..CameraSection::of(&params) }
     }
 }
 
-impl Camera {
+impl CameraSection {
     /// Returns the section of a recipe that describes a camera.
     #[must_use]
     pub fn of(params: &CameraParams) -> Self {

@@ -1,7 +1,7 @@
 //! Checks of a recipe: the range of each number, and the relations between numbers.
 
-use super::camera::Camera;
-use super::imaging::{FocusOutput, Imaging, Light, Optics};
+use super::camera::CameraSection;
+use super::imaging::{FocusOutput, Imaging, LightSection, Optics};
 use super::number::Number;
 use super::section::Declared;
 use super::whole::{RECIPE_VERSION, Recipe};
@@ -118,7 +118,7 @@ fn background(recipe: &Recipe, check: &mut Check<'_>) {
 }
 
 fn light(recipe: &Recipe, check: &mut Check<'_>) {
-    if let (Light::Colour(_), Optics::Gaussian(_)) = (&recipe.light, &recipe.optics) {
+    if let (LightSection::Colour(_), Optics::Gaussian(_)) = (&recipe.light, &recipe.optics) {
         let message = "colour needs bright-field optics; expected `kind = \"monochrome\"`, or `kind = \"bright-field\"` under \
                        [optics]";
         check.add("light.kind", message.to_owned());
@@ -143,7 +143,7 @@ fn no_more_than(check: &mut Check<'_>, (field, na): (&str, &Number), (medium, in
     }
 }
 
-fn detector(camera: &Camera, check: &mut Check<'_>) {
+fn detector(camera: &CameraSection, check: &mut Check<'_>) {
     let ([median, most], [least, rms]) = (camera.read_noise_e.bounds(), camera.read_noise_rms_e.bounds());
     if rms > 0.0 && (median <= 0.0 || least < most || rms > 20.0 * median) {
         let message = format!(
@@ -197,7 +197,7 @@ fn specimen(recipe: &Recipe, check: &mut Check<'_>) {
 mod tests {
     use super::*;
     use crate::recipe::imaging::Gaussians;
-    use crate::recipe::number::Law;
+    use crate::recipe::number::Distribution;
 
     #[test]
     fn an_invalid_field_is_reported_with_its_value_and_what_is_accepted() {
@@ -218,8 +218,11 @@ mod tests {
     fn counts_must_be_integers() {
         let mut recipe = Recipe::default();
         recipe.camera.bits = Number::Fixed(8.5);
-        recipe.field.width_px =
-            Number::Drawn { law: Law::Choice(vec![100.0, 100.5]), min: f64::NEG_INFINITY, max: f64::INFINITY };
+        recipe.field.width_px = Number::Drawn {
+            distribution: Distribution::Choice(vec![100.0, 100.5]),
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+        };
         recipe.debris.speckles.count = Number::uniform(0.5, 2.5).into();
         let text: Vec<String> = recipe.problems().iter().map(ToString::to_string).collect();
         assert_eq!(text, ["field.width_px: 100.5 is not an integer", "camera.bits: 8.5 is not an integer"]);

@@ -5,7 +5,7 @@ use super::section::section;
 
 section! {
     /// Image: its size and its pixel size. Densities of cells and debris apply to its
-    /// area; objects of a density also lie in a margin of 60 µm round it, from which they reach into the image.
+    /// area. Objects of a density also have centres in a margin of 60 µm around it, so that they reach into the image.
     pub struct Field {
         /// Width of the image. Drawn once a field.
         width_px: Count = 1376, 16..=32768, "pixels";
@@ -99,7 +99,7 @@ section! {
 
 section! {
     /// Light: monochrome or colour.
-    pub enum Light, by default Monochrome {
+    pub enum LightSection, by default Monochrome {
         /// A grey image in the light of an interference filter.
         Monochrome(Monochrome),
         /// A colour image: halogen lamp, colour camera, white balance on the empty slide.

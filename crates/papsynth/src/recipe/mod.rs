@@ -27,18 +27,18 @@ pub use crate::debris::{
 };
 pub use crate::error::InvalidField;
 pub use abundance::Abundance;
-pub use camera::{Binning, Camera, CameraPreset, PhotonNoise, Subsampling};
+pub use camera::{Binning, CameraPreset, CameraSection, PhotonNoise, Subsampling};
 pub use dyes::DyeAmounts;
 pub use imaging::{
-    Background, Border, Colour, Field, Focus, FocusOutput, Gaussians, Illumination, Imaging, Light, Microscope, Mixing,
-    Monochrome, Optics, Quadratic, Rendition,
+    Background, Border, Colour, Field, Focus, FocusOutput, Gaussians, Illumination, Imaging, LightSection, Microscope,
+    Mixing, Monochrome, Optics, Quadratic, Rendition,
 };
-pub use number::{Count, Law, Number, REACH_SD};
+pub use number::{Count, Distribution, Number, REACH_SD};
 pub use presets::Preset;
 pub use print::{is_toml_table, toml_value};
 pub use scan::{Deposit, Scan};
 pub use specimen::{
     Acceptance, Band, CellMix, Cells, Chromatin, Clusters, Cytoplasm, Folds, Group, GroupForm, Labels, Layout, Nucleus,
-    Restore, Seam, ShapeSpread, Sheet, Slide, Stain, TintMix,
+    Restore, Seam, ShapeSpread, Sheet, SlideSection, Stain, TintMix,
 };
 pub use whole::{RECIPE_VERSION, Recipe};

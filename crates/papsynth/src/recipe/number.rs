@@ -33,7 +33,7 @@ pub enum Number {
     /// A distribution, cut to `min..=max`.
     Drawn {
         /// The distribution.
-        law: Law,
+        distribution: Distribution,
         /// Smallest value.
         min: f64,
         /// Largest value.
@@ -43,7 +43,7 @@ pub enum Number {
 
 /// A distribution of a recipe.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Law {
+pub enum Distribution {
     /// Uniform between two values.
     Uniform(f64, f64),
     /// Normal with a mean and a standard deviation.
@@ -73,36 +73,36 @@ impl Number {
     /// Returns a uniform distribution between `low` and `high`.
     #[must_use]
     pub fn uniform(low: f64, high: f64) -> Self {
-        Self::law(Law::Uniform(low, high))
+        Self::drawn(Distribution::Uniform(low, high))
     }
 
     /// Returns a normal distribution with a mean and a standard deviation, cut at 4 standard deviations.
     #[must_use]
     pub fn normal(mean: f64, sd: f64) -> Self {
-        Self::law(Law::Normal(mean, sd))
+        Self::drawn(Distribution::Normal(mean, sd))
     }
 
     /// Returns a log-normal distribution with a median and the standard deviation of the logarithm, cut at 4 standard deviations.
     #[must_use]
     pub fn log_normal(median: f64, log_sd: f64) -> Self {
-        Self::law(Law::LogNormal(median, log_sd))
+        Self::drawn(Distribution::LogNormal(median, log_sd))
     }
 
     /// Returns a distribution of equally likely values.
     #[must_use]
     pub fn choice(values: impl Into<Vec<f64>>) -> Self {
-        Self::law(Law::Choice(values.into()))
+        Self::drawn(Distribution::Choice(values.into()))
     }
 
-    fn law(law: Law) -> Self {
-        Self::Drawn { law, min: f64::NEG_INFINITY, max: f64::INFINITY }
+    fn drawn(distribution: Distribution) -> Self {
+        Self::Drawn { distribution, min: f64::NEG_INFINITY, max: f64::INFINITY }
     }
 
     /// Returns the number, cut below `floor`.
     #[must_use]
     pub fn at_least(self, floor: f64) -> Self {
         match self {
-            Self::Drawn { law, min, max } => Self::Drawn { law, min: min.max(floor), max },
+            Self::Drawn { distribution, min, max } => Self::Drawn { distribution, min: min.max(floor), max },
             Self::Fixed(value) => Self::Fixed(value.max(floor)),
         }
     }
@@ -111,7 +111,7 @@ impl Number {
     #[must_use]
     pub fn at_most(self, ceiling: f64) -> Self {
         match self {
-            Self::Drawn { law, min, max } => Self::Drawn { law, min, max: max.min(ceiling) },
+            Self::Drawn { distribution, min, max } => Self::Drawn { distribution, min, max: max.min(ceiling) },
             Self::Fixed(value) => Self::Fixed(value.min(ceiling)),
         }
     }
@@ -121,8 +121,8 @@ impl Number {
     pub fn bounds(&self) -> [f64; 2] {
         match self {
             Self::Fixed(value) => [*value, *value],
-            Self::Drawn { law, min, max } => {
-                let [low, high] = law.bounds();
+            Self::Drawn { distribution, min, max } => {
+                let [low, high] = distribution.bounds();
                 [low.max(*min), high.min(*max)]
             }
         }
@@ -134,10 +134,10 @@ impl Number {
         const TRIES: usize = 1000;
         match self {
             Self::Fixed(value) => *value,
-            Self::Drawn { law, .. } => {
+            Self::Drawn { distribution, .. } => {
                 let [low, high] = self.bounds();
                 for _ in 0..TRIES {
-                    let value = law.draw(rng);
+                    let value = distribution.draw(rng);
                     if (low..=high).contains(&value) {
                         return value;
                     }
@@ -167,17 +167,17 @@ impl Number {
     fn mean_of(&self, of: impl Fn(f64) -> f64) -> f64 {
         /// Points of the midpoint rule over the bounds.
         const POINTS: u32 = 4096;
-        let Self::Drawn { law, .. } = self else { return of(self.bounds()[0]) };
+        let Self::Drawn { distribution, .. } = self else { return of(self.bounds()[0]) };
         let [low, high] = self.bounds();
         let is_within = |value: &&f64| (low..=high).contains(*value);
-        if let Law::Choice(values) = law {
+        if let Distribution::Choice(values) = distribution {
             let kept: Vec<f64> = values.iter().filter(is_within).map(|value| of(*value)).collect();
             return kept.iter().sum::<f64>() / kept.len().max(1) as f64;
         }
-        let [from, to] = [law.scaled(low), law.scaled(high)];
+        let [from, to] = [distribution.scaled(low), distribution.scaled(high)];
         let points = (0..POINTS).map(|i| from + (to - from) * (f64::from(i) + 0.5) / f64::from(POINTS));
         let (sum, weights) = points.fold((0.0, 0.0), |(sum, weights), x| {
-            let (value, weight) = law.at(x);
+            let (value, weight) = distribution.at(x);
             (sum + weight * of(value), weights + weight)
         });
         if weights > 0.0 { sum / weights } else { of(0.5 * (low + high)) }
@@ -187,7 +187,7 @@ impl Number {
     pub(crate) fn fraction(&self) -> Option<String> {
         let written: &[f64] = match self {
             Self::Fixed(value) => &[*value],
-            Self::Drawn { law: Law::Choice(values), .. } => values,
+            Self::Drawn { distribution: Distribution::Choice(values), .. } => values,
             Self::Drawn { .. } => &[],
         };
         let value = written.iter().find(|value| value.is_finite() && value.floor() != **value)?;
@@ -196,8 +196,8 @@ impl Number {
 
     /// Returns a message if the number is invalid or not within `low..=high`.
     pub(crate) fn problem(&self, low: f64, high: f64) -> Option<String> {
-        if let Self::Drawn { law, min, max } = self {
-            if let Some(problem) = law.problem() {
+        if let Self::Drawn { distribution, min, max } = self {
+            if let Some(problem) = distribution.problem() {
                 return Some(problem);
             }
             if min.is_nan() || max.is_nan() {
@@ -223,7 +223,7 @@ fn range(low: f64, high: f64) -> String {
     format!("{low} to {high}")
 }
 
-impl Law {
+impl Distribution {
     fn bounds(&self) -> [f64; 2] {
         match self {
             Self::Uniform(low, high) => [*low, *high],
@@ -247,7 +247,7 @@ impl Law {
         }
     }
 
-    /// Returns the value on the scale on which [`Law::at`] is uniform or normal: standard deviations from the centre.
+    /// Returns the value on the scale on which [`Distribution::at`] is uniform or normal: standard deviations from the centre.
     fn scaled(&self, value: f64) -> f64 {
         match self {
             Self::Normal(mean, sd) if *sd > 0.0 => (value - mean) / sd,
@@ -312,8 +312,8 @@ impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fixed(value) => write!(f, "{value}"),
-            Self::Drawn { law, min, max } => {
-                write!(f, "{{ {} = {:?}", law.name(), law.values())?;
+            Self::Drawn { distribution, min, max } => {
+                write!(f, "{{ {} = {:?}", distribution.name(), distribution.values())?;
                 if min.is_finite() {
                     write!(f, ", min = {min}")?;
                 }
@@ -330,9 +330,9 @@ impl Serialize for Number {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Fixed(value) => serialize_plain(*value, serializer),
-            Self::Drawn { law, min, max } => {
+            Self::Drawn { distribution, min, max } => {
                 let mut map = serializer.serialize_map(None)?;
-                map.serialize_entry(law.name(), &law.values())?;
+                map.serialize_entry(distribution.name(), &distribution.values())?;
                 if min.is_finite() {
                     map.serialize_entry("min", min)?;
                 }
@@ -367,7 +367,7 @@ impl<'de> Deserialize<'de> for Number {
 struct NumberVisitor;
 
 /// Keys of a distribution.
-const LAWS: &[&str] = &["uniform", "normal", "log_normal", "choice", "min", "max"];
+const KEYS: &[&str] = &["uniform", "normal", "log_normal", "choice", "min", "max"];
 
 impl<'de> Visitor<'de> for NumberVisitor {
     type Value = Number;
@@ -400,14 +400,14 @@ impl<'de> Visitor<'de> for NumberVisitor {
 /// The entries of a table that describes a distribution.
 #[derive(Default)]
 pub(crate) struct Entries {
-    law: Option<Law>,
+    distribution: Option<Distribution>,
     min: Option<f64>,
     max: Option<f64>,
 }
 
 impl Entries {
     pub(crate) fn is_empty(&self) -> bool {
-        self.law.is_none() && self.min.is_none() && self.max.is_none()
+        self.distribution.is_none() && self.min.is_none() && self.max.is_none()
     }
 
     /// Reads the value of the entry `name`.
@@ -415,27 +415,31 @@ impl Entries {
         match name {
             "min" => self.min = Some(map.next_value()?),
             "max" => self.max = Some(map.next_value()?),
-            "uniform" | "normal" | "log_normal" if self.law.is_none() => {
+            "uniform" | "normal" | "log_normal" if self.distribution.is_none() => {
                 let [a, b]: [f64; 2] = map.next_value()?;
-                self.law = Some(match name {
-                    "uniform" => Law::Uniform(a, b),
-                    "normal" => Law::Normal(a, b),
-                    _ => Law::LogNormal(a, b),
+                self.distribution = Some(match name {
+                    "uniform" => Distribution::Uniform(a, b),
+                    "normal" => Distribution::Normal(a, b),
+                    _ => Distribution::LogNormal(a, b),
                 });
             }
-            "choice" if self.law.is_none() => self.law = Some(Law::Choice(map.next_value()?)),
+            "choice" if self.distribution.is_none() => {
+                self.distribution = Some(Distribution::Choice(map.next_value()?))
+            }
             "uniform" | "normal" | "log_normal" | "choice" => {
                 return Err(de::Error::custom("expected one distribution, found two"));
             }
-            other => return Err(de::Error::unknown_field(other, LAWS)),
+            other => return Err(de::Error::unknown_field(other, KEYS)),
         }
         Ok(())
     }
 
     pub(crate) fn finish<E: de::Error>(self) -> Result<Number, E> {
-        let law = self.law.ok_or_else(|| E::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
+        let distribution = self
+            .distribution
+            .ok_or_else(|| E::custom("expected one of `uniform`, `normal`, `log_normal`, `choice`"))?;
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
-        Ok(Number::Drawn { law, min, max })
+        Ok(Number::Drawn { distribution, min, max })
     }
 }
 
@@ -456,7 +460,7 @@ impl Number {
     /// Returns the JSON schemas of a plain number and of each distribution.
     pub(crate) fn forms() -> Vec<serde_json::Value> {
         let pair = serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
-        let law = |name: &str, values: serde_json::Value| {
+        let form = |name: &str, values: serde_json::Value| {
             serde_json::json!({
                 "type": "object",
                 "properties": { name: values, "min": { "type": "number" }, "max": { "type": "number" } },
@@ -466,10 +470,10 @@ impl Number {
         };
         vec![
             serde_json::json!({ "type": "number" }),
-            law("uniform", pair.clone()),
-            law("normal", pair.clone()),
-            law("log_normal", pair),
-            law("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
+            form("uniform", pair.clone()),
+            form("normal", pair.clone()),
+            form("log_normal", pair),
+            form("choice", serde_json::json!({ "type": "array", "items": { "type": "number" }, "minItems": 1 })),
         ]
     }
 }

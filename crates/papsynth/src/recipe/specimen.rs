@@ -13,7 +13,7 @@ use super::section::{Bounds, Declared, Part, section, within};
 
 section! {
     /// Depth and spacing of the cells ("Final Image Formation": depth from a median-filtered Perlin image).
-    pub struct Slide {
+    pub struct SlideSection {
         /// Range of depth of the cells of a field, without `stacking_um`.
         depth_um: Number = Number::uniform(1.0, 4.0), 0..=1000, "µm";
         /// Length scale of the variation of depth: cell size of its Perlin noise.

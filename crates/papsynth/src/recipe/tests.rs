@@ -16,7 +16,7 @@ fn recipes() -> [Recipe; 3] {
     let mut paper = Preset::Paper2015.recipe();
     paper.layout = Layout::Band(Band::default());
     let colour = Recipe {
-        light: Light::Colour(Colour::default()),
+        light: LightSection::Colour(Colour::default()),
         layout: Layout::Labels(Labels { path: "labels.png".to_owned(), ..Labels::default() }),
         ..Recipe::default()
     };

@@ -1,11 +1,11 @@
 //! The recipe and its sections.
 
-use super::camera::Camera;
-use super::imaging::{Background, Field, Focus, Light, Optics};
+use super::camera::CameraSection;
+use super::imaging::{Background, Field, Focus, LightSection, Optics};
 use super::number::Number;
 use super::scan::Scan;
 use super::section::{Declared, Part, section};
-use super::specimen::{Cells, Cytoplasm, Layout, Nucleus, Slide, Stain, default_cells};
+use super::specimen::{Cells, Cytoplasm, Layout, Nucleus, SlideSection, Stain, default_cells};
 use crate::debris::Debris;
 use crate::scene::MARGIN_UM;
 
@@ -22,7 +22,7 @@ section! {
         /// Focal planes: one for an image, several for a focus stack.
         focus: Focus;
         /// Slide: depth and spacing of the cells.
-        slide: Slide;
+        slide: SlideSection;
         /// Layout of the cells.
         layout: Layout;
         /// Cells, by the name of their class in the model.
@@ -38,11 +38,11 @@ section! {
         /// Background: the light of the empty slide.
         background: Background;
         /// Light: monochrome or colour.
-        light: Light;
+        light: LightSection;
         /// Optics between slide and sensor.
         optics: Optics;
         /// Camera.
-        camera: Camera;
+        camera: CameraSection;
         /// Whole slides.
         scan: Scan;
     }
