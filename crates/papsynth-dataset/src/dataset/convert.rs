@@ -168,7 +168,7 @@ impl<'a> Open<'a> {
                 grey,
                 noise_free,
                 saturated: saturated.get(index).cloned().unwrap_or_default(),
-                floored: frame.floored.get(index).copied().unwrap_or_default(),
+                clipped_px: frame.floored.get(index).copied().unwrap_or_default(),
             })?;
             index += 1;
             Ok(())

@@ -1,6 +1,6 @@
 //! COCO: a document for each frame, and one for all.
 
-use papsynth::scene::{Kind, Tint};
+use papsynth::scene::{ObjectKind, Tint};
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Traits, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -160,7 +160,7 @@ impl Annotation {
         let unknown = |what: &str, found: &str| {
             Problem::broken("COCO", format!("annotation {}: there is no {what} `{}`", self.id, found.escape_default()))
         };
-        let kind = Kind::ALL.into_iter().find(|kind| kind.name() == self.kind);
+        let kind = ObjectKind::ALL.into_iter().find(|kind| kind.name() == self.kind);
         let tint =
             (!self.tint.is_empty()).then(|| Tint::by_name(&self.tint).ok_or_else(|| unknown("tint", &self.tint)));
         Ok(ObjectTruth {
@@ -173,13 +173,13 @@ impl Annotation {
             cluster: self.cluster,
             centre_um: self.centre_um,
             depth_um: self.depth_um,
-            stain: self.stain,
+            mean_absorbance: self.stain,
             tint: tint.transpose()?,
             rotation_deg: self.rotation_deg,
             area_um2: self.area_um2,
             truncated: self.truncated,
             amodal,
-            front,
+            visible: front,
             defocus_um: self.defocus_um.clone(),
             detectability: self.detectability.clone(),
         })

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
 use papsynth::scene::{
-    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
+    ObjectKind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
     Tint, View,
 };
 use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
@@ -130,23 +130,23 @@ fn disc(x: f32, y: f32, radius: f32) -> Mask {
     Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
 }
 
-fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
+fn object(id: u32, part: Part, kind: ObjectKind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
     ObjectTruth {
         id,
         part,
         kind,
         class: class.to_owned(),
-        bethesda: if kind == Kind::Cell { "NILM".to_owned() } else { String::new() },
+        bethesda: if kind == ObjectKind::Cell { "NILM".to_owned() } else { String::new() },
         traits: [Trait::Flap, Trait::Pyknotic].into_iter().collect(),
         cluster: 1,
         centre_um: [3.25, 7.5],
         depth_um,
-        stain: 0.3,
+        mean_absorbance: 0.3,
         tint: (part == Part::Cytoplasm).then_some(Tint::Cyanophilic),
         rotation_deg: 12.5,
         area_um2: amodal.area() as f64 / 16.0,
         truncated: amodal.bounds().is_some_and(|b| b.x == 0),
-        front: Mask::default(),
+        visible: Mask::default(),
         amodal,
         defocus_um: planes.iter().map(|z| z - depth_um).collect(),
         detectability: planes.iter().map(|z| 10.0 / (1.0 + (z - depth_um).abs())).collect(),
@@ -171,12 +171,12 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     let shift = (index % 7) as f32;
     let near = first_id + 1;
     let mut objects = vec![
-        object(first_id, Part::Cytoplasm, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
-        object(first_id, Part::Nucleus, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
-        object(near, Part::Cytoplasm, Kind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
-        object(near, Part::Nucleus, Kind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
-        object(near + 1, Part::Whole, Kind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
-        object(near + 2, Part::Whole, Kind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
+        object(first_id, Part::Cytoplasm, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
+        object(first_id, Part::Nucleus, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
+        object(near, Part::Cytoplasm, ObjectKind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
+        object(near, Part::Nucleus, ObjectKind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
+        object(near + 1, Part::Whole, ObjectKind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
+        object(near + 2, Part::Whole, ObjectKind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
     ];
     let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
         (0..objects.len()).filter(|&i| objects[i].part == part).collect()
@@ -211,7 +211,7 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
             // As many saturated pixels as the number of the plane.
             let run = Run { y: 0, x0: 3, x1: 3 + z as u32 };
             let saturated = Mask::from_runs(if z > 0 { vec![run] } else { Vec::new() });
-            Plane { index: z, stage_um, channels, grey, noise_free, saturated, floored: 0 }
+            Plane { index: z, stage_um, channels, grey, noise_free, saturated, clipped_px: 0 }
         })
         .collect();
     Frame { planes, finished: Finished { scene, truth, all_in_focus } }

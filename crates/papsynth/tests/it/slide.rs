@@ -192,12 +192,13 @@ fn density_matches_fields_inside_the_deposit_and_is_lower_outside() {
     let engine = engine(&recipe);
     let count = |slide: &papsynth::Slide<'_>, origin, size: u32| {
         let found = slide.objects(origin, [size; 2]).unwrap();
-        found.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count() as f64
+        found.iter().filter(|o| o.body.kind() == papsynth::scene::ObjectKind::Cell).count() as f64
     };
     let fields = 24;
     let scenes = (0..fields).map(|index| engine.scene(papsynth::key::Key { seed: 3, index }).unwrap());
-    let cells: usize =
-        scenes.map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count()).sum();
+    let cells: usize = scenes
+        .map(|scene| scene.objects.iter().filter(|o| o.body.kind() == papsynth::scene::ObjectKind::Cell).count())
+        .sum();
     let wanted = cells as f64 / (fields as f64 * 1376.0 * 1038.0);
     let side = 8000;
     let (mut inside, mut beyond) = (0.0, 0.0);
