@@ -18,8 +18,8 @@ pub(crate) mod view;
 mod weight;
 
 pub use crate::debris::{
-    Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Kind,
-    Leukocyte, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
+    Bacillus, BareNucleus, Blob, Body, Bubble, Candida, Coat, Colony, Crystal, Fibre, Fleck, Grain, Growth, Leukocyte,
+    ObjectKind, RedCell, Scratch, Smudge, Speckle, Strand, Trichomonad,
 };
 pub use crate::recipe::camera::SceneCamera;
 pub use crate::recipe::imaging::SceneMicroscope;

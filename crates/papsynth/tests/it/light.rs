@@ -9,7 +9,7 @@ use papsynth::recipe::{
     Microscope, Mixing, Monochrome, Number, Optics, Preset, Recipe,
 };
 use papsynth::recipe::{Rendition, Restore};
-use papsynth::scene::{Body, Kind};
+use papsynth::scene::{Body, ObjectKind};
 use papsynth::truth::Part;
 use papsynth::{Engine, Error, Frame, Inputs};
 
@@ -429,7 +429,7 @@ fn specks_of_both_forms_have_the_specified_size() {
     for form in [papsynth::recipe::SpeckForm::Round, papsynth::recipe::SpeckForm::Dilated] {
         recipe.debris.speckles.form = form;
         let frame = frame(&recipe, 0);
-        let specks = frame.finished.truth.objects.iter().filter(|o| o.kind == Kind::Speckle && !o.truncated);
+        let specks = frame.finished.truth.objects.iter().filter(|o| o.kind == ObjectKind::Speckle && !o.truncated);
         let inside: Vec<_> = specks.collect();
         assert!(inside.len() >= 15, "{form:?}: {} specks", inside.len());
         for speck in inside {

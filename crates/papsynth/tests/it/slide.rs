@@ -192,7 +192,7 @@ fn density_matches_fields_inside_the_deposit_and_is_lower_outside() {
     let engine = engine(&recipe);
     let count = |slide: &papsynth::Slide<'_>, origin, size: u32| {
         let found = slide.objects(origin, [size; 2]).unwrap();
-        found.iter().filter(|o| o.body.kind() == papsynth::scene::Kind::Cell).count() as f64
+        found.iter().filter(|o| o.body.kind() == papsynth::scene::ObjectKind::Cell).count() as f64
     };
     let fields = 24;
     let scenes = (0..fields).map(|index| engine.scene(papsynth::key::Key { seed: 3, index }).unwrap());

@@ -62,8 +62,8 @@ fn outline(cell: &CellContext<'_>, class: &ClassAssets, centre: Point) -> Result
     let mut rng = cell.stream("outline");
     let radius_px = cell.body.radius_um / cell.pixel_um();
     let formed = class.cytoplasm(radius_px, &mut rng)?;
-    let posed = formed.rotated(cell.object.rotation_deg.to_radians());
-    let outline = posed.outline(POINTS);
+    let rotated = formed.rotated(cell.object.rotation_deg.to_radians());
+    let outline = rotated.outline(POINTS);
     let middle = fsd_shape::centroid(&outline);
     let outline: Vec<Point> =
         outline.iter().map(|p| [p[0] - middle[0] + centre[0], p[1] - middle[1] + centre[1]]).collect();
