@@ -110,8 +110,8 @@ fn told(fit: &Fit) -> String {
         "\ndistance from the real windows, in standard errors: {:.2} before, {:.2} as estimated, {:.2} after the search\n",
         d.before, d.estimated, d.after
     ));
-    let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.apart.is_finite()).collect();
-    worst.sort_by(|a, b| b.apart.abs().total_cmp(&a.apart.abs()));
+    let mut worst: Vec<_> = fit.statistics.iter().filter(|s| s.standard_errors.is_finite()).collect();
+    worst.sort_by(|a, b| b.standard_errors.abs().total_cmp(&a.standard_errors.abs()));
     text.push_str("farthest apart:\n");
     for s in worst.iter().take(TOLD) {
         text.push_str(&format!(

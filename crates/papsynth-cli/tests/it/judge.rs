@@ -79,9 +79,11 @@ fn fields_of_another_seed_pass_and_other_fields_do_not() {
         "high",
         "--seed 2 --preset high-grade --set cells.high-grade.count=7 --set cells.intermediate.count=0",
     );
-    for (other, test, verdict) in
-        [("noise", "patches", "distinguishable"), ("blurred", "patches", "distinguishable"), ("high", "nuclei", "distinguishable")]
-    {
+    for (other, test, verdict) in [
+        ("noise", "patches", "distinguishable"),
+        ("blurred", "patches", "distinguishable"),
+        ("high", "nuclei", "distinguishable"),
+    ] {
         let outcome = bench.good(&format!("judge a {other} --out {other}-report --quick"));
         let line = outcome.out.lines().find(|line| line.starts_with(test)).unwrap();
         assert!(line.ends_with(&format!(": {verdict}")), "{other}: {}", outcome.out);
@@ -167,7 +169,7 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder says how large its pixels are"),
         ("judge few good --pixel-um 0.3", "few: there is 1 field; at least 2 are needed"),
-        ("judge good flat --pixel-um 0.3", "is the same everywhere"),
+        ("judge good flat --pixel-um 0.3", "is constant"),
         ("judge sizes sizes --pixel-um 0.3", "the mask is 64 x 40, its image 64 x 48"),
         ("judge good broken --pixel-um 0.3", "b.png"),
         ("judge grades good --pixel-um 0.3 --group H", "grades: no field is of group H"),
