@@ -84,7 +84,7 @@ pub enum Problem {
     #[error("there is no such {0}")]
     Missing(&'static str),
     /// The path is a folder.
-    #[error("expected a file, found a folder")]
+    #[error("is a folder; expected a file")]
     Folder,
     /// The file, or a folder in its path, is a symbolic link.
     #[error("the path contains a symbolic link; links in a data set are not followed")]

@@ -164,10 +164,10 @@ def main(program, folder):
     store.delete_object(Bucket=BUCKET, Key=lost)
     store.put_object(Bucket=BUCKET, Key="killed/notes.txt", Body=b"mine")
     code, told = run(program, "verify", f"s3://{BUCKET}/killed")
-    check(code == 2 and ": missing" in told and "notes.txt" in told, "verify finds a lost object and a stray one")
+    check(code == 2 and ": missing" in told and "notes.txt" in told, "verify finds a missing object and an untracked one")
     check(run(program, *generating(f"s3://{BUCKET}/killed"))[0] == 0, "the same command makes what is lost")
-    code, told = run(program, "clean", f"s3://{BUCKET}/killed", "--strays")
-    check(code == 0 and objects("killed") == files, "clean takes the stray one away")
+    code, told = run(program, "clean", f"s3://{BUCKET}/killed", "--untracked")
+    check(code == 0 and objects("killed") == files, "clean removes the untracked file")
 
     code, told = run(program, *generating("s3://nobodys/set"))
     check(code == 74 and "s3://nobodys/set" in told, "a bucket that is not there is named")

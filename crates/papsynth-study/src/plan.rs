@@ -10,9 +10,9 @@ use sha2::{Digest, Sha256};
 use crate::design::{Grey, Side, Stage, StudyParams, order};
 use crate::error::Error;
 use crate::fields::{Field, Frame, Root, bytes};
+use crate::grey_image::{self, GreyImage, Places, Raw};
 use crate::key::{Key, hex};
 use crate::parameters::{Objects, Parameters, varied};
-use crate::grey_image::{self, GreyImage, Places, Raw};
 
 /// Relative difference below which pixel sizes count as equal.
 const SAME_PIXEL: f64 = 0.005;

@@ -89,7 +89,7 @@ impl Dataset {
         if record.identity != self.identity || record.layout != self.layout {
             return damaged("belongs to another data set".to_owned());
         }
-        if let Some((path, message)) = self.folder.first_flaw(&record.files, check)? {
+        if let Some((path, message)) = self.folder.first_defect(&record.files, check)? {
             return Ok(Err(Finding::damaged(path, message)));
         }
         if check == Check::Hashes
@@ -109,7 +109,7 @@ impl Dataset {
         if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
             return Ok(false);
         }
-        Ok(self.folder.first_flaw(&manifest.files, Check::Sizes)?.is_none())
+        Ok(self.folder.first_defect(&manifest.files, Check::Sizes)?.is_none())
     }
 }
 

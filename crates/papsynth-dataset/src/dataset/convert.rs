@@ -119,7 +119,7 @@ struct OpenShard<'a> {
 impl<'a> OpenShard<'a> {
     fn open(source: &'a Dataset, target: &'a Layout, shard: u64) -> Result<Self, Error> {
         let record = record(source, shard)?;
-        if let Some((path, message)) = source.folder.first_flaw(&record.files, Check::Hashes)? {
+        if let Some((path, message)) = source.folder.first_defect(&record.files, Check::Hashes)? {
             return refuse(source, format!("{path}: {message}; `papsynth verify` lists all findings"));
         }
         Ok(Self { source, target, record, document: source.document(shard)? })
@@ -192,8 +192,8 @@ impl<'a> OpenShard<'a> {
         Ok(levels(to_camera(image, frame.bits), frame.channels))
     }
 
-    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells whether a target
-    /// format has these images.
+    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells
+    /// whether a target format has these images.
     fn check_depth(&self, from: Format, frame: &FrameSummary, uses: impl Fn(Format) -> bool) -> Result<(), Error> {
         let deep = self.target.formats.iter().find(|format| format.depth() == Depth::Camera && uses(**format));
         match deep {

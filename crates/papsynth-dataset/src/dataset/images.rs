@@ -166,12 +166,12 @@ fn check_hash(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
         return Ok(());
     }
     let record = read_record(&dataset.folder, shard)?;
-    let flaw = match record.files.iter().find(|found| found.path == file) {
-        Some(found) => dataset.folder.flaw(found, Check::Hashes)?,
+    let defect = match record.files.iter().find(|found| found.path == file) {
+        Some(found) => dataset.folder.defect(found, Check::Hashes)?,
         None => Some("no record lists this file".to_owned()),
     };
-    match flaw {
-        Some(flaw) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(flaw))),
+    match defect {
+        Some(defect) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(defect))),
         None => {
             trusted.insert(file.to_owned());
             Ok(())

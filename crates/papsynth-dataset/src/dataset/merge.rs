@@ -32,8 +32,10 @@ impl Dataset {
     /// are not rewritten.
     ///
     /// # Errors
-    /// If a file cannot be read or written.
+    /// If an input was changed after generation ([`check_inputs`](Self::check_inputs)), or a file cannot be read or
+    /// written.
     pub fn finish(&self) -> Result<Summary, Error> {
+        self.check_inputs()?;
         let listed = Self { folder: self.folder.listed()?, ..self.clone() };
         merge(&listed).map_err(|error| self.folder.named(error))
     }

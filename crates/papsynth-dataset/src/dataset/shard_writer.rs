@@ -69,8 +69,8 @@ impl ShardWriter<'_> {
     /// If the frame is not in this shard, is out of order, or a file cannot be written.
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
         let frame = FrameSummary::of_scene(scene);
-        let (there, here) = (scene.key.seed, self.dataset.identity.seed);
-        frame.due(there == here, format!("the seed of the scene is {there}, that of the data set {here}"))?;
+        let (found, expected) = (scene.key.seed, self.dataset.identity.seed);
+        frame.due(found == expected, format!("the seed of the scene is {found}, that of the data set {expected}"))?;
         self.begin_with(frame)
     }
 

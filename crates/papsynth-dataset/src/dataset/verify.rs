@@ -130,8 +130,8 @@ fn verify_in(
     }
     for file in &merged {
         listed.insert(file.path.clone());
-        let flaw = folder.flaw(file, Check::Hashes)?;
-        findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+        let defect = folder.defect(file, Check::Hashes)?;
+        findings.extend(defect.map(|message| Finding::damaged(&file.path, message)));
     }
     if merged.is_empty() {
         listed.extend(dataset.given().map(str::to_owned).chain(named_map(folder)));

@@ -171,7 +171,7 @@ impl Folder {
     /// Writes a file unless it exists with the same content.
     pub(crate) fn keep(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         let record = FileRecord::of(name, bytes);
-        if self.flaw(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
+        if self.defect(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
     }
 
     /// Writes a file in pieces unless it exists with the same content.
@@ -182,7 +182,7 @@ impl Folder {
     ) -> Result<FileRecord, Error> {
         let mut pending = self.filled(name, fill)?;
         let record = pending.seal()?;
-        if self.flaw(&record, Check::Hashes)?.is_some() {
+        if self.defect(&record, Check::Hashes)?.is_some() {
             pending.rename()?;
         }
         Ok(record)
@@ -214,7 +214,7 @@ impl Folder {
     }
 
     /// Compares a file with its record and returns the difference.
-    pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
+    pub(crate) fn defect(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
         let missing = || Ok(Some("missing".to_owned()));
         if self.remote.is_some() {
             match self.size(&record.path)? {
@@ -243,13 +243,13 @@ impl Folder {
     }
 
     /// Returns the path of the first file that differs from its record, and the difference.
-    pub(crate) fn first_flaw<'f>(
+    pub(crate) fn first_defect<'f>(
         &self,
         files: &'f [FileRecord],
         check: Check,
     ) -> Result<Option<(&'f str, String)>, Error> {
         for file in files {
-            if let Some(message) = self.flaw(file, check)? {
+            if let Some(message) = self.defect(file, check)? {
                 return Ok(Some((&file.path, message)));
             }
         }

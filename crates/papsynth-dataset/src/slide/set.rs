@@ -164,7 +164,7 @@ impl SlideSet {
 
     pub(super) fn recorded(&self, name: &str, check: Check) -> Result<Option<SlideRecord>, Error> {
         let Some(record) = self.record(name)? else { return Ok(None) };
-        Ok(self.folder.first_flaw(&record.files, check)?.is_none().then_some(record))
+        Ok(self.folder.first_defect(&record.files, check)?.is_none().then_some(record))
     }
 
     /// Returns a record if it exists and belongs to this slide.

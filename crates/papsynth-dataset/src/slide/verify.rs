@@ -35,8 +35,8 @@ impl SlideSet {
             findings.push(Finding::damaged(name, message));
         }
         for (done, file) in (1..).zip(&files) {
-            let flaw = self.folder.flaw(file, Check::Hashes)?;
-            findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+            let defect = self.folder.defect(file, Check::Hashes)?;
+            findings.extend(defect.map(|message| Finding::damaged(&file.path, message)));
             report(VerifyProgress { done, total: files.len() as u64 });
         }
         let mut known = self.names_of(&files);

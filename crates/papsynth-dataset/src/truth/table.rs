@@ -164,7 +164,9 @@ const MORE: [Named; 4] = [
     (Head::new("image_width_px", Kind::Whole), |row| Cell::Whole(row.size[0] as u64)),
     (Head::new("image_height_px", Kind::Whole), |row| Cell::Whole(row.size[1] as u64)),
     (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.amodal, row.size[0], row.size[1]))),
-    (Head::new("visible_rle", Kind::Text), |row| Cell::text(rle::encode(&row.object.visible, row.size[0], row.size[1]))),
+    (Head::new("visible_rle", Kind::Text), |row| {
+        Cell::text(rle::encode(&row.object.visible, row.size[0], row.size[1]))
+    }),
 ];
 
 pub(crate) fn typed_columns() -> Vec<Named> {

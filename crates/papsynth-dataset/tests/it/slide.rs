@@ -97,7 +97,10 @@ fn tasks_generate_the_same_slide_and_missing_shards_are_refused() {
     let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
     let refused = refused.to_string();
-    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there and 256 here)"), "{refused}");
+    assert!(
+        refused.contains("another recipe (`scan.frame_px` is 512 in the existing recipe and 256 in the given one)"),
+        "{refused}"
+    );
 }
 
 #[test]

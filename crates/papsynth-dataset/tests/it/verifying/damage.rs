@@ -326,6 +326,7 @@ fn inputs_that_were_changed_after_generation_are_refused() {
         let refused = dataset.check_inputs().unwrap_err();
         let (is_io, refused) = (refused.is_io(), refused.to_string());
         assert!(!is_io && refused.contains(name) && refused.contains("changed after generation"), "{refused}");
+        assert_eq!(dataset.finish().unwrap_err().to_string(), refused);
         fs::write(scratch.join(name), good).unwrap();
     }
 }
