@@ -1,10 +1,10 @@
-//! Any bytes as a class file, beside the classes that ship.
+//! Parses bytes as a class file.
 
 use std::sync::LazyLock;
 
 use papsynth::model::Model;
 
-/// A model with classes that were read is sound, has those that ship, and reads back as written.
+/// Checks that a model with the classes is valid, has the built-in classes, and is read back after writing.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
     let Ok(text) = std::str::from_utf8(bytes) else {

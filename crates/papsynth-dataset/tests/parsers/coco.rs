@@ -1,8 +1,8 @@
-//! Any bytes as the COCO document of a shard.
+//! Parses bytes as the COCO document of a shard.
 
 use papsynth_dataset::truths;
 
-/// Masks that are read lie in their image.
+/// Checks that masks are within their image.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(truths) = truths(bytes) else {
         return;

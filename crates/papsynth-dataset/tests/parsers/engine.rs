@@ -1,4 +1,4 @@
-//! Any bytes as a recipe to make an engine of.
+//! Parses bytes as a recipe and creates an engine.
 
 use std::sync::LazyLock;
 
@@ -7,7 +7,7 @@ use papsynth::{Engine, Inputs};
 
 use super::sound;
 
-/// A sound recipe makes an engine or says why not. It takes milliseconds, a hundred times as long as to read it.
+/// Checks that a valid recipe gives an engine or an error. This takes milliseconds, a hundred times longer than parsing.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
     let Some(recipe) = sound::recipe(bytes) else { return };

@@ -1,8 +1,8 @@
-//! Any bytes as a table of outlines.
+//! Parses bytes as a table of outlines.
 
 use papsynth_dataset::read::outlines;
 
-/// Outlines that are read have an inside, and finite points.
+/// Checks that outlines have at least three finite points.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(outlines) = outlines(bytes) else {
         return;

@@ -1,8 +1,8 @@
-//! Any bytes as the counts of a mask, behind two bytes for the sides of its image.
+//! Parses bytes as the counts of a mask, after two bytes for the image size.
 
 use papsynth_dataset::rle;
 
-/// A mask that is read lies in its image and reads back as written.
+/// Checks that a mask is within its image and is read back after writing.
 pub(crate) fn check(bytes: &[u8]) {
     let [width, height, counts @ ..] = bytes else { return };
     let (width, height) = (usize::from(*width), usize::from(*height));

@@ -1,8 +1,8 @@
-//! Any bytes as an image of one or several planes, grey or in colour.
+//! Parses bytes as a grey or colour image, and as a stack.
 
 use papsynth_dataset::read::{LevelImage, Limits, Stack};
 
-/// An image that is read is whole and within the limits, and so is every plane of a stack.
+/// Checks that an image and the planes of a stack are complete.
 pub(crate) fn check(bytes: &[u8]) {
     let limits = Limits { max_side_px: 2048, max_pixels: 1 << 18, ..Limits::default() };
     if let Ok(image) = LevelImage::decode(bytes, &limits) {

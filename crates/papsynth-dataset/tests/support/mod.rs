@@ -1,4 +1,4 @@
-//! Small frames made by hand, and folders that vanish.
+//! Small synthetic frames, and temporary folders.
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 #![allow(dead_code, reason = "each test uses its part")]
 
@@ -18,13 +18,13 @@ pub(crate) const WIDTH: usize = 70;
 pub(crate) const HEIGHT: usize = 50;
 pub(crate) const SEED: u64 = 11;
 
-/// A folder of this test alone, removed at its end.
+/// A folder of one test, removed at its end.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
         let path = |n: u32| std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}-{n}", std::process::id()));
-        // Tests that run beside each other may use the same name.
+        // Concurrent tests may use the same name.
         Self((0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap())
     }
 
@@ -43,7 +43,7 @@ impl Drop for Scratch {
     }
 }
 
-/// Every file below a folder with its content, by its path from there.
+/// Returns all files in a folder and its subfolders: relative path and content.
 pub(crate) fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     collect(folder, "", &mut found);
@@ -66,7 +66,7 @@ fn collect(folder: &Path, prefix: &str, found: &mut Vec<(String, Vec<u8>)>) {
     }
 }
 
-/// A recipe whose classes the frames use.
+/// A recipe with the classes of the frames.
 pub(crate) fn recipe() -> Recipe {
     Recipe::default()
 }
@@ -153,12 +153,12 @@ fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &
     }
 }
 
-/// Two cells of which one overlaps the other, and two things that are no cell. `first_id` is that of the first cell.
+/// A frame with two overlapping cells and two other objects. `first_id` is the id of the first cell.
 pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Frame {
     frame_of(scene(index, planes, bits), first_id)
 }
 
-/// The same in colour.
+/// The same frame in colour.
 pub(crate) fn colour_frame(index: u64, planes: usize, bits: u32) -> Frame {
     let light =
         SceneLight::Colour { lamp_k: 3200.0, mixing: Mixing::Spectral, chromatic_um: 0.3, rendition: Rendition::Srgb };
@@ -208,7 +208,7 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
                 (v + noise * 0.05 * f32::from(white)).clamp(0.0, f32::from(white)) as u16
             });
             let (grey, stage_um) = (grey.collect(), scene.planes_um[z]);
-            // As many saturated pixels as the number of the plane.
+            // Plane z has z saturated pixels.
             let run = Run { y: 0, x0: 3, x1: 3 + z as u32 };
             let saturated = Mask::from_runs(if z > 0 { vec![run] } else { Vec::new() });
             Plane { index: z, stage_um, channels, grey, noise_free, saturated, floored: 0 }
