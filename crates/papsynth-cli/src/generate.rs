@@ -8,7 +8,7 @@ use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
 use papsynth_dataset::memory::{Fit, Need};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Home, Layout, Progress as Step, Run, Share};
+use papsynth_dataset::{Dataset, Error, Format, FrameSummary, Home, Layout, Progress as Step, Run, Share};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -68,13 +68,26 @@ pub(crate) fn run(args: &Generate) -> Result<(), Failure> {
     // What is whole is left alone, which a disk that cannot be written allows too.
     // What others are still making is merged by whoever comes last.
     if share == Share::ALL && (outcome.made > 0 || args.verify || !dataset.is_finished()?) {
-        dataset.finish().map_err(|error| damaged(&error))?;
+        let summary = dataset.finish().map_err(|error| damaged(&error))?;
+        if !args.quiet && [Format::YoloSeg, Format::Huggingface].into_iter().any(|format| layout.has(format)) {
+            note_empty_splits(&summary.empty_splits);
+        }
     }
     progress.done(&outcome, share)?;
     match account {
         Some(account) if args.json => report::event(&account.event(setup.threads)),
         Some(account) => exit::print(&account.table(setup.threads)),
         None => Ok(()),
+    }
+}
+
+/// Prints which splits by slide have no frames.
+fn note_empty_splits(empty: &[String]) {
+    if !empty.is_empty() {
+        exit::note(format!(
+            "no slide is in the split {}; for splits by slide, generate more frames or set slide.fields_per_slide = 1",
+            empty.join(" and ")
+        ));
     }
 }
 
