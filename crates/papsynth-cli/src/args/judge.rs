@@ -20,7 +20,7 @@ Examples:
   papsynth judge slides fields --pixel-um 0.33 --group N --out report      negative fields alone
   papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
 
-REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG, JPEG or TIFF images
 (16 bits are fine, of colours green is looked at), where what is known may lie beside them:
   NAME.csv     points in the nuclei of NAME.png, one `y,x` a line
   masks/       masks or label images of nuclei, of the same names

@@ -19,7 +19,7 @@ Examples:
       --base mine.json --numbers-only --out mine.json
   papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 --out mine.json
 
-Images are PNG or TIFF in grey; a mask or label image is 0 outside. An outline file is CSV with the columns
+Images are grey PNG, JPEG or TIFF; a mask or label image is 0 outside. An outline file is CSV with the columns
 outline, k, x_px, y_px: name of the outline, number of its point from 0, and its place in pixels.")]
 pub(crate) struct Learn {
     /// Class that is learned: new, or one of the base model's to learn anew

@@ -21,7 +21,7 @@ Examples:
   papsynth study real fields --pixel-um 0.33                     synthetic pixels are made as large
   papsynth study --results results                               all subjects, as the paper's Table 1
 
-REAL and SYNTHETIC are folders of PNG or TIFF images, data sets of papsynth, or folders of several
+REAL and SYNTHETIC are folders of PNG, JPEG or TIFF images, data sets of papsynth, or folders of several
 such data sets, of varied settings; answers are then broken down by what the recipes differ in, and
 by defocus, stain and density. Of images in colour green is shown, of stacks the middle plane.
 

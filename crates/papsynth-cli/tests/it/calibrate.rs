@@ -398,7 +398,7 @@ fn stacks_and_edges_that_cannot_be_measured_are_refused() {
     refused(&bench, "--edge even.tif", &["no straight edge was found", "--line"]);
     refused(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
-    refused(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
+    refused(&bench, "--edge text.tif", &["text.tif: is not a PNG, JPEG or TIFF"]);
 }
 
 #[test]

@@ -163,7 +163,7 @@ fn what_cannot_be_judged_is_named_and_nothing_is_written() {
     bench.good(&format!("generate --out damaged --frames 2 {FIELD} {CELLS}"));
     fs::write(bench.path("damaged/images/000001.png"), "x").unwrap();
     for (words, wanted) in [
-        ("judge good empty --pixel-um 0.3", "empty: holds no PNG or TIFF file"),
+        ("judge good empty --pixel-um 0.3", "empty: the folder has no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder says how large its pixels are"),
         ("judge few good --pixel-um 0.3", "few: there is 1 field; at least 2 are needed"),
