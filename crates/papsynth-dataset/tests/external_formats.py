@@ -235,8 +235,8 @@ def check_ome(path, frame, planes, channels):
         equal(f"physical size {key} of {path}", getattr(typed, f"physical_size_{key}"), frame.summary["pixel_um"])
         equal(f"unit of {key} of {path}", getattr(typed, f"physical_size_{key}_unit").value, "µm")
     equal(f"samples of {path}", sum(channel.samples_per_pixel for channel in typed.channels), channels)
-    wanted = ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
-    equal(f"axes of {path}", axes, wanted)
+    expected_axes = ("Z" if planes > 1 else "") + ("C" if channels > 1 and not colour else "") + "YX" + ("S" if colour else "")
+    equal(f"axes of {path}", axes, expected_axes)
     return pixels, typed
 
 

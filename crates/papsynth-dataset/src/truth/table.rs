@@ -198,7 +198,7 @@ const OF_SLIDE: &str = "id,part,kind,class,bethesda,traits,cluster,centre_x_um,c
 #[cfg(feature = "zarr")]
 pub(crate) fn slide_columns() -> Vec<Named> {
     let mask: Named = (Head::new("rle", Kind::Text), |row| Cell::text(rle::encode_in_box(&row.object.amodal)));
-    let known = OF_SLIDE.split(',').filter_map(|wanted| COLUMNS.into_iter().find(|(head, _)| head.name == wanted));
+    let known = OF_SLIDE.split(',').filter_map(|name| COLUMNS.into_iter().find(|(head, _)| head.name == name));
     known.chain([mask]).collect()
 }
 
