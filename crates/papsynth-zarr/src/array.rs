@@ -42,8 +42,8 @@ impl Block {
 
 /// One level of a [`Pyramid`](crate::Pyramid): a Zarr 3 array in shards. Each shard is a file.
 ///
-/// A chunk, the unit of compression, is a square of one channel and plane. A shard has the chunks of a square of all channels and of some
-/// planes. Its file ends with an index and the checksum of the index.
+/// A chunk, the unit of compression, is a square of one channel and plane. A shard has the chunks of a square of all
+/// channels and of some planes. Its file ends with an index and the checksum of the index.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Array {
     pub(crate) kind: DataType,
@@ -84,8 +84,8 @@ impl Array {
         self.shard
     }
 
-    /// Returns all shards, plane by plane in row-major order. All of their files must exist, because readers treat a missing file as
-    /// zeros.
+    /// Returns all shards, plane by plane in row-major order. All of their files must exist, because readers treat a
+    /// missing file as zeros.
     pub fn shards(&self) -> impl Iterator<Item = Shard> + use<> {
         let [_, planes, rows, columns] = self.shape;
         let [z, y, x] = [planes.div_ceil(self.shard_planes), rows.div_ceil(self.shard), columns.div_ceil(self.shard)];

@@ -53,7 +53,8 @@ pub struct Image {
     pub attributes: Map<String, Value>,
 }
 
-/// A label image: the object of each pixel; 0 is background. Pixels and levels have the coordinates of those of the image.
+/// A label image: the object of each pixel; 0 is background. Pixels and levels have the coordinates of those of the
+/// image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Labels {
     /// Name of letters, digits, `-`, `_` and dots. The first character is not a dot.
@@ -98,12 +99,12 @@ impl Labels {
 }
 
 impl Image {
-    /// Returns all `zarr.json` of the group: the path in the folder of the group, and the content. With the shards of all arrays they are
-    /// the complete image.
+    /// Returns all `zarr.json` of the group: the path in the folder of the group, and the content. With the shards of
+    /// all arrays they are the complete image.
     ///
     /// # Errors
-    /// If the number of channels is wrong, a label image differs from the image in size or number of levels or is not of integers, a name
-    /// is invalid or used twice, the pixel size is not above 0 µm, or the step is 0.
+    /// If the number of channels is wrong, a label image differs from the image in size or number of levels or is not
+    /// of integers, a name is invalid or used twice, the pixel size is not above 0 µm, or the step is 0.
     pub fn documents(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
         self.check()?;
         let mut attributes = self.attributes.clone();
@@ -208,7 +209,8 @@ fn arrays<'a>(folder: &'a str, pyramid: &'a Pyramid) -> impl Iterator<Item = (St
     numbered.map(move |(number, array)| (format!("{folder}{number}/zarr.json"), array.document()))
 }
 
-/// Returns the axes and the coordinates of each level. The centre of a pixel is that of the full-size pixels that it covers.
+/// Returns the axes and the coordinates of each level. The centre of a pixel is that of the full-size pixels that it
+/// covers.
 fn multiscales(name: &str, pyramid: &Pyramid, coordinates: &Coordinates, how: &str) -> Value {
     let full = &pyramid.levels()[0];
     let micrometre = |name: &str| json!({ "name": name, "type": "space", "unit": "micrometer" });

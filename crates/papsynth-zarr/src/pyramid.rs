@@ -79,9 +79,10 @@ pub fn levels_until(side: usize, width: usize, height: usize) -> usize {
 
 /// An image at several sizes. Each is half of the previous one, rounded up.
 ///
-/// The shards of the first [`with_shard`](Self::with_shard) levels cover the same regions: their width is halved from level to level, down to
-/// one chunk. The process that writes a shard of the image also writes the files of these levels, from this shard alone, and no two
-/// processes write the same file. In the levels above, shards have the full width. They are written later, each from four shards below.
+/// The shards of the first [`with_shard`](Self::with_shard) levels cover the same regions: their width is halved from
+/// level to level, down to one chunk. The process that writes a shard of the image also writes the files of these
+/// levels, from this shard alone, and no two processes write the same file. In the levels above, shards have the full
+/// width. They are written later, each from four shards below.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pyramid {
     levels: Vec<Array>,

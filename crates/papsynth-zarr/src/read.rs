@@ -18,8 +18,8 @@ const CHECKSUM: usize = 4;
 
 /// Reads regions of a shard that [`ShardEncoder`](crate::ShardEncoder) wrote.
 ///
-/// Memory is limited by the sizes of the array, for any file: the index, one chunk, and the region. Any change of the file is an
-/// [`Error::Damaged`]: the index and each chunk have a checksum, and all chunks must exist.
+/// Memory is limited by the sizes of the array, for any file: the index, one chunk, and the region. Any change of the
+/// file is an [`Error::Damaged`]: the index and each chunk have a checksum, and all chunks must exist.
 #[derive(Debug)]
 pub struct ShardReader<R> {
     array: Array,
@@ -91,11 +91,13 @@ impl<R: Read + Seek> ShardReader<R> {
         &self.block
     }
 
-    /// Reads rows and columns of one channel of one plane, in row-major order. All indices are those of the array and must be in the
-    /// [`Block`]. All chunks of the region are decompressed, so regions along chunk borders are the fastest.
+    /// Reads rows and columns of one channel of one plane, in row-major order. All indices are those of the array and
+    /// must be in the [`Block`]. All chunks of the region are decompressed, so regions along chunk borders are the
+    /// fastest.
     ///
     /// # Errors
-    /// If the region is not in the shard, `T` differs from the data type of the array, or the file is damaged or cannot be read.
+    /// If the region is not in the shard, `T` differs from the data type of the array, or the file is damaged or cannot
+    /// be read.
     pub fn region<T: Sample>(
         &mut self,
         channel: usize,

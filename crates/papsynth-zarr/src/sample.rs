@@ -90,8 +90,9 @@ fn mean(of: [u64; 4]) -> u64 {
 
 /// Halves an image: each pixel is the mean of 2 x 2 pixels ([`Sample::mean`]).
 ///
-/// `values` are rows of `width` values; the result has `width.div_ceil(2)` columns. An odd last row or column is repeated, so a pixel at
-/// the border is the rounded mean of the pixels that exist. Blocks with even start rows and columns can be halved independently.
+/// `values` are rows of `width` values; the result has `width.div_ceil(2)` columns. An odd last row or column is
+/// repeated, so a pixel at the border is the rounded mean of the pixels that exist. Blocks with even start rows and
+/// columns can be halved independently.
 #[must_use]
 pub fn halved<T: Sample>(values: &[T], width: usize) -> Vec<T> {
     by_fours(values, width, T::mean)

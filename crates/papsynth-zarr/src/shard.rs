@@ -10,7 +10,8 @@ use crate::sample::Sample;
 /// Index entry of a missing chunk.
 pub(crate) const ABSENT: [u64; 2] = [u64::MAX; 2];
 
-/// Encodes a shard plane by plane. The caller appends the returned bytes to the file, the index last. Equal values give equal bytes.
+/// Encodes a shard plane by plane. The caller appends the returned bytes to the file, the index last. Equal values give
+/// equal bytes.
 ///
 /// All chunks are written, also those of zeros, so a missing chunk or file is damage.
 #[derive(Debug)]
@@ -38,12 +39,12 @@ impl ShardEncoder {
         &self.block
     }
 
-    /// Encodes one channel of one plane (indices of the array). `values` are those of the [`Block`] in row-major order. Planes may come in
-    /// any order, each once.
+    /// Encodes one channel of one plane (indices of the array). `values` are those of the [`Block`] in row-major order.
+    /// Planes may come in any order, each once.
     ///
     /// # Errors
-    /// If the plane is not in the shard or was encoded before, `T` differs from the data type of the array, the number of values differs
-    /// from the number of pixels, or the compressor has no memory.
+    /// If the plane is not in the shard or was encoded before, `T` differs from the data type of the array, the number
+    /// of values differs from the number of pixels, or the compressor has no memory.
     pub fn plane<T: Sample>(&mut self, channel: usize, plane: usize, values: &[T]) -> Result<Vec<u8>, Error> {
         let (array, block) = (&self.array, &self.block);
         if T::KIND != array.kind {
@@ -110,8 +111,8 @@ impl ShardEncoder {
 /// Encodes a complete shard. `values` are those of its [`Block`]: channel by channel, plane by plane, row by row.
 ///
 /// # Errors
-/// If the shard is outside the array, `T` differs from the data type of the array, the number of values is wrong, or the compressor has no
-/// memory.
+/// If the shard is outside the array, `T` differs from the data type of the array, the number of values is wrong, or
+/// the compressor has no memory.
 pub fn shard_bytes<T: Sample>(array: &Array, shard: Shard, values: &[T]) -> Result<Vec<u8>, Error> {
     let mut encoder = ShardEncoder::new(array, shard)?;
     let Block { planes, .. } = encoder.block.clone();

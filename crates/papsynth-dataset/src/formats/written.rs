@@ -21,7 +21,8 @@ pub(crate) const LIMITS: Limits = Limits {
     allow_lossy: false,
 };
 
-/// Returns the levels of a page with the channels of the frame. A colour image in which all pixels are grey is read as grey.
+/// Returns the levels of a page with the channels of the frame. A colour image in which all pixels are grey is read as
+/// grey.
 pub(crate) fn levels(page: LevelImage, channels: usize) -> Vec<u16> {
     match channels / page.channels.max(1) {
         3 => page.levels.iter().flat_map(|&level| [level; 3]).collect(),

@@ -40,8 +40,9 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Problem> {
     Ok(Raster { width, channels, samples: Samples::U8(samples) })
 }
 
-/// Checks whether JPEG is allowed, and the size in every frame header of a JPEG stream, because the decoder allocates by it. Inside entropy-coded data the byte 0xFF
-/// is always followed by 0, so a match is a header, at the top or of a thumbnail.
+/// Checks whether JPEG is allowed, and the size in every frame header of a JPEG stream, because the decoder allocates
+/// by it. Inside entropy-coded data the byte 0xFF is always followed by 0, so a match is a header, at the top or of a
+/// thumbnail.
 pub(super) fn check_frames(bytes: &[u8], limits: &Limits) -> Result<(), Problem> {
     if !limits.allow_lossy {
         return Err(Problem::samples("lossy JPEG compression", "PNG or lossless TIFF files"));

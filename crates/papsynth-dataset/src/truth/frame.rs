@@ -37,8 +37,8 @@ pub struct FrameSummary {
     pub planes_um: Vec<f64>,
     /// Number of saturated pixels of each plane.
     pub saturated_px: Vec<usize>,
-    /// Number of pixels of each plane that the model of the optics made too dark, next to very dark objects, and that were set to the
-    /// least light.
+    /// Number of pixels of each plane that the model of the optics made too dark, next to very dark objects, and that
+    /// were set to the least light.
     pub clipped_px: Vec<usize>,
     /// Number of objects and parts of cells by category, as `coco.json` names it.
     pub objects: BTreeMap<String, u64>,

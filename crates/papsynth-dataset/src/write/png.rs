@@ -4,7 +4,8 @@ use std::io;
 
 use png::{BitDepth, ColorType, Compression, Encoder, Filter, PixelDimensions, Unit};
 
-/// Encodes a grey or colour image with 8 bits, or 16 if `bits` is above 8. `pixel_um` is written as physical size (`pHYs`).
+/// Encodes a grey or colour image with 8 bits, or 16 if `bits` is above 8. `pixel_um` is written as physical size
+/// (`pHYs`).
 pub(crate) fn png(levels: &[u16], width: usize, channels: usize, bits: u32, pixel_um: f64) -> io::Result<Vec<u8>> {
     let (bytes, depth): (Vec<u8>, _) = if bits <= 8 {
         #[expect(clippy::cast_possible_truncation, reason = "grey levels of 8 bits")]

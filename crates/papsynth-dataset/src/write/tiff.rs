@@ -1,4 +1,5 @@
-//! TIFF: uncompressed pages, compressed images, and pyramids of large pages in tiles, for viewers that read only the visible part.
+//! TIFF: uncompressed pages, compressed images, and pyramids of large pages in tiles, for viewers that read only the
+//! visible part.
 
 use std::borrow::Cow;
 use std::io::{self, Cursor, Seek, Write};
@@ -84,7 +85,8 @@ fn resolution<W: Out, K: TiffKind>(directory: &mut DirectoryEncoder<W, K>, pixel
     directory.write_tag(Tag::YResolution, Rational { n, d: 1000 })
 }
 
-/// Largest size of the pages of a classic TIFF; larger ones need BigTIFF. Offsets are below 2³², and directories need some space.
+/// Largest size of the pages of a classic TIFF; larger ones need BigTIFF. Offsets are below 2³², and directories need
+/// some space.
 const CLASSIC_BYTES: u64 = 0xFF00_0000;
 
 /// Writes uncompressed pages one after the other. Noisy images hardly compress, and this takes a tenth of the time.
@@ -170,7 +172,8 @@ pub(crate) fn fits_16_bits(ids: &[u32]) -> bool {
     ids.iter().all(|&id| id <= u16::MAX.into())
 }
 
-/// Encodes compressed pages of integers, without the horizontal predictor, which ImageJ ignores. The first page has the description.
+/// Encodes compressed pages of integers, without the horizontal predictor, which ImageJ ignores. The first page has the
+/// description.
 pub(crate) fn compressed(pages: &[Pixels], page: &Page) -> io::Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
     let mut write = || -> TiffResult<()> {

@@ -34,7 +34,8 @@ mod sound;
 #[path = "../parsers/stack.rs"]
 mod stack;
 
-/// Runs the check of a target on every input, complete and truncated at three lengths, and on `PAPSYNTH_FUZZ` randomly changed inputs.
+/// Runs the check of a target on every input, complete and truncated at three lengths, and on `PAPSYNTH_FUZZ` randomly
+/// changed inputs.
 fn replay(target: &str, check: fn(&[u8])) {
     replay_part(target, 1, check);
 }
@@ -81,7 +82,8 @@ impl Numbers {
         usize::try_from((self.0 >> 33) % u64::try_from(end.max(1)).unwrap()).unwrap()
     }
 
-    /// Returns an input with a few changes: bytes, numbers as text, and parts that are moved, repeated, removed or taken from another input.
+    /// Returns an input with a few changes: bytes, numbers as text, and parts that are moved, repeated, removed or
+    /// taken from another input.
     fn mutant(&mut self, inputs: &[Vec<u8>]) -> Vec<u8> {
         const WORDS: [&[u8]; 16] = [
             b"0",

@@ -7,7 +7,8 @@ use papsynth::{Engine, Inputs};
 
 use super::sound;
 
-/// Checks that a valid recipe gives an engine or an error. This takes milliseconds, a hundred times longer than parsing.
+/// Checks that a valid recipe gives an engine or an error. This takes milliseconds, a hundred times longer than
+/// parsing.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
     let Some(recipe) = sound::recipe(bytes) else { return };

@@ -4,7 +4,8 @@ use std::path::{Component, Path};
 
 use papsynth_dataset::{Manifest, ShardRecord};
 
-/// Checks that a record has only files inside the data set and is read back after writing, and that a manifest can be written.
+/// Checks that a record has only files inside the data set and is read back after writing, and that a manifest can be
+/// written.
 pub(crate) fn check(bytes: &[u8]) {
     if let Ok(record) = ShardRecord::from_json(bytes) {
         let inside = |path: &str| Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));

@@ -1,5 +1,6 @@
-//! Replaces one of the files of a shard: table, COCO, GeoJSON, outlines, image, label image, tar file. The first byte selects the file.
-//! From 128 on, the other bytes are the new content; below, they are changes to the original file, of four bytes each.
+//! Replaces one of the files of a shard: table, COCO, GeoJSON, outlines, image, label image, tar file. The first byte
+//! selects the file. From 128 on, the other bytes are the new content; below, they are changes to the original file, of
+//! four bytes each.
 
 use std::fs;
 use std::sync::LazyLock;
