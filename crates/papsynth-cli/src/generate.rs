@@ -8,7 +8,7 @@ use papsynth::Threads;
 use papsynth::key::Key;
 use papsynth::profile::{Profile, Stage};
 use papsynth_dataset::memory::{MemoryEstimate, MemoryPlan};
-use papsynth_dataset::{Dataset, Error, FrameSummary, Layout, Location, Progress as Step, Run, Task};
+use papsynth_dataset::{Dataset, Error, Format, FrameSummary, Layout, Location, Progress as Step, Run, Task};
 use serde_json::json;
 
 use crate::args::{Generate, LayoutArgs, check_of};
@@ -70,13 +70,26 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     // A complete data set is not written again, so that it may lie on a read-only disk.
     // `papsynth merge` finishes the data set of several tasks.
     if task == Task::ALL && (outcome.written > 0 || args.verify || !dataset.is_finished()?) {
-        dataset.finish().map_err(|error| damaged(&error))?;
+        let summary = dataset.finish().map_err(|error| damaged(&error))?;
+        if !args.quiet && [Format::YoloSeg, Format::Huggingface].into_iter().any(|format| layout.has(format)) {
+            note_empty_splits(&summary.empty_splits);
+        }
     }
     progress.done(&outcome, task, end)?;
     match timing {
         Some(timing) if args.json => report::event(&timing.event(setup.threads)),
         Some(timing) => exit::print(&timing.table(setup.threads)),
         None => Ok(()),
+    }
+}
+
+/// Prints which splits by slide have no frames.
+fn note_empty_splits(empty: &[String]) {
+    if !empty.is_empty() {
+        exit::note(format!(
+            "no slide is in the split {}; for splits by slide, generate more frames or set slide.fields_per_slide = 1",
+            empty.join(" and ")
+        ));
     }
 }
 

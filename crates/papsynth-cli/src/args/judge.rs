@@ -21,8 +21,8 @@ Examples:
   papsynth judge slides fields --pixel-um 0.33 --group N --out report      only negative fields
   papsynth judge slides other-slides --pixel-um 0.33 --synthetic-pixel-um 0.25 --out report
 
-REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG or TIFF images of
-8 or 16 bits; of colour images the green channel is used. A folder may also hold:
+REAL and SYNTHETIC are each a data set of `papsynth generate`, or a folder of PNG, JPEG or TIFF images
+of 8 or 16 bits; of colour images the green channel is used. A folder may also hold:
   NAME.csv     points in the nuclei of NAME.png, one `y,x` per line
   masks/       masks or label images of nuclei, with the names of the images
   frames.csv   the group of each image, with the columns `frame,grade`

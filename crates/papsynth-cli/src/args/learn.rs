@@ -19,7 +19,7 @@ Examples:
       --base mine.json --numbers-only --out mine.json
   papsynth learn --class parabasal --like intermediate --labels fields --pixel-um 0.33 --out mine.json
 
-Images are grey PNG or TIFF files; masks and label images are 0 outside the objects. An outline file is
+Images are grey PNG, JPEG or TIFF files; masks and label images are 0 outside the objects. An outline file is
 a CSV file with the columns outline, k, x_px, y_px: name of the outline, index of the point from 0, and
 its position in pixels.")]
 pub(crate) struct Learn {

@@ -22,7 +22,7 @@ Examples:
   papsynth study real fields --pixel-um 0.33                     resample to equal pixel sizes
   papsynth study --results results                               results of all subjects, as Table 1 of the paper
 
-REAL and SYNTHETIC are folders of PNG or TIFF images, data sets of papsynth, or folders of several
+REAL and SYNTHETIC are folders of PNG, JPEG or TIFF images, data sets of papsynth, or folders of several
 data sets with different settings; results are then also listed by the settings that differ, and by
 defocus, stain and density. Of colour images the green channel is shown, of stacks the centre plane.
 

@@ -399,7 +399,7 @@ fn invalid_stacks_and_edges_are_rejected() {
     rejected(&bench, "--edge even.tif", &["no straight edge found", "--line"]);
     rejected(&bench, "--edge even.tif --line 50,50,80,50", &["holds no edge"]);
     fs::write(bench.path("text.tif"), "no image").unwrap();
-    rejected(&bench, "--edge text.tif", &["text.tif: is neither a PNG nor a TIFF"]);
+    rejected(&bench, "--edge text.tif", &["text.tif: is not a PNG, JPEG or TIFF"]);
 }
 
 #[test]

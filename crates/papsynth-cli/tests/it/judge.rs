@@ -165,7 +165,7 @@ fn invalid_input_of_a_judge_is_rejected_and_no_file_is_written() {
     bench.good(&format!("generate --out damaged --frames 2 {FIELD} {CELLS}"));
     fs::write(bench.path("damaged/images/000001.png"), "x").unwrap();
     for (words, wanted) in [
-        ("judge good empty --pixel-um 0.3", "empty: holds no PNG or TIFF file"),
+        ("judge good empty --pixel-um 0.3", "empty: the folder has no PNG, JPEG or TIFF file"),
         ("judge good missing --pixel-um 0.3", "missing: there is no such folder"),
         ("judge good good", "neither folder records its pixel size"),
         ("judge few good --pixel-um 0.3", "few: 1 field; at least 2 are needed"),

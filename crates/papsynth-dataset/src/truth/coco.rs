@@ -276,8 +276,8 @@ impl Document {
     }
 }
 
-/// Reads the ground truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the index of the
-/// frame, in the order of the images.
+/// Reads the ground truth of every frame of a COCO document of a data set (`shards/*.coco.json`, `coco.json`), with the
+/// index of the frame, in the order of the images.
 ///
 /// # Errors
 /// If the document is invalid, or boxes or areas differ from the masks.
