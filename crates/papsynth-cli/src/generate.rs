@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Generate) -> Result<(), ExitError> {
     let progress = Progress::start(args, frames_of(task, &frames, layout.frames_per_shard), working, fit.bytes)?;
     let check = check_of(args.verify);
     let end = frames.end;
-    let run = Run { frames, task, workers: at_once, threads, check, stop, profile: profile.as_deref() };
+    let run = Run { frames, task, workers, threads, check, stop, profile: profile.as_deref() };
     let step = |step: Step| {
         timing.iter().for_each(|timing| timing.step(step));
         progress.step(step);

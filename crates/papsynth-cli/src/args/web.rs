@@ -47,8 +47,8 @@ pub(crate) struct Study {
     #[arg(long, value_name = "NAME", default_value_t = StudyParams::default().subject)]
     pub(crate) subject: String,
     /// Design of a trial: one patch, real or not (as in the paper), or two patches, which is real
-    #[arg(long, value_name = "NAME", value_parser = named(Task::ALL, Task::name), default_value = StudyParams::default().task.name())]
-    pub(crate) design: Task,
+    #[arg(long, value_name = "NAME", value_parser = named(TrialDesign::ALL, TrialDesign::name), default_value = StudyParams::default().task.name())]
+    pub(crate) design: TrialDesign,
     /// Number of scored trials
     #[arg(long, value_name = "N", default_value_t = StudyParams::default().trials)]
     pub(crate) trials: usize,
