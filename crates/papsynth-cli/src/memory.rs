@@ -53,8 +53,8 @@ impl Limits {
     }
 }
 
-/// How a run fits into its budget: with at most `workers` frames at the same time. `too_large` is the error for a budget
-/// that is too small for one frame.
+/// How a run fits into its budget: with at most `workers` frames at the same time. `too_large` is the error for a
+/// budget that is too small for one frame.
 pub(crate) fn fit(
     need: &MemoryEstimate,
     threads: usize,
