@@ -60,7 +60,7 @@ pub(crate) fn torture(workspace: &Workspace, numbers: &Torture) -> Result<()> {
         ("papsynth-dataset", "corpus::"),
         ("papsynth-cli", "memory::"),
         ("papsynth", "slide::windows_of_tiles"),
-        ("ccd-noise", "laws::"),
+        ("ccd-noise", "properties::"),
     ] {
         let mut cargo = workspace.cargo();
         cargo.args(["test", "--release", "--package", package, "--test", "it", filter]);

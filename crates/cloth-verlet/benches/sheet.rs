@@ -1,6 +1,6 @@
-//! What does one sheet cost, alone and among sixteen, and its picture?
+//! Time of one sheet, alone and in a batch of sixteen, of folding, and of the thickness image.
 
-use cloth_verlet::{Cloth, ClothParams, Crease, Point, Turn, View};
+use cloth_verlet::{Cloth, ClothParams, Crease, FoldKind, PixelGrid, Point};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -36,16 +36,16 @@ fn crumple(c: &mut Criterion) {
 fn thickness(c: &mut Criterion) {
     let cloth = Cloth::new(&ClothParams::default()).expect("presets are valid");
     let flat = cloth.crumple(&outline(3.0), &mut Xoshiro256PlusPlus::seed_from_u64(1)).expect("an outline");
-    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, turn: Turn::Flap };
+    let crease = Crease { point: [30.0, 10.0], direction_rad: 1.0, radius: 4.0, kind: FoldKind::Flap };
     let mut folded = flat.clone();
     folded.fold(&crease).expect("a crease");
-    let view = View { origin: [-110.0, -110.0], pixel: 1.0 };
+    let grid = PixelGrid { origin: [-110.0, -110.0], pixel_size: 1.0 };
     let mut image = vec![0.0_f32; 220 * 220];
     let mut group = c.benchmark_group("thickness, 220 x 220 pixels");
     group.throughput(Throughput::Elements(220 * 220));
     for (name, sheet) in [("crumpled", &flat), ("folded", &folded)] {
         group.bench_function(name, |b| {
-            b.iter(|| sheet.thickness_into(black_box(&mut image), 220, &view, |r| 1.5 - r * r))
+            b.iter(|| sheet.thickness_into(black_box(&mut image), 220, &grid, |r| 1.5 - r * r))
         });
     }
     group.finish();

@@ -1,7 +1,8 @@
-//! The steps from an outline to a picture: outline, flat mesh, pressed mesh, thickness; then a flap, a rolled rim and both rims rolled
-//! in. Usage: `figure [path]`, default `target/cloth-verlet.png`.
+//! Draws the steps from an outline to an image: outline, flat mesh, crumpled mesh, thickness; then the paper's method,
+//! a flap, a rolled rim, and a sheet folded in from both sides. Usage: `figure [path]`, default
+//! `target/cloth-verlet.png`.
 
-use cloth_verlet::{Cloth, ClothParams, Crease, Point, Sheet, Turn, View};
+use cloth_verlet::{Cloth, ClothParams, Crease, FoldKind, PixelGrid, Point, Sheet};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, Luma};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -11,12 +12,12 @@ use std::error::Error;
 const PANEL: u32 = 244;
 const COLUMNS: u32 = 4;
 const PAPER_WHITE: f32 = 235.0;
-/// Coarser grey levels than 1 nobody sees, and they keep the file small.
+/// Step of the grey levels: invisible, and the file stays small.
 const GREY_STEP: f32 = 3.0;
-/// Absorbance of the flat sheet's middle.
+/// Absorbance at the centre of the flat sheet.
 const ABSORBANCE: f64 = 0.16;
 
-/// A crooked outline about 220 across, around the origin.
+/// An irregular outline, about 220 px across, around the origin.
 const OUTLINE: [Point; 20] = [
     [-98.0, -18.0],
     [-80.0, -60.0],
@@ -53,7 +54,7 @@ struct Figure {
 impl Figure {
     const WIDTH: u32 = PANEL * COLUMNS;
 
-    /// Draws the segment from `a` to `b`, about one pixel wide, around the middle of a panel.
+    /// Draws the segment from `a` to `b`, about one pixel wide, relative to the centre of a panel.
     fn line(&mut self, panel: u32, a: Point, b: Point, ink: f32) {
         let middle = f64::from(PANEL) / 2.0;
         let steps = ((b[0] - a[0]).abs() + (b[1] - a[1]).abs()) * 2.0 + 1.0;
@@ -86,9 +87,12 @@ impl Figure {
     fn thickness(&mut self, panel: u32, sheet: &Sheet) {
         let middle = f64::from(PANEL) / 2.0;
         let mut tile = vec![0.0_f32; (PANEL * PANEL) as usize];
-        sheet.thickness_into(&mut tile, PANEL as usize, &View { origin: [-middle, -middle], pixel: 1.0 }, |r| {
-            1.0 - 0.45 * r * r
-        });
+        sheet.thickness_into(
+            &mut tile,
+            PANEL as usize,
+            &PixelGrid { origin: [-middle, -middle], pixel_size: 1.0 },
+            |r| 1.0 - 0.45 * r * r,
+        );
         let (left, top) = (panel % COLUMNS * PANEL, panel / COLUMNS * PANEL);
         for (row, line) in (top..).zip(tile.chunks_exact(PANEL as usize)) {
             for (column, &t) in (left..).zip(line) {
@@ -116,16 +120,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     for k in 0..OUTLINE.len() {
         figure.line(0, OUTLINE[k], OUTLINE[(k + 1) % OUTLINE.len()], 80.0);
     }
-    figure.mesh(1, &sheet, |v| sheet.rest()[v]);
+    figure.mesh(1, &sheet, |v| sheet.rest_positions()[v]);
     figure.mesh(2, &sheet, |v| [sheet.vertices()[v][0], sheet.vertices()[v][1]]);
     figure.thickness(3, &sheet);
 
     figure.thickness(4, &paper);
-    let flap = Crease { point: [42.0, -20.0], direction_rad: -1.0, radius: 3.0, turn: Turn::Flap };
-    let roll = Crease { point: [0.0, 70.0], direction_rad: 0.15, radius: 2.5, turn: Turn::Roll { turns: 2 } };
+    let flap = Crease { point: [42.0, -20.0], direction_rad: -1.0, radius: 3.0, kind: FoldKind::Flap };
+    let roll = Crease { point: [0.0, 70.0], direction_rad: 0.15, radius: 2.5, kind: FoldKind::Roll { turns: 2 } };
     let sides = [
-        Crease { point: [35.0, 0.0], direction_rad: -1.4, radius: 7.0, turn: Turn::Flap },
-        Crease { point: [-30.0, 0.0], direction_rad: 1.8, radius: 6.0, turn: Turn::Flap },
+        Crease { point: [35.0, 0.0], direction_rad: -1.4, radius: 7.0, kind: FoldKind::Flap },
+        Crease { point: [-30.0, 0.0], direction_rad: 1.8, radius: 6.0, kind: FoldKind::Flap },
     ];
     for (panel, creases) in [(5, &[flap][..]), (6, &[roll]), (7, &sides)] {
         let mut folded = sheet.clone();

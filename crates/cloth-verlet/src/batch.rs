@@ -1,19 +1,20 @@
-//! The state of sheets that are solved side by side, one in each lane, and both solvers.
+//! The state of a batch of sheets, one in each vector lane, and both solvers.
 
-use crate::lanes::{Binding, Curve, Lane, Node, advance, confine, project, single, verlet};
+use crate::lanes::{Constraint, Curve, Lane, Node, advance, confine, project, single, verlet};
 use crate::mesh::{Disc, Pair};
 use crate::outline::{Outline, distance};
-use crate::ring::{Ring, View};
+use crate::ring::{MovingOutline, SearchWindow};
 use crate::{Point, VerletParams, Vertex, XpbdParams};
 
-/// What all sheets of a mesh share: which vertices are bound, and where each may meet the outline.
+/// Data shared by all sheets of a mesh: the constrained pairs of vertices, and the sides of the outline that each
+/// vertex may touch.
 #[derive(Debug)]
 pub(crate) struct Topology {
-    /// Distances within the rim, from the rim inwards, and inside.
+    /// Edges with two, one and no vertex on the rim.
     pub(crate) edges: [Vec<Pair>; 3],
-    /// Distances across edges, likewise.
+    /// Pairs of vertices opposite an edge, sorted likewise.
     pub(crate) bends: [Vec<Pair>; 3],
-    views: Vec<View>,
+    windows: Vec<SearchWindow>,
     pub(crate) rim: usize,
 }
 
@@ -27,21 +28,21 @@ impl Topology {
         Topology {
             edges: sorted(&disc.edges),
             bends: sorted(&disc.bends),
-            views: disc.points.iter().map(|&p| View::from(p, sides)).collect(),
+            windows: disc.points.iter().map(|&p| SearchWindow::from(p, sides)).collect(),
             rim: disc.rim,
         }
     }
 }
 
-/// One sheet before it is pressed, in units of its outline's equivalent radius.
+/// One sheet before it is crumpled, in units of the equivalent radius of its outline.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
-    /// What it is pressed into, and where round that its first rim vertex stands.
+    /// The target outline, and the position of the first rim vertex on it, as a fraction of the perimeter.
     pub(crate) shape: Outline,
     pub(crate) offset: f64,
     pub(crate) rest: Vec<Point>,
     pub(crate) heights: Vec<f64>,
-    /// The outline before and after.
+    /// The outline at the start and at the end.
     pub(crate) outline: [Vec<Point>; 2],
 }
 
@@ -49,9 +50,9 @@ pub(crate) struct Start {
 pub(crate) struct Batch<const L: usize> {
     now: Vec<Node<L>>,
     before: Vec<Node<L>>,
-    ring: Ring<L>,
+    ring: MovingOutline<L>,
     /// The outline at the start and at the end.
-    ways: [Curve<L>; 2],
+    outlines: [Curve<L>; 2],
     /// Rest lengths of [`Topology::edges`] and [`Topology::bends`].
     edges: [Vec<Lane<L>>; 3],
     bends: [Vec<Lane<L>>; 3],
@@ -60,24 +61,24 @@ pub(crate) struct Batch<const L: usize> {
 impl<const L: usize> Batch<L> {
     /// # Panics
     ///
-    /// If `starts` is empty; lanes beyond its length repeat the first.
+    /// If `starts` is empty. Lanes beyond its length repeat the first.
     pub(crate) fn new(topology: &Topology, starts: &[&Start]) -> Self {
         let lanes: [&Start; L] = std::array::from_fn(|l| starts.get(l).copied().unwrap_or(starts[0]));
         let row = |value: &dyn Fn(&Start) -> f64| Lane(lanes.map(|s| single(value(s))));
         let now: Vec<Node<L>> = (0..lanes[0].rest.len())
             .map(|v| [row(&|s| s.rest[v][0]), row(&|s| s.rest[v][1]), row(&|s| s.heights[v])])
             .collect();
-        let ways = [0, 1].map(|way| -> Curve<L> {
-            (0..lanes[0].outline[way].len()).map(|k| [0, 1].map(|axis| row(&|s| s.outline[way][k][axis]))).collect()
+        let outlines = [0, 1].map(|which| -> Curve<L> {
+            (0..lanes[0].outline[which].len()).map(|k| [0, 1].map(|axis| row(&|s| s.outline[which][k][axis]))).collect()
         });
         let lengths = |pairs: &Vec<Pair>| {
             pairs.iter().map(|&[a, b]| row(&|s| distance(s.rest[a as usize], s.rest[b as usize]))).collect()
         };
         Batch {
             before: now.clone(),
-            ring: Ring::new(ways[0].clone(), now.len()),
+            ring: MovingOutline::new(outlines[0].clone(), now.len()),
             now,
-            ways,
+            outlines,
             edges: topology.edges.each_ref().map(lengths),
             bends: topology.bends.each_ref().map(lengths),
         }
@@ -87,13 +88,14 @@ impl<const L: usize> Batch<L> {
         self.now.iter().map(|n| n.map(|lane| f64::from(lane[l]))).collect()
     }
 
-    /// The paper's way: Eq. 4 on every vertex and on the outline, distances restored by projection, a ground plane.
+    /// Runs the paper's method: Eq. 4 on every vertex and on the outline, distances restored by projection, a ground
+    /// plane.
     #[inline(always)]
     pub(crate) fn verlet(&mut self, topology: &Topology, steps: usize, params: &VerletParams) {
         let keep = single(1.0 - params.damping);
         let gravity = single(-params.gravity * params.dt_squared);
         let attraction = single(params.attraction * params.dt_squared);
-        let rigid = Binding { weights: [1.0; 2], gain: 0.5, gives_way: f32::MAX };
+        let rigid = Constraint { weights: [1.0; 2], gain: 0.5, yield_strain: f32::MAX };
         for step in 1..=steps {
             for _ in 0..params.passes {
                 for (pairs, lengths) in topology.edges.iter().zip(&self.edges) {
@@ -101,7 +103,7 @@ impl<const L: usize> Batch<L> {
                 }
             }
             let ring = self.ring.points.iter_mut().zip(&mut self.ring.before);
-            for ((point, before), target) in ring.zip(&self.ways[1]) {
+            for ((point, before), target) in ring.zip(&self.outlines[1]) {
                 for axis in 0..2 {
                     for l in 0..L {
                         let now = point[axis][l];
@@ -111,32 +113,32 @@ impl<const L: usize> Batch<L> {
                 }
             }
             advance(&mut self.now, &mut self.before, keep, gravity);
-            self.ring.press(&mut self.now, &topology.views, 0, step);
+            self.ring.push_inside(&mut self.now, &topology.windows, 0, step);
             confine(&mut self.now, f32::MAX);
         }
     }
 
-    /// Small steps of extended position-based dynamics, the rim tied to an outline that eases from start to end.
+    /// Runs extended position-based dynamics in small steps. The rim follows an outline that eases from start to end.
     #[inline(always)]
     pub(crate) fn xpbd(&mut self, topology: &Topology, steps: usize, params: &XpbdParams) {
         let (all, small) = ((steps * params.substeps) as f64, params.substeps as f64);
         let keep = single(libm::pow(1.0 - params.damping, 1.0 / small));
         let gravity = single(-params.gravity / (small * small));
-        // Of pairs with one end held on the rim, and of free ones. α̃ = α / Δt², with Δt in steps.
-        let bindings = |compliance: f64, gives_way: f32| {
-            [[0.0, 1.0], [1.0, 1.0]].map(|weights: [f64; 2]| Binding {
+        // For pairs with one end fixed on the rim, and for free pairs. α̃ = α / Δt², with Δt in steps.
+        let constraints = |compliance: f64, yield_strain: f32| {
+            [[0.0, 1.0], [1.0, 1.0]].map(|weights: [f64; 2]| Constraint {
                 weights: weights.map(single),
                 gain: single(1.0 / (weights[0] + weights[1] + compliance * small * small)),
-                gives_way,
+                yield_strain,
             })
         };
-        let stretch = bindings(params.stretch_compliance, f32::MAX);
-        let bend = bindings(params.bend_compliance, single(params.bend_yield));
+        let stretch = constraints(params.stretch_compliance, f32::MAX);
+        let bend = constraints(params.bend_compliance, single(params.bend_yield));
         for substep in 1..=steps * params.substeps {
             let s = substep as f64 / all;
-            self.tie(topology.rim, single(s * s * (3.0 - 2.0 * s)));
+            self.move_rim(topology.rim, single(s * s * (3.0 - 2.0 * s)));
             advance(&mut self.now[topology.rim..], &mut self.before[topology.rim..], keep, gravity);
-            // The first set holds the edges of the rim, whose positions are prescribed.
+            // Set 0 holds the edges of the rim, whose positions are prescribed.
             for set in 1..3 {
                 project(&mut self.now, &topology.edges[set], &self.edges[set], stretch[set - 1]);
             }
@@ -145,15 +147,15 @@ impl<const L: usize> Batch<L> {
             }
             confine(&mut self.now, single(params.ceiling));
             if substep.is_multiple_of(params.substeps) {
-                self.ring.press(&mut self.now, &topology.views, topology.rim, substep / params.substeps);
+                self.ring.push_inside(&mut self.now, &topology.windows, topology.rim, substep / params.substeps);
             }
         }
     }
 
-    /// Moves the outline, and the rim with it, to the place `moved` of the way from start to end.
+    /// Moves the outline and the rim to the fraction `moved` of their which from start to end.
     #[inline(always)]
-    fn tie(&mut self, rim: usize, moved: f32) {
-        let [from, to] = &self.ways;
+    fn move_rim(&mut self, rim: usize, moved: f32) {
+        let [from, to] = &self.outlines;
         for (((point, node), a), b) in self.ring.points.iter_mut().zip(&mut self.now[..rim]).zip(from).zip(to) {
             for axis in 0..2 {
                 for l in 0..L {

@@ -1,17 +1,17 @@
 use crate::batch::{Batch, Start, Topology};
 use crate::mesh::Disc;
 use crate::outline::{Inside, Outline};
-use crate::params::check_excess;
+use crate::params::check_area_ratio;
 use crate::refine::Refinement;
 use crate::{ClothParams, Error, Point, Rng, Sheet, Solver, Vertex, rest};
 use multiversion::multiversion;
 
-/// Sheets solved side by side: as many as there are f32 in the widest registers.
+/// Sheets solved at once: the number of f32 in the widest registers.
 const LANES: usize = 16;
-/// Up to this many sheets are solved one by one: that takes less time than all lanes for a few.
+/// Up to this many sheets are solved one by one, which is faster than a batch of mostly unused lanes.
 const FEW: usize = 2;
 
-/// A circular mesh, ready to be pressed into any number of outlines.
+/// A circular mesh that can be crumpled into any number of outlines.
 #[derive(Debug)]
 pub struct Cloth {
     params: ClothParams,
@@ -20,21 +20,21 @@ pub struct Cloth {
     refinement: Refinement,
 }
 
-/// A sheet that is wanted.
+/// Outline and area of one sheet of [`Cloth::crumple_each`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Job<'a> {
-    /// What it is pressed into: a simple polygon, either way round, of any unit.
+pub struct SheetSpec<'a> {
+    /// The target outline: a simple polygon in either orientation, in any unit.
     pub outline: &'a [Point],
-    /// Area of the flat sheet over that of the outline, 1 to 4; see [`ClothParams::excess`].
-    pub excess: f64,
+    /// Ratio of the areas of flat sheet and outline, 1 to 4; see [`ClothParams::area_ratio`].
+    pub area_ratio: f64,
 }
 
 impl Cloth {
-    /// Builds the mesh: the same for the same number of vertices.
+    /// Builds the mesh, which depends only on the number of vertices.
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] names the first field outside its range.
+    /// [`Error::Parameter`] with the first field that is out of range.
     pub fn new(params: &ClothParams) -> Result<Cloth, Error> {
         params.check()?;
         let disc = Disc::new(params.vertices)?;
@@ -43,48 +43,49 @@ impl Cloth {
         Ok(Cloth { params: params.clone(), disc, topology, refinement })
     }
 
-    /// Presses one sheet into an outline: a simple polygon, either way round, of any unit.
+    /// Crumples one sheet into an outline: a simple polygon in either orientation, in any unit.
     ///
     /// # Errors
     ///
-    /// If the outline has fewer than 3 points, one that is not finite, or no area.
+    /// If the outline has fewer than 3 points, a point that is not finite, or no area.
     pub fn crumple<R: Rng + ?Sized>(&self, outline: &[Point], rng: &mut R) -> Result<Sheet, Error> {
-        let start = self.start(Job { outline, excess: self.params.excess }, rng)?;
+        let start = self.start(SheetSpec { outline, area_ratio: self.params.area_ratio }, rng)?;
         self.solved(&[&start]).pop().ok_or(Error::TooFewPoints { points: 0 })
     }
 
-    /// Presses sheets into outlines, each with its own source of random numbers, many at a time: the quick way.
-    /// Each result, or error, is that of [`Cloth::crumple`], bit by bit.
+    /// Crumples several sheets, each with its own random number generator. Sixteen are solved at once, which is faster
+    /// than one by one. Each result or error equals that of [`Cloth::crumple`], bit for bit.
     ///
     /// # Panics
     ///
-    /// If there are not as many sources as outlines.
+    /// If the numbers of outlines and generators differ.
     pub fn crumple_many<R: Rng>(&self, outlines: &[&[Point]], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
-        let excess = self.params.excess;
-        let jobs: Vec<Job> = outlines.iter().map(|&outline| Job { outline, excess }).collect();
-        self.crumple_each(&jobs, rngs)
+        let area_ratio = self.params.area_ratio;
+        let specs: Vec<SheetSpec> = outlines.iter().map(|&outline| SheetSpec { outline, area_ratio }).collect();
+        self.crumple_each(&specs, rngs)
     }
 
-    /// The same, each sheet with an excess of its own.
+    /// Crumples several sheets like [`Cloth::crumple_many`], each with its own area ratio.
     ///
     /// # Panics
     ///
-    /// If there are not as many sources as sheets.
-    pub fn crumple_each<R: Rng>(&self, jobs: &[Job<'_>], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
-        assert_eq!(jobs.len(), rngs.len(), "each outline needs its own source of random numbers");
-        let starts: Vec<Result<Start, Error>> = jobs.iter().zip(rngs).map(|(job, rng)| self.start(*job, rng)).collect();
+    /// If the numbers of sheets and generators differ.
+    pub fn crumple_each<R: Rng>(&self, specs: &[SheetSpec<'_>], rngs: &mut [R]) -> Vec<Result<Sheet, Error>> {
+        assert_eq!(specs.len(), rngs.len(), "the numbers of outlines and generators differ");
+        let starts: Vec<Result<Start, Error>> =
+            specs.iter().zip(rngs).map(|(spec, rng)| self.start(*spec, rng)).collect();
         let good: Vec<&Start> = starts.iter().flatten().collect();
         let mut sheets = good.chunks(LANES).flat_map(|chunk| self.solved(chunk));
         let mut next = |_: &Start| sheets.next().ok_or(Error::TooFewPoints { points: 0 });
         starts.iter().map(|start| start.as_ref().map_err(Error::clone).and_then(&mut next)).collect()
     }
 
-    fn start<R: Rng + ?Sized>(&self, job: Job<'_>, rng: &mut R) -> Result<Start, Error> {
-        check_excess(job.excess)?;
-        Ok(rest::start(&self.disc, Outline::new(job.outline)?, job.excess, &self.params, rng))
+    fn start<R: Rng + ?Sized>(&self, spec: SheetSpec<'_>, rng: &mut R) -> Result<Start, Error> {
+        check_area_ratio(spec.area_ratio)?;
+        Ok(rest::start(&self.disc, Outline::new(spec.outline)?, spec.area_ratio, &self.params, rng))
     }
 
-    /// Up to [`LANES`] sheets.
+    /// Solves up to [`LANES`] sheets.
     fn solved(&self, starts: &[&Start]) -> Vec<Sheet> {
         if starts.len() <= FEW {
             starts.iter().map(|start| self.finished(start, &self.run::<1>(&[start]).lane(0))).collect()
@@ -102,15 +103,15 @@ impl Cloth {
 
     fn finished(&self, start: &Start, vertices: &[Vertex]) -> Sheet {
         let mut sheet = self.refinement.apply(vertices, &start.rest);
-        let hemmed = matches!(self.params.solver, Solver::Xpbd(_));
-        if hemmed {
-            self.refinement.hem(&mut sheet, &start.shape, start.offset);
+        let rim_on_outline = matches!(self.params.solver, Solver::Xpbd(_));
+        if rim_on_outline {
+            self.refinement.snap_rim(&mut sheet, &start.shape, start.offset);
         }
         let Outline { points, centre, radius } = &start.shape;
         let inside = Inside::new(points);
         for (v, &from_centre) in sheet.vertices.iter_mut().zip(sheet.radius.iter()) {
-            // The hem lies on the outline already.
-            let [x, y] = if hemmed && from_centre == 1.0 { [v[0], v[1]] } else { inside.nearest([v[0], v[1]]) };
+            // The rim is already on the outline.
+            let [x, y] = if rim_on_outline && from_centre == 1.0 { [v[0], v[1]] } else { inside.nearest([v[0], v[1]]) };
             *v = [centre[0] + radius * x, centre[1] + radius * y, radius * v[2]];
         }
         for r in &mut sheet.rest {
@@ -120,7 +121,7 @@ impl Cloth {
     }
 }
 
-/// Plain loops, compiled for each instruction set; nothing is contracted, so that all give the same bits.
+/// Compiled for each instruction set. No operations are fused, so that all give the same bits.
 #[multiversion(targets = "simd")]
 fn solve<const L: usize>(batch: &mut Batch<L>, topology: &Topology, params: &ClothParams) {
     match &params.solver {
@@ -132,12 +133,12 @@ fn solve<const L: usize>(batch: &mut Batch<L>, topology: &Topology, params: &Clo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Rest;
+    use crate::RestShape;
     use crate::outline::{distance, moments, sides};
     use crate::sheet::cross;
     use crate::testing::{angular, rng, wavy};
 
-    fn few() -> ClothParams {
+    fn coarse() -> ClothParams {
         ClothParams { vertices: 300, ..ClothParams::default() }
     }
 
@@ -145,19 +146,19 @@ mod tests {
         vec![wavy(3.0, 0.2), angular(), wavy(7.0, 0.1), vec![[0.0, 0.0], [3.0, 0.2], [1.0, 4.0]], wavy(2.0, 0.5)]
     }
 
-    /// How far outside the polygon a point is.
+    /// Returns the distance of a point from the polygon, 0 inside.
     fn outside(polygon: &[Point], v: &Vertex) -> f64 {
         let p = [v[0], v[1]];
         distance(p, Inside::new(polygon).nearest(p))
     }
 
     #[test]
-    fn law_24_sheets_stay_where_they_belong() {
+    fn sheets_stay_inside_the_outline_and_below_the_ceiling() {
         let both = [
-            few(),
+            coarse(),
             ClothParams::paper(),
-            ClothParams { rest: Rest::Disc, smoothing: crate::Smoothing::Loop, ..few() },
-            ClothParams { rest: Rest::Outline, excess: 1.3, ..ClothParams::paper() },
+            ClothParams { rest_shape: RestShape::Disc, smoothing: crate::Smoothing::Loop, ..coarse() },
+            ClothParams { rest_shape: RestShape::Outline, area_ratio: 1.3, ..ClothParams::paper() },
         ];
         for params in both {
             let cloth = Cloth::new(&params).unwrap();
@@ -174,23 +175,23 @@ mod tests {
     }
 
     #[test]
-    fn law_24_a_sheet_is_hardly_stretched() {
-        let cloth = Cloth::new(&ClothParams { excess: 1.12, ..ClothParams::default() }).unwrap();
+    fn a_sheet_is_hardly_stretched() {
+        let cloth = Cloth::new(&ClothParams { area_ratio: 1.12, ..ClothParams::default() }).unwrap();
         let outline = wavy(2.0, 0.08);
         for stream in 7..10 {
             let sheet = cloth.crumple(&outline, &mut rng(stream)).unwrap();
-            let (strain, excess) = (sheet.edge_strain_rms(), sheet.rest_area() / moments(&outline).0);
-            assert!(strain < 0.03 && (excess - 1.12).abs() < 0.005, "{strain} {excess}");
+            let (strain, area_ratio) = (sheet.edge_strain_rms(), sheet.rest_area() / moments(&outline).0);
+            assert!(strain < 0.03 && (area_ratio - 1.12).abs() < 0.005, "{strain} {area_ratio}");
         }
     }
 
     #[test]
-    fn the_default_sheet_ends_exactly_on_its_outline() {
+    fn the_rim_of_the_default_sheet_is_the_outline() {
         for smoothing in [crate::Smoothing::None, crate::Smoothing::Loop] {
-            let cloth = Cloth::new(&ClothParams { smoothing, ..few() }).unwrap();
+            let cloth = Cloth::new(&ClothParams { smoothing, ..coarse() }).unwrap();
             for outline in outlines() {
                 let sheet = cloth.crumple(&outline, &mut rng(10)).unwrap();
-                // Green: the signed areas of all triangles add up to what the rim encloses.
+                // Green's theorem: the signed areas of all triangles add up to the area inside the rim.
                 let shadow: f64 = sheet
                     .triangles()
                     .iter()
@@ -206,8 +207,8 @@ mod tests {
     }
 
     #[test]
-    fn a_sheets_bits_depend_on_itself_alone() {
-        for params in [few(), ClothParams { vertices: 300, ..ClothParams::paper() }] {
+    fn the_bits_of_a_sheet_do_not_depend_on_its_batch() {
+        for params in [coarse(), ClothParams { vertices: 300, ..ClothParams::paper() }] {
             let cloth = Cloth::new(&params).unwrap();
             let outlines: Vec<Vec<Point>> =
                 (0..18_u8).map(|k| wavy(2.0 + f64::from(k % 4), 0.02 * f64::from(k % 7))).collect();
@@ -224,24 +225,24 @@ mod tests {
     }
 
     #[test]
-    fn each_sheet_has_its_own_excess_and_its_own_error() {
-        let (plain, outline) = (Cloth::new(&few()).unwrap(), wavy(3.0, 0.1));
+    fn each_sheet_has_its_own_area_ratio_and_its_own_error() {
+        let (plain, outline) = (Cloth::new(&coarse()).unwrap(), wavy(3.0, 0.1));
         let cases = [(1.02, 200), (1.3, 200), (5.0, 200), (1.15, 2), (1.15, 200)];
-        let jobs = cases.map(|(excess, points)| Job { outline: &outline[..points], excess });
-        let sheets = plain.crumple_each(&jobs, &mut [0, 1, 2, 3, 4].map(rng));
-        for (k, job) in jobs.iter().enumerate() {
-            let own = Cloth::new(&ClothParams { excess: job.excess, ..few() });
-            assert_eq!(sheets[k], own.and_then(|c| c.crumple(job.outline, &mut rng(k as u64))), "{k}");
+        let specs = cases.map(|(area_ratio, points)| SheetSpec { outline: &outline[..points], area_ratio });
+        let sheets = plain.crumple_each(&specs, &mut [0, 1, 2, 3, 4].map(rng));
+        for (k, spec) in specs.iter().enumerate() {
+            let own = Cloth::new(&ClothParams { area_ratio: spec.area_ratio, ..coarse() });
+            assert_eq!(sheets[k], own.and_then(|c| c.crumple(spec.outline, &mut rng(k as u64))), "{k}");
         }
         assert_eq!(sheets[3], Err(Error::TooFewPoints { points: 2 }));
         assert!(plain.crumple_many::<rand_xoshiro::Xoshiro256PlusPlus>(&[], &mut []).is_empty());
     }
 
     #[test]
-    fn size_and_place_do_not_matter() {
-        let cloth = Cloth::new(&few()).unwrap();
+    fn the_result_does_not_depend_on_scale() {
+        let cloth = Cloth::new(&coarse()).unwrap();
         let outline = wavy(3.0, 0.15);
-        // Powers of two, so that rounding is the same too.
+        // A power of two, so that rounding errors are the same.
         let other: Vec<Point> = outline.iter().map(|p| p.map(|c| c / 64.0)).collect();
         let (a, b) = (cloth.crumple(&outline, &mut rng(11)).unwrap(), cloth.crumple(&other, &mut rng(11)).unwrap());
         for (p, q) in a.vertices().iter().zip(b.vertices()) {
@@ -249,25 +250,26 @@ mod tests {
         }
     }
 
-    /// Either solver, one sheet in f64, every vertex against every side.
-    fn slow(cloth: &Cloth, start: &Start) -> Vec<Vertex> {
+    /// Reference implementation of both solvers: one sheet in f64, every vertex against every side.
+    fn reference(cloth: &Cloth, start: &Start) -> Vec<Vertex> {
         let Cloth { params, topology, .. } = cloth;
         let mut now: Vec<Vertex> = start.rest.iter().zip(&start.heights).map(|(r, &h)| [r[0], r[1], h]).collect();
         let (mut before, [mut ring, target]) = (now.clone(), start.outline.clone());
         let mut ring_before = ring.clone();
-        let project = |now: &mut [Vertex], pairs: &[[u32; 2]], weights: [f64; 2], compliance: f64, gives_way: f64| {
-            let gain = 1.0 / (weights[0] + weights[1] + compliance);
-            for &[a, b] in pairs {
-                let (a, b) = (a as usize, b as usize);
-                let d: Vertex = std::array::from_fn(|i| now[b][i] - now[a][i]);
-                let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-                let part = gain * (1.0 - distance(start.rest[a], start.rest[b]) / length).max(-gives_way);
-                for axis in 0..3 {
-                    now[a][axis] += weights[0] * part * d[axis];
-                    now[b][axis] -= weights[1] * part * d[axis];
+        let project =
+            |now: &mut [Vertex], pairs: &[[u32; 2]], weights: [f64; 2], compliance: f64, yield_strain: f64| {
+                let gain = 1.0 / (weights[0] + weights[1] + compliance);
+                for &[a, b] in pairs {
+                    let (a, b) = (a as usize, b as usize);
+                    let d: Vertex = std::array::from_fn(|i| now[b][i] - now[a][i]);
+                    let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                    let part = gain * (1.0 - distance(start.rest[a], start.rest[b]) / length).max(-yield_strain);
+                    for axis in 0..3 {
+                        now[a][axis] += weights[0] * part * d[axis];
+                        now[b][axis] -= weights[1] * part * d[axis];
+                    }
                 }
-            }
-        };
+            };
         let advance = |now: &mut [Vertex], before: &mut [Vertex], keep: f64, gravity: f64| {
             for (n, b) in now.iter_mut().zip(before) {
                 let next: Vertex = std::array::from_fn(|i| n[i] + (n[i] - b[i]) * keep);
@@ -308,10 +310,11 @@ mod tests {
                     let keep = libm::pow(1.0 - p.damping, 1.0 / small);
                     advance(&mut now[rim..], &mut before[rim..], keep, p.gravity / small / small);
                     let stretch = (&topology.edges, p.stretch_compliance, f64::INFINITY);
-                    for (pairs, compliance, gives_way) in [stretch, (&topology.bends, p.bend_compliance, p.bend_yield)]
+                    for (pairs, compliance, yield_strain) in
+                        [stretch, (&topology.bends, p.bend_compliance, p.bend_yield)]
                     {
-                        project(&mut now, &pairs[1], [0.0, 1.0], compliance * small * small, gives_way);
-                        project(&mut now, &pairs[2], [1.0, 1.0], compliance * small * small, gives_way);
+                        project(&mut now, &pairs[1], [0.0, 1.0], compliance * small * small, yield_strain);
+                        project(&mut now, &pairs[2], [1.0, 1.0], compliance * small * small, yield_strain);
                     }
                     let pressed = substep.is_multiple_of(p.substeps);
                     confine(&mut now[rim..], pressed.then_some(&ring), p.ceiling);
@@ -322,19 +325,19 @@ mod tests {
     }
 
     #[test]
-    fn lanes_agree_with_the_slow_solvers() {
-        for params in [ClothParams::paper(), ClothParams { steps: 12, ..few() }] {
+    fn lanes_agree_with_the_reference_solvers() {
+        for params in [ClothParams::paper(), ClothParams { steps: 12, ..coarse() }] {
             let cloth = Cloth::new(&params).unwrap();
             let start = |k: u8| {
-                let (outline, excess) = (wavy(2.0 + f64::from(k), 0.08), params.excess);
-                cloth.start(Job { outline: &outline, excess }, &mut rng(u64::from(k))).unwrap()
+                let (outline, area_ratio) = (wavy(2.0 + f64::from(k), 0.08), params.area_ratio);
+                cloth.start(SheetSpec { outline: &outline, area_ratio }, &mut rng(u64::from(k))).unwrap()
             };
             let starts: Vec<Start> = (0..4).map(start).collect();
             let batch = cloth.run::<LANES>(&starts.iter().collect::<Vec<_>>());
             for (l, start) in starts.iter().enumerate() {
-                let (found, slow) = (batch.lane(l), slow(&cloth, start));
-                let errors = found.as_flattened().iter().zip(slow.as_flattened()).map(|(p, q)| (p - q) * (p - q));
-                let rms = (errors.sum::<f64>() / slow.len() as f64).sqrt();
+                let (found, reference) = (batch.lane(l), reference(&cloth, start));
+                let errors = found.as_flattened().iter().zip(reference.as_flattened()).map(|(p, q)| (p - q) * (p - q));
+                let rms = (errors.sum::<f64>() / reference.len() as f64).sqrt();
                 assert!(rms < 1e-3, "lane {l}: {rms}");
             }
         }

@@ -1,4 +1,4 @@
-//! Folding a sheet, or a polygon, along a line.
+//! Folds a sheet or a polygon along a line.
 
 use crate::outline::{moments, sides};
 use crate::params::range;
@@ -7,34 +7,34 @@ use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-/// Strips into which half a turn is divided: the tube's silhouette is then right to 1 part in 100 of its radius.
+/// Strips of half a turn of the tube; its silhouette is then exact to 1 % of its radius.
 const STRIPS: u32 = 12;
-/// Part of the radius within which a vertex counts as lying on a line: a cut there would only leave slivers.
+/// Distance from a line, as a fraction of the radius, within which a vertex counts as on it; avoids sliver triangles.
 const ON_LINE: f64 = 1e-6;
 const MOST_TURNS: u32 = 100;
 
-/// A straight fold. What lies beyond the line is bent up round a tube that touches the sheet there, without being stretched.
+/// A straight fold. The part of the sheet beyond the line is bent up around a tube on that line, without stretching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crease {
     /// A point of the line.
     pub point: Point,
-    /// Direction of the line as an angle from +x towards +y. What lies a quarter turn further on, towards
-    /// (−sin, cos), is beyond the line.
+    /// Direction of the line, as an angle from +x towards +y. The side in the direction (−sin, cos) is beyond the
+    /// line.
     pub direction_rad: f64,
-    /// Radius of the tube in the sheet's unit, above 0.
+    /// Radius of the tube in the unit of the sheet, above 0.
     pub radius: f64,
-    /// How far the sheet is bent.
-    pub turn: Turn,
+    /// Flap or roll.
+    pub kind: FoldKind,
 }
 
-/// How far a sheet is bent at a [`Crease`].
+/// The kind of fold of a [`Crease`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Turn {
-    /// Half a turn; the rest lies flat on top, mirrored.
+pub enum FoldKind {
+    /// Half a turn around the tube; the remainder is mirrored and lies flat on top.
     Flap,
-    /// Wound up: this many whole turns, 1 to 100, and another half, after which what is left lies flat on top.
+    /// Several turns around the tube and another half turn; the remainder lies flat on top.
     Roll {
-        /// Whole turns.
+        /// Number of full turns, 1 to 100.
         turns: u32,
     },
 }
@@ -46,25 +46,25 @@ impl Crease {
         range("point[1]", self.point[1], finite, "finite")?;
         range("direction_rad", self.direction_rad, finite, "finite")?;
         range("radius", self.radius, (f64::MIN_POSITIVE, f64::MAX), "above 0 and finite")?;
-        match self.turn {
-            Turn::Flap => Ok(()),
-            Turn::Roll { turns } => range("turns", f64::from(turns), (1.0, f64::from(MOST_TURNS)), "1 to 100"),
+        match self.kind {
+            FoldKind::Flap => Ok(()),
+            FoldKind::Roll { turns } => range("turns", f64::from(turns), (1.0, f64::from(MOST_TURNS)), "1 to 100"),
         }
     }
 
-    /// The direction that leads beyond the line.
+    /// Returns the direction beyond the line.
     fn normal(&self) -> Point {
         [-libm::sin(self.direction_rad), libm::cos(self.direction_rad)]
     }
 
     fn half_turns(&self) -> u32 {
-        match self.turn {
-            Turn::Flap => 1,
-            Turn::Roll { turns } => 2 * turns + 1,
+        match self.kind {
+            FoldKind::Flap => 1,
+            FoldKind::Roll { turns } => 2 * turns + 1,
         }
     }
 
-    /// Where what was at `s` beyond the line comes to lie: how far beyond, and how high.
+    /// Returns the new distance beyond the line and the height of a point at the distance `s` beyond the line.
     fn bent(&self, s: f64) -> [f64; 2] {
         let r = self.radius;
         let end = PI * r * f64::from(self.half_turns());
@@ -78,7 +78,7 @@ impl Crease {
         }
     }
 
-    /// Where the tube is divided into strips, as far as `end`.
+    /// Returns the distances of the borders of the strips, up to `end`.
     fn strips(&self, end: f64) -> impl Iterator<Item = f64> {
         let width = PI * self.radius / f64::from(STRIPS);
         (0..=STRIPS * self.half_turns()).map(move |k| f64::from(k) * width).take_while(move |&s| s < end)
@@ -86,8 +86,8 @@ impl Crease {
 }
 
 impl Sheet {
-    /// Folds the sheet as it lies: heights are kept on top of the tube's, triangles on the tube are divided, and neither the
-    /// flat sheet nor its volume changes.
+    /// Folds the crumpled sheet. Heights add to those of the tube, triangles on the tube are divided; the flat sheet
+    /// and its volume do not change.
     ///
     /// # Errors
     ///
@@ -108,19 +108,19 @@ impl Sheet {
                 *v = [v[0] + (x - s) * normal[0], v[1] + (x - s) * normal[1], v[2] + z];
             }
         }
-        self.pair_up();
+        self.update_edges();
         Ok(())
     }
 
-    /// Divides all triangles along the line where `far` is `line`. `ahead` are those that may have a corner beyond it, and then
-    /// those that have; lines follow each other outwards.
+    /// Divides all triangles along the line where `far` equals `line`. `ahead` lists the triangles that may have a
+    /// corner beyond it, and is reduced to those that have; lines come in ascending order.
     fn cut(&mut self, far: &mut Vec<f64>, line: f64, tolerance: f64, ahead: &mut Vec<usize>) {
         let mut made = BTreeMap::new();
         ahead.retain(|&t| self.triangles[t].iter().any(|&v| far[v as usize] - line > tolerance));
         let before = self.triangles.len();
         for &t in &*ahead {
             let corners = self.triangles[t];
-            // −1 this side, 0 on the line, 1 beyond.
+            // −1 before the line, 0 on it, 1 beyond.
             let places = corners.map(|v| {
                 let s = far[v as usize] - line;
                 i32::from(s > tolerance) - i32::from(s < -tolerance)
@@ -128,7 +128,7 @@ impl Sheet {
             if !(places.contains(&-1) && places.contains(&1)) {
                 continue;
             }
-            // Turn the triangle so that its first corner is alone on its side, or on the line.
+            // Rotate the triangle so that its first corner is alone on its side, or on the line.
             let sum: i32 = places.iter().sum();
             let Some(k) = (0..3).find(|&k| places[k] == 0).or((0..3).find(|&k| sum == -places[k])) else { continue };
             let [a, b, c] = [corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]];
@@ -148,7 +148,7 @@ impl Sheet {
         ahead.extend(before..self.triangles.len());
     }
 
-    /// The vertex where edge a–b meets the line.
+    /// Returns the vertex where the edge a–b crosses the line.
     fn divide(&mut self, made: &mut BTreeMap<[u32; 2], u32>, far: &mut Vec<f64>, line: f64, a: u32, b: u32) -> u32 {
         let key = [a.min(b), a.max(b)];
         *made.entry(key).or_insert_with(|| {
@@ -167,12 +167,13 @@ impl Sheet {
     }
 }
 
-/// The silhouette of a polygon folded like a sheet: what is kept, then the mirrored flap (for a roll, each half turn), each as
-/// one or more simple polygons with positive area. Pieces overlap; the silhouette is their union. To fold again, fold each piece.
+/// Returns the silhouette of a folded polygon: the part before the line, then the mirrored flap (for a roll, each half
+/// turn), each as one or more simple polygons with positive area. Pieces overlap; the silhouette is their union. To
+/// fold again, fold each piece.
 ///
 /// # Errors
 ///
-/// As [`Sheet::fold`], and if the outline is not one.
+/// As [`Sheet::fold`], and if the outline is invalid.
 pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Point>>, Error> {
     crease.check()?;
     crate::outline::Outline::new(outline)?;
@@ -191,7 +192,7 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
     };
     let mut pieces = Vec::new();
     let mut left = vec![polygon];
-    // The sheet turns back where it has gone up, and down, a quarter: at π/2, 3π/2, …
+    // The direction of the sheet reverses at angles of π/2, 3π/2, … around the tube.
     for half in 0..=crease.half_turns() {
         let turn =
             if half < crease.half_turns() { crease.radius * (FRAC_PI_2 + PI * f64::from(half)) } else { f64::INFINITY };
@@ -215,7 +216,7 @@ pub fn crease_outline(outline: &[Point], crease: &Crease) -> Result<Vec<Vec<Poin
     Ok(pieces)
 }
 
-/// The polygon with a point more wherever a side crosses one of the lines y = `lines`, which ascend.
+/// Inserts a point wherever a side crosses one of the lines y = `lines`, which are in ascending order.
 fn divided(polygon: &[Point], lines: &[f64]) -> Vec<Point> {
     let mut points = Vec::with_capacity(polygon.len());
     for (a, b) in sides(polygon) {
@@ -228,14 +229,14 @@ fn divided(polygon: &[Point], lines: &[f64]) -> Vec<Point> {
     points
 }
 
-/// The parts of a simple polygon where y ≤ `line`.
+/// Returns the parts of a simple polygon with y ≤ `line`.
 fn clipped(polygon: &[Point], line: f64) -> Vec<Vec<Point>> {
     let Some(start) = polygon.iter().position(|p| p[1] > line) else {
         return vec![polygon.to_vec()];
     };
     let mut polygon = polygon.to_vec();
     polygon.rotate_left(start);
-    // Stretches below the line, each from where it comes down to where it goes up.
+    // Chains below the line, each from a downward to an upward crossing.
     let mut chains: Vec<Vec<Point>> = Vec::new();
     for (a, b) in sides(&polygon) {
         let crossing = || [a[0] + (b[0] - a[0]) * (line - a[1]) / (b[1] - a[1]), line];
@@ -250,7 +251,8 @@ fn clipped(polygon: &[Point], line: f64) -> Vec<Vec<Point>> {
     joined(chains)
 }
 
-/// Closes chains along the line on which all of them start and end: of the crossings in order along it, each second gap is inside.
+/// Closes chains along the line on which they start and end: of the gaps between sorted crossings, every second is
+/// inside.
 fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
     let ends = chains.iter().enumerate().flat_map(|(k, c)| [(c[0][0], k, true), (c[c.len() - 1][0], k, false)]);
     let mut ends: Vec<(f64, usize, bool)> = ends.collect();
@@ -259,7 +261,7 @@ fn joined(chains: Vec<Vec<Point>>) -> Vec<Vec<Point>> {
     for pair in ends.chunks_exact(2) {
         match (pair[0], pair[1]) {
             ((_, to, true), (_, from, false)) | ((_, from, false), (_, to, true)) => next[from] = Some(to),
-            // Only where the polygon crosses itself: one closed curve then serves as well.
+            // Only for a self-intersecting polygon: return one closed curve.
             _ => return vec![chains.concat()],
         }
     }
@@ -285,9 +287,9 @@ mod tests {
     use super::*;
     use crate::sheet::rim;
     use crate::testing::{angular, rng, wavy};
-    use crate::{Cloth, ClothParams, View};
+    use crate::{Cloth, ClothParams, PixelGrid};
 
-    const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, turn: Turn::Flap };
+    const CREASE: Crease = Crease { point: [40.0, -10.0], direction_rad: 2.0, radius: 3.0, kind: FoldKind::Flap };
 
     fn flat() -> Sheet {
         let mut sheet = Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(2.0, 0.1), &mut rng(5)).unwrap();
@@ -296,11 +298,11 @@ mod tests {
     }
 
     #[test]
-    fn a_fold_neither_stretches_nor_loses_anything() {
-        for turn in [Turn::Flap, Turn::Roll { turns: 2 }] {
+    fn a_fold_preserves_lengths_and_volume() {
+        for kind in [FoldKind::Flap, FoldKind::Roll { turns: 2 }] {
             let mut sheet = flat();
             let (volume, count) = (sheet.volume(|r| 2.0 - r), sheet.triangles().len());
-            sheet.fold(&Crease { turn, ..CREASE }).unwrap();
+            sheet.fold(&Crease { kind, ..CREASE }).unwrap();
             assert!((sheet.volume(|r| 2.0 - r) / volume - 1.0).abs() < 1e-9);
             assert!(sheet.triangles().len() > count + 100);
             // A chord of 1/24 turn is shorter than its arc by 3 in 1000.
@@ -311,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flap_lies_mirrored_on_top() {
+    fn a_flap_is_mirrored_on_top() {
         let mut sheet = flat();
         let before = sheet.vertices().to_vec();
         sheet.fold(&CREASE).unwrap();
@@ -328,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn folding_where_nothing_is_changes_nothing() {
+    fn a_crease_outside_the_sheet_changes_nothing() {
         let mut sheet = flat();
         let before = sheet.clone();
         sheet.fold(&Crease { point: [1e4, 0.0], direction_rad: -FRAC_PI_2, ..CREASE }).unwrap();
@@ -336,9 +338,9 @@ mod tests {
     }
 
     #[test]
-    fn the_silhouette_covers_the_folded_sheet_and_no_more() {
-        for (direction_rad, turn) in [(2.0, Turn::Flap), (0.3, Turn::Roll { turns: 1 })] {
-            let crease = Crease { direction_rad, turn, ..CREASE };
+    fn the_silhouette_is_that_of_the_folded_sheet() {
+        for (direction_rad, kind) in [(2.0, FoldKind::Flap), (0.3, FoldKind::Roll { turns: 1 })] {
+            let crease = Crease { direction_rad, kind, ..CREASE };
             let mut sheet = flat();
             let place = |&(v, _): &(u32, u32)| [sheet.vertices[v as usize][0], sheet.vertices[v as usize][1]];
             let rim: Vec<Point> = rim(&sheet.edges).iter().map(place).collect();
@@ -352,16 +354,16 @@ mod tests {
                 .map(|[a, b, c]| crate::sheet::cross(a, b, c).abs() / 2.0)
                 .sum();
             assert!((areas / shadow - 1.0).abs() < 1e-9, "{areas} {shadow}");
-            // Where the sheet is thick there is a piece, and the other way round.
+            // Pixels have a thickness exactly where a piece covers them.
             let mut image = vec![0.0_f32; 250 * 250];
-            let view = View { origin: [-100.0, -150.0], pixel: 1.0 };
-            sheet.thickness_into(&mut image, 250, &view, |_| 1.0);
+            let grid = PixelGrid { origin: [-100.0, -150.0], pixel_size: 1.0 };
+            sheet.thickness_into(&mut image, 250, &grid, |_| 1.0);
             let insides: Vec<crate::outline::Inside> = pieces.iter().map(|p| crate::outline::Inside::new(p)).collect();
             let mut wrong = 0;
             for (k, &value) in image.iter().enumerate() {
-                let p = [view.origin[0] + (k % 250) as f64, view.origin[1] + (k / 250) as f64];
+                let p = [grid.origin[0] + (k % 250) as f64, grid.origin[1] + (k / 250) as f64];
                 let covered = |x: f64, y: f64| insides.iter().any(|i| i.contains([p[0] + x, p[1] + y]));
-                // A pixel cut by the silhouette may be thick although its centre is free.
+                // A pixel at the silhouette may have a thickness although its centre is uncovered.
                 let near = [-1.0, 0.0, 1.0].iter().any(|&x| [-1.0, 0.0, 1.0].iter().any(|&y| covered(x, y)));
                 wrong += usize::from(covered(0.0, 0.0) && value == 0.0) + usize::from(!near && value > 0.0);
             }
@@ -370,10 +372,10 @@ mod tests {
     }
 
     #[test]
-    fn a_concave_outline_falls_into_pieces() {
-        // Both arms of a U lie beyond the line.
+    fn a_concave_outline_is_split_into_pieces() {
+        // Both arms of a U are beyond the line.
         let u = [[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [6.0, 9.0], [6.0, 3.0], [3.0, 3.0], [3.0, 9.0], [0.0, 9.0]];
-        let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, turn: Turn::Flap };
+        let crease = Crease { point: [0.0, 5.0], direction_rad: 0.0, radius: 1e-6, kind: FoldKind::Flap };
         let pieces = crease_outline(&u, &crease).unwrap();
         let mut areas: Vec<f64> = pieces.iter().map(|p| moments(p).0).collect();
         areas.sort_by(f64::total_cmp);
@@ -386,14 +388,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_crease_is_an_error() {
+    fn invalid_creases_are_rejected() {
         let mut sheet = flat();
         for crease in [
             Crease { radius: 0.0, ..CREASE },
             Crease { radius: f64::NAN, ..CREASE },
             Crease { direction_rad: f64::INFINITY, ..CREASE },
             Crease { point: [0.0, f64::NAN], ..CREASE },
-            Crease { turn: Turn::Roll { turns: 0 }, ..CREASE },
+            Crease { kind: FoldKind::Roll { turns: 0 }, ..CREASE },
         ] {
             assert!(matches!(sheet.fold(&crease), Err(Error::Parameter { .. })));
             assert!(crease_outline(&angular(), &crease).is_err());

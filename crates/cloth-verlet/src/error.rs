@@ -1,37 +1,37 @@
-/// What can be wrong with parameters or with an outline.
+/// An invalid parameter or outline.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter lies outside its range.
-    #[error("{field} = {value}: must be {accepted}")]
+    /// A parameter is out of range.
+    #[error("{field} = {value} is out of range: expected {accepted}")]
     Parameter {
         /// Name of the field.
         field: &'static str,
-        /// Value found.
+        /// The value.
         value: f64,
-        /// What would be accepted.
+        /// The accepted range.
         accepted: &'static str,
     },
-    /// The outline is no polygon.
-    #[error("outline has {points} points: must have at least 3")]
+    /// The outline has too few points.
+    #[error("the outline has {points} points: expected at least 3")]
     TooFewPoints {
-        /// Number of points found.
+        /// Number of points.
         points: usize,
     },
     /// A point of the outline is NaN or infinite.
-    #[error("outline[{index}] = ({x}, {y}): must be finite")]
+    #[error("outline[{index}] = ({x}, {y}): expected finite coordinates")]
     NotFinite {
         /// Index of the point.
         index: usize,
-        /// Its x.
+        /// x coordinate of the point.
         x: f64,
-        /// Its y.
+        /// y coordinate of the point.
         y: f64,
     },
-    /// The outline encloses nothing.
-    #[error("outline encloses an area of {area}: must be greater than 0")]
+    /// The outline encloses no area.
+    #[error("the outline encloses an area of {area}: expected more than 0")]
     NoArea {
-        /// Area found.
+        /// The area.
         area: f64,
     },
 }

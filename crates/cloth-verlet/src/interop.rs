@@ -1,9 +1,9 @@
-//! Meshes in types of other libraries.
+//! Conversions of meshes to types of other libraries.
 
 use crate::Sheet;
 
 impl Sheet {
-    /// [`Sheet::vertices`] as points of `mint`. Outlines of other libraries' points become `[f64; 2]` by `into`.
+    /// Returns [`Sheet::vertices`] as points of `mint`. Points of other libraries convert to `[f64; 2]` with `into`.
     ///
     /// ```
     /// use cloth_verlet::{Cloth, ClothParams};
@@ -24,13 +24,13 @@ impl Sheet {
         self.vertices().iter().map(|&v| v.into())
     }
 
-    /// [`Sheet::normals`] as vectors of `mint`.
+    /// Returns [`Sheet::normals`] as vectors of `mint`.
     #[cfg(feature = "mint")]
     pub fn mint_normals(&self) -> impl ExactSizeIterator<Item = mint::Vector3<f64>> + use<> {
         self.normals().into_iter().map(Into::into)
     }
 
-    /// [`Sheet::vertices`] as points of `nalgebra`.
+    /// Returns [`Sheet::vertices`] as points of `nalgebra`.
     ///
     /// ```
     /// # use cloth_verlet::{Cloth, ClothParams};
@@ -49,7 +49,7 @@ impl Sheet {
         self.vertices().iter().map(|&v| v.into())
     }
 
-    /// [`Sheet::normals`] as vectors of `nalgebra`.
+    /// Returns [`Sheet::normals`] as vectors of `nalgebra`.
     #[cfg(feature = "nalgebra")]
     pub fn nalgebra_normals(&self) -> impl ExactSizeIterator<Item = nalgebra::Vector3<f64>> + use<> {
         self.normals().into_iter().map(Into::into)

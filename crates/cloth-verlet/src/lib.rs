@@ -19,16 +19,16 @@ mod sheet;
 #[cfg(test)]
 mod testing;
 
-pub use cloth::{Cloth, Job};
-pub use crease::{Crease, Turn, crease_outline};
+pub use cloth::{Cloth, SheetSpec};
+pub use crease::{Crease, FoldKind, crease_outline};
 pub use error::Error;
-pub use params::{ClothParams, Rest, Smoothing, Solver, VerletParams, XpbdParams};
+pub use params::{ClothParams, RestShape, Smoothing, Solver, VerletParams, XpbdParams};
 pub use rand_core::Rng;
-pub use raster::View;
+pub use raster::PixelGrid;
 pub use sheet::Sheet;
 
-/// A point or vector in the plane: x right, y down, in the unit of the caller's outline.
+/// A point or vector in the plane: x right, y down, in the unit of the outline.
 pub type Point = [f64; 2];
 
-/// A point in space: x right, y down, z up from the ground, in the unit of the caller's outline.
+/// A point in space: x right, y down, z up from the ground, in the unit of the outline.
 pub type Vertex = [f64; 3];

@@ -1,4 +1,4 @@
-//! The disc that every sheet is cut from: one triangulation for all, so that sheets can be solved side by side.
+//! The triangulated disc of all sheets. All sheets have the same topology, so that they can be solved in vector lanes.
 
 use crate::sheet::{cross, edges};
 use crate::{Error, Point};
@@ -8,15 +8,15 @@ use std::f64::consts::{PI, TAU};
 
 /// The paper's mesh: 75 vertices on the rim of 538.
 const RIM_OF_PAPER: (f64, f64) = (75.0, 538.0);
-/// Sweeps that even out the triangles; beyond a dozen the edge lengths no longer change visibly.
+/// Relaxation sweeps; beyond a dozen the edge lengths hardly change.
 const RELAXATIONS: usize = 16;
-/// The sunflower's angle, 2π(1 - 1/φ): consecutive points never line up.
+/// The golden angle 2π(1 - 1/φ), which spaces the points of a sunflower evenly.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
-/// Vertices of a square patch of the mesh: those of sixteen sheets side by side, with their neighbours', are half of a first cache.
+/// Vertices of a square patch of the mesh. Those of sixteen sheets, with their neighbours, fill half of an L1 cache.
 const PATCH: f64 = 100.0;
 
-/// A pair of vertices bound by a distance.
+/// A pair of vertices with a distance constraint.
 pub(crate) type Pair = [u32; 2];
 
 /// A triangulated unit disc. Vertices `0..rim` lie on the circle at equal angles, the others inside.
@@ -26,11 +26,11 @@ pub(crate) struct Disc {
     pub(crate) rim: usize,
     /// Counter-clockwise.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Smaller index first, in the order in which the solver takes them.
+    /// Smaller index first, in the order of the solver.
     pub(crate) edges: Vec<Pair>,
-    /// The two vertices opposite each inner edge, ordered likewise.
+    /// The two vertices opposite each inner edge, in the order of the solver.
     pub(crate) bends: Vec<Pair>,
-    /// `harmonics[k][v]`: weight of rim vertex k in inner vertex v.
+    /// `harmonics[k][v]` is the weight of rim vertex k in inner vertex v.
     harmonics: Vec<Vec<f64>>,
 }
 
@@ -48,9 +48,9 @@ impl Disc {
         Ok(Disc { rim, triangles, edges: ordered(&edges, &points), bends: ordered(&bends, &points), harmonics, points })
     }
 
-    /// Carries a closed curve of `rim` points into the disc: each coordinate becomes the harmonic function
-    /// with these values on the circle, the shape that a soap film would take.
-    pub(crate) fn spread(&self, curve: &[Point]) -> Vec<Point> {
+    /// Extends a closed curve of `rim` points to all vertices: each coordinate is the harmonic function with these
+    /// values on the circle.
+    pub(crate) fn harmonic_map(&self, curve: &[Point]) -> Vec<Point> {
         let (mut xs, mut ys) = (vec![0.0; self.points.len() - self.rim], vec![0.0; self.points.len() - self.rim]);
         for (weights, &[x, y]) in self.harmonics.iter().zip(curve) {
             add_multiples(&mut xs, &mut ys, weights, [x, y]);
@@ -67,7 +67,7 @@ fn add_multiples(xs: &mut [f64], ys: &mut [f64], weights: &[f64], [x, y]: Point)
     }
 }
 
-/// Number of vertices on the rim and inside, in the proportion of the paper's mesh.
+/// Returns the numbers of vertices on the rim and inside, in the proportion of the paper's mesh.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "counts far below 2^32")]
 fn split(vertices: usize) -> (usize, usize) {
     let rim = (RIM_OF_PAPER.0 * (vertices as f64 / RIM_OF_PAPER.1).sqrt()).round() as usize;
@@ -86,7 +86,7 @@ fn delaunay(points: &[Point]) -> Result<Vec<[u32; 3]>, Error> {
     let mesh = DelaunayTriangulation::<_>::bulk_load_stable(vertices).map_err(|_| Error::Parameter {
         field: "vertices",
         value: f64::NAN,
-        accepted: "a number whose sunflower can be triangulated",
+        accepted: "a number of points that can be triangulated",
     })?;
     #[expect(clippy::cast_possible_truncation, reason = "counts far below 2^32")]
     Ok(mesh.inner_faces().map(|face| face.vertices().map(|v| v.fix().index() as u32)).collect())
@@ -110,7 +110,7 @@ fn relax(points: &mut [Point], rim: usize, triangles: &[[u32; 3]]) {
     }
 }
 
-/// Edges, and for each inner edge the two vertices opposite it.
+/// Returns the edges, and the two vertices opposite each inner edge.
 fn pairs(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Pair>, Vec<Pair>) {
     let mut edges = edges(triangles, vertices);
     edges.sort_unstable_by_key(|e| e.ends);
@@ -121,14 +121,14 @@ fn pairs(triangles: &[[u32; 3]], vertices: usize) -> (Vec<Pair>, Vec<Pair>) {
     (edges.iter().map(|e| e.ends).collect(), bends.collect())
 }
 
-/// Orders pairs for the solver: patch by patch, so that what a patch needs stays in the first cache, the patches scattered over the disc,
-/// so that no direction is preferred; within a patch in sets without a common vertex, so that neighbours in the list never
-/// wait for each other.
+/// Orders pairs for the solver: patch by patch, so that a patch stays in the L1 cache. The order of patches is
+/// scattered over the disc, so that no direction is preferred. Within a patch, consecutive pairs share no vertex, so
+/// that they do not wait for each other.
 fn ordered(pairs: &[Pair], points: &[Point]) -> Vec<Pair> {
-    patches(pairs, points).iter().flat_map(|patch| coloured(patch, points.len())).collect()
+    patches(pairs, points).iter().flat_map(|patch| independent_sets(patch, points.len())).collect()
 }
 
-/// Pairs by the square of a grid over the disc that their middle lies in.
+/// Groups pairs by the grid square that contains their midpoint.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "patch numbers, far below 2^32")]
 fn patches(pairs: &[Pair], points: &[Point]) -> Vec<Vec<Pair>> {
     let side = (points.len() as f64 / PATCH).sqrt().ceil() as usize;
@@ -139,15 +139,15 @@ fn patches(pairs: &[Pair], points: &[Point]) -> Vec<Vec<Pair>> {
             |axis: usize| ((0.25 * (a[axis] + b[axis]) + 0.5) * side as f64).clamp(0.0, side as f64 - 1.0) as usize;
         patches[place(1) * side + place(0)].push(pair);
     }
-    // Multiples of the golden angle never come close to each other.
+    // Multiples of the golden angle are evenly spaced: this scatters the patches.
     let turn = |patch: usize| (patch as f64 * GOLDEN_ANGLE / TAU).fract();
     let mut order: Vec<usize> = (0..patches.len()).collect();
     order.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)));
     order.into_iter().map(|patch| std::mem::take(&mut patches[patch])).collect()
 }
 
-/// Sorts pairs into sets without a common vertex (greedy colouring).
-fn coloured(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
+/// Sorts pairs into sets without a common vertex, by greedy colouring.
+fn independent_sets(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
     let mut taken = vec![0_u64; vertices];
     let mut sets: Vec<Vec<Pair>> = Vec::new();
     for &[a, b] in pairs {
@@ -160,7 +160,7 @@ fn coloured(pairs: &[Pair], vertices: usize) -> Vec<Pair> {
     sets.concat()
 }
 
-/// Weights of the trigonometric polynomial through the rim, continued inwards:
+/// Returns the weights of the trigonometric polynomial through the rim, continued inwards:
 /// w = (1/K) ∑_l r^|l| cos l(θ - θ_k), |l| ≤ K/2.
 fn harmonics(points: &[Point], rim: usize) -> Vec<Vec<f64>> {
     points[..rim]
@@ -191,7 +191,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn the_disc_is_a_disc() {
+    fn the_mesh_covers_the_disc() {
         let disc = Disc::new(538).unwrap();
         assert_eq!((disc.points.len(), disc.rim), (538, 75));
         // Euler: V − E + F = 1, and the rim is the boundary.
@@ -219,7 +219,7 @@ mod tests {
         for pairs in [&disc.edges, &disc.bends] {
             let mut taken = BTreeSet::new();
             let mut sets = 1;
-            for [a, b] in coloured(pairs, 200) {
+            for [a, b] in independent_sets(pairs, 200) {
                 assert!(a < b);
                 if !taken.insert(a) | !taken.insert(b) {
                     sets += 1;
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_are_small_and_hold_every_pair_once() {
+    fn patches_are_small_and_contain_every_pair_once() {
         let disc = Disc::new(2000).unwrap();
         let (mut edges, bends) = pairs(&disc.triangles, 2000);
         for (found, all) in [(&disc.edges, &edges), (&disc.bends, &bends)] {
@@ -246,12 +246,12 @@ mod tests {
     }
 
     #[test]
-    fn harmonic_functions_are_carried_inwards() {
+    fn harmonic_functions_are_reproduced() {
         let disc = Disc::new(400).unwrap();
         // Re z³ and Im z² are harmonic.
         let field = |&[x, y]: &Point| [x * x * x - 3.0 * x * y * y, 2.0 * x * y];
         let rim: Vec<Point> = disc.points[..disc.rim].iter().map(field).collect();
-        for (found, p) in disc.spread(&rim).iter().zip(&disc.points) {
+        for (found, p) in disc.harmonic_map(&rim).iter().zip(&disc.points) {
             let wanted = field(p);
             assert!((found[0] - wanted[0]).abs() < 1e-9 && (found[1] - wanted[1]).abs() < 1e-9);
         }

@@ -1,14 +1,14 @@
-//! The polygon a sheet is pressed into.
+//! The target outline of a sheet.
 
 use crate::{Error, Point};
 use std::f64::consts::PI;
 
-/// A checked outline in units of its equivalent radius, its centre of mass at the origin, its area positive.
+/// A valid outline in units of its equivalent radius, with its centroid at the origin and positive area.
 #[derive(Debug, Clone)]
 pub(crate) struct Outline {
     pub(crate) points: Vec<Point>,
     pub(crate) centre: Point,
-    /// Equivalent radius √(area / π) in the caller's unit.
+    /// Equivalent radius √(area / π) in the unit of the caller.
     pub(crate) radius: f64,
 }
 
@@ -25,7 +25,7 @@ impl Outline {
         let local: Vec<Point> = points.iter().map(|p| [p[0] - x0, p[1] - y0]).collect();
         let (area, centre) = moments(&local);
         let span = local.iter().fold(0.0_f64, |s, p| s.max(p[0].abs()).max(p[1].abs()));
-        // Areas below the rounding of their own terms are those of a line.
+        // A smaller area is a rounding error: the points are collinear.
         if !(area.abs() > f64::EPSILON * span * span * 64.0 && area.is_finite()) {
             return Err(Error::NoArea { area });
         }
@@ -38,13 +38,13 @@ impl Outline {
         Ok(Outline { points, centre: [x0 + centre[0], y0 + centre[1]], radius })
     }
 
-    /// The point that stands `offset` in 0..1 of the way round, and `count - 1` more at equal arcs.
+    /// Returns `count` points at equal arc lengths, the first at the fraction `offset` of the perimeter, 0 to 1.
     pub(crate) fn resampled(&self, count: usize, offset: f64) -> Vec<Point> {
         let sides = || sides(&self.points);
         let perimeter: f64 = sides().map(|(a, b)| distance(a, b)).sum();
         let mut walked = 0.0;
         let mut ring = Vec::with_capacity(count);
-        // Twice round, because the first arc starts somewhere on the way.
+        // Two rounds, because the first arc starts at `offset`.
         for (a, b) in sides().chain(sides()) {
             let length = distance(a, b);
             while ring.len() < count {
@@ -61,8 +61,8 @@ impl Outline {
         ring
     }
 
-    /// The outline's own corners in the order in which a walk from `offset` meets them: which of `count` equal arcs each lies in,
-    /// how far along it, and where.
+    /// Returns the corners of the outline in order from `offset`: the index of the equal arc, of `count`, that contains
+    /// it, the position along that arc, 0 to 1, and the point.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "arc numbers below count")]
     pub(crate) fn corners(&self, count: usize, offset: f64) -> Vec<(usize, f64, Point)> {
         let perimeter: f64 = sides(&self.points).map(|(a, b)| distance(a, b)).sum();
@@ -86,7 +86,7 @@ pub(crate) fn sides(points: &[Point]) -> impl Iterator<Item = (Point, Point)> {
     points.iter().copied().zip(points.iter().copied().cycle().skip(1))
 }
 
-/// Signed area (positive where +x turns into +y) and centre of mass of a polygon.
+/// Returns the signed area (positive if oriented from +x to +y) and the centroid of a polygon.
 pub(crate) fn moments(points: &[Point]) -> (f64, Point) {
     let (mut twice, mut sx, mut sy) = (0.0, 0.0, 0.0);
     for (a, b) in sides(points) {
@@ -102,17 +102,17 @@ pub(crate) fn distance(a: Point, b: Point) -> f64 {
     square(a, b).sqrt()
 }
 
-/// Sides that follow each other and are passed over together when their box is too far away.
+/// Consecutive sides that are skipped together if their bounding box is too far away.
 const GROUP: usize = 16;
 
-/// Tells inside from outside, with the sides sorted into bands of y and grouped into boxes.
+/// Point-in-polygon and nearest-point queries. Sides are sorted into bands of y and grouped into bounding boxes.
 #[derive(Debug)]
 pub(crate) struct Inside {
     sides: Vec<(Point, Point)>,
     low: f64,
     bands_per_unit: f64,
     bands: Vec<Vec<u32>>,
-    /// Least and greatest x and y of each [`GROUP`] of sides.
+    /// Bounding box of each [`GROUP`] of sides.
     boxes: Vec<[Point; 2]>,
 }
 
@@ -135,8 +135,8 @@ impl Inside {
         Inside { sides, low, bands_per_unit, bands, boxes }
     }
 
-    /// Even-odd rule.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a band number, looked up")]
+    /// Returns whether a point is inside, by the even-odd rule.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a band number, checked by get")]
     pub(crate) fn contains(&self, p: Point) -> bool {
         let band = (p[1] - self.low) * self.bands_per_unit;
         let Some(list) = self.bands.get(band as usize).filter(|_| band >= 0.0) else {
@@ -149,7 +149,7 @@ impl Inside {
         list.iter().filter(crossed).count() % 2 == 1
     }
 
-    /// `p` itself where it is inside, else the nearest point of the boundary.
+    /// Returns `p` if it is inside, otherwise the nearest point of the boundary.
     pub(crate) fn nearest(&self, p: Point) -> Point {
         if self.contains(p) {
             return p;
@@ -197,7 +197,7 @@ mod tests {
     use portable_numerics::random::uniform;
 
     #[test]
-    fn an_outline_is_centred_scaled_and_turned() {
+    fn an_outline_is_centred_scaled_and_oriented() {
         let outline = Outline::new(&angular()).unwrap();
         let (area, centre) = moments(&outline.points);
         assert!((area - PI).abs() < 1e-12 && centre[0].abs() < 1e-12 && centre[1].abs() < 1e-12);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_outline_is_an_error() {
+    fn invalid_outlines_are_rejected() {
         let error = |points: &[Point]| Outline::new(points).unwrap_err();
         assert_eq!(error(&[[0.0, 0.0], [1.0, 0.0]]), Error::TooFewPoints { points: 2 });
         assert!(matches!(error(&[[0.0, 0.0], [f64::NAN, 0.0], [1.0, 1.0]]), Error::NotFinite { index: 1, .. }));
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn arcs_are_equal_and_corners_are_found_in_them() {
+    fn arcs_are_equal_and_contain_their_corners() {
         let outline = Outline::new(&angular()).unwrap();
         let (count, offset) = (40, 0.37);
         let ring = outline.resampled(count, offset);
@@ -232,12 +232,12 @@ mod tests {
     }
 
     #[test]
-    fn nearest_agrees_with_looking_at_every_side() {
+    fn nearest_agrees_with_brute_force() {
         let points = Outline::new(&wavy(5.0, 0.3)).unwrap().points;
         let inside = Inside::new(&points);
         let mut rng = rng(2);
         let mut value = || 3.6 * (uniform(&mut rng) - 0.5);
-        let mut strays = 0;
+        let mut outside = 0;
         for _ in 0..2000 {
             let p = [value(), value()];
             let crossings = sides(&points)
@@ -248,7 +248,7 @@ mod tests {
             let wanted = if crossings % 2 == 1 {
                 p
             } else {
-                strays += 1;
+                outside += 1;
                 let feet = sides(&points).map(|(a, b)| {
                     let u = [b[0] - a[0], b[1] - a[1]];
                     let t =
@@ -259,6 +259,6 @@ mod tests {
             };
             assert_eq!(inside.nearest(p), wanted);
         }
-        assert!(strays > 500);
+        assert!(outside > 500);
     }
 }

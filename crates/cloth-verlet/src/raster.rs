@@ -1,4 +1,4 @@
-//! The picture of a sheet: its thickness along z, exact in area and in volume.
+//! Rasterises a sheet: its thickness along z, exact in area and volume.
 
 use crate::sheet::cross;
 use crate::sheet::{Edge, OUTSIDE};
@@ -6,123 +6,131 @@ use crate::{Point, Sheet, Vertex};
 use multiversion::multiversion;
 use std::ops::Range;
 
-/// Where the picture lies.
+/// Position and size of the pixels of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
-    /// Centre of the first pixel, in the sheet's unit.
+pub struct PixelGrid {
+    /// Centre of the first pixel, in the unit of the sheet.
     pub origin: Point,
-    /// Width and height of a pixel in the sheet's unit, above 0.
-    pub pixel: f64,
+    /// Width and height of a pixel in the unit of the sheet, above 0.
+    pub pixel_size: f64,
 }
 
-/// Area in square pixels below which a triangle's thickness is taken as even: its slope would be all rounding.
+/// Area in square pixels below which the thickness of a triangle counts as constant: its slope would be a rounding
+/// error.
 const SLIVER: f64 = 1e-2;
-/// Part of the greatest thickness that counts as nothing: what rounding leaves beyond the sheet's edge.
-const NOTHING: f64 = 1e-11;
-/// Area in square pixels below which all triangles round a vertex stand on edge.
-const LEAST_ROOM: f64 = 1e-6;
+/// Fraction of the greatest thickness below which a pixel is 0: rounding errors beyond the edge of the sheet.
+const NEGLIGIBLE: f64 = 1e-11;
+/// Projected area in square pixels below which all triangles around a vertex count as vertical.
+const MIN_PROJECTED_AREA: f64 = 1e-6;
 
-/// Rows that are summed side by side.
-const ABREAST: usize = 4;
+/// Rows that are integrated at once.
+const ROWS_AT_ONCE: usize = 4;
 
-/// Thickness p₀ + p₁ x + p₂ y.
+/// Coefficients of the thickness p₀ + p₁ x + p₂ y.
 type Plane = [f64; 3];
 
 impl Sheet {
-    /// Adds to each pixel of `image` (row-major, `width` a row) the sheet's mean thickness there along z, in the unit of
-    /// `thickness`: all layers of a fold together. `thickness` is the flat sheet's as a function of [`Sheet::rest_radius`]; it
-    /// becomes thickness/|n_z| where the sheet is tilted.
+    /// Adds to each pixel of `image` (row-major, `width` pixels a row) the mean thickness of the sheet along z, summed
+    /// over all layers of a fold. `thickness` is the thickness of the flat sheet as a function of
+    /// [`Sheet::rest_radius`]; the unit is the same. Where the sheet is tilted, it becomes thickness/|n_z|.
     ///
-    /// The sum over the image times the pixel's area is [`Sheet::volume`], as far as the sheet lies within the image. Each vertex
-    /// gathers a third of the volume of the triangles round it and spreads it as a pyramid over their projections, so that
-    /// the picture has no facets; pixels cut by an edge hold their exact share.
+    /// The sum over the image times the area of a pixel is [`Sheet::volume`], if the sheet is within the image. Each
+    /// vertex gathers a third of the volume of its adjacent triangles and distributes it as a pyramid over their
+    /// projections, so that the image has no facets. Pixels at an edge contain the exact fraction.
     ///
     /// # Panics
     ///
-    /// If the image is not made of whole rows, or `view.pixel` is not above 0.
-    pub fn thickness_into(&self, image: &mut [f32], width: usize, view: &View, thickness: impl Fn(f64) -> f64) {
-        assert!(width > 0 && image.len().is_multiple_of(width), "{} pixels are no whole rows of {width}", image.len());
-        assert!(view.pixel > 0.0, "pixel = {}: must be above 0", view.pixel);
-        let scale = 1.0 / view.pixel;
-        let [columns, rows] = self.reach([width, image.len() / width], view);
+    /// If the length of the image is not a multiple of `width`, or the pixel size is not above 0.
+    pub fn thickness_into(&self, image: &mut [f32], width: usize, grid: &PixelGrid, thickness: impl Fn(f64) -> f64) {
+        assert!(
+            width > 0 && image.len().is_multiple_of(width),
+            "{} pixels are not a multiple of the width {width}",
+            image.len()
+        );
+        assert!(grid.pixel_size > 0.0, "pixel_size = {}: expected more than 0", grid.pixel_size);
+        let scale = 1.0 / grid.pixel_size;
+        let [columns, rows] = self.covered_pixels([width, image.len() / width], grid);
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        // The first pixel in reach covers 0..1 here, and lengths are in pixels.
+        // In units of pixels; the first covered pixel is 0..1.
         let first = [columns.start as f64, rows.start as f64];
-        let shift = [0, 1].map(|axis| view.origin[axis] + (first[axis] - 0.5) * view.pixel);
+        let shift = [0, 1].map(|axis| grid.origin[axis] + (first[axis] - 0.5) * grid.pixel_size);
         let place = |v: &Vertex| [(v[0] - shift[0]) * scale, (v[1] - shift[1]) * scale];
         let places: Vec<Point> = self.vertices.iter().map(place).collect();
         let profile: Vec<f64> = self.radius.iter().map(|&r| thickness(r)).collect();
         let mut gathered = vec![[0.0; 2]; places.len()];
         for (t, corners) in self.triangles.iter().enumerate() {
             let corners = corners.map(|v| v as usize);
-            // A third of the volume, and the same third of the room it is spread over.
+            // A third of the volume, and a third of the projected area.
             let volume = self.rest_area_of(t) * scale * scale * corners.iter().map(|&v| profile[v]).sum::<f64>() / 3.0;
-            let room = 0.5 * cross(places[corners[0]], places[corners[1]], places[corners[2]]).abs();
+            let projected_area = 0.5 * cross(places[corners[0]], places[corners[1]], places[corners[2]]).abs();
             for v in corners {
                 gathered[v][0] += volume;
-                gathered[v][1] += room;
+                gathered[v][1] += projected_area;
             }
         }
-        self.make_room(&mut gathered);
-        let density: Vec<f64> = gathered.iter().map(|[volume, room]| volume / room.max(LEAST_ROOM)).collect();
+        self.redistribute(&mut gathered);
+        let density: Vec<f64> =
+            gathered.iter().map(|[volume, projected_area]| volume / projected_area.max(MIN_PROJECTED_AREA)).collect();
         let greatest = density.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
         let planes: Vec<Plane> =
             self.triangles.iter().map(|t| plane(t.map(|v| (places[v as usize], density[v as usize])))).collect();
-        // One column more takes what goes on beyond.
+        // One more column holds the remainder beyond the row.
         let stride = columns.len() + 1;
-        let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ABREAST)];
+        let mut sums = vec![[0.0; 2]; stride * rows.len().next_multiple_of(ROWS_AT_ONCE)];
         sweep(&mut sums[..stride * rows.len()], stride, &self.edges, &places, &planes);
-        let mut lines = vec![0.0; ABREAST * columns.len()];
+        let mut lines = vec![0.0; ROWS_AT_ONCE * columns.len()];
         let mut image = image[rows.start * width..rows.end * width].chunks_exact_mut(width);
-        for steps in sums.chunks_exact(ABREAST * stride) {
-            integrate(&mut lines, steps, NOTHING * greatest);
+        for steps in sums.chunks_exact(ROWS_AT_ONCE * stride) {
+            integrate(&mut lines, steps, NEGLIGIBLE * greatest);
             for (line, row) in lines.chunks_exact(columns.len()).zip(&mut image) {
                 add(&mut row[columns.clone()], line);
             }
         }
     }
 
-    /// Hands the volume of each vertex without room to its neighbours that have some. Only what stands on edge all around is lost.
-    fn make_room(&self, gathered: &mut [[f64; 2]]) {
-        let cramped = |room: f64| room < LEAST_ROOM;
-        if !gathered.iter().any(|g| cramped(g[1])) {
+    /// Moves the volume of each vertex without projected area to its neighbours that have some. It is lost if no
+    /// neighbour has.
+    fn redistribute(&self, gathered: &mut [[f64; 2]]) {
+        let is_vertical = |projected_area: f64| projected_area < MIN_PROJECTED_AREA;
+        if !gathered.iter().any(|g| is_vertical(g[1])) {
             return;
         }
         let both = self.edges.iter().flat_map(|e| [[e.ends[0], e.ends[1]], [e.ends[1], e.ends[0]]]);
-        let inherits = |[from, to]: &[usize; 2]| cramped(gathered[*from][1]) && !cramped(gathered[*to][1]);
+        let inherits = |[from, to]: &[usize; 2]| is_vertical(gathered[*from][1]) && !is_vertical(gathered[*to][1]);
         let pairs: Vec<[usize; 2]> = both.map(|pair| pair.map(|v| v as usize)).filter(inherits).collect();
-        let mut shares = vec![0.0; gathered.len()];
+        let mut neighbours = vec![0.0; gathered.len()];
         for &[from, _] in &pairs {
-            shares[from] += 1.0;
+            neighbours[from] += 1.0;
         }
         for &[from, to] in &pairs {
-            gathered[to][0] += gathered[from][0] / shares[from];
+            gathered[to][0] += gathered[from][0] / neighbours[from];
         }
-        for (g, shares) in gathered.iter_mut().zip(&shares) {
-            if *shares > 0.0 {
+        for (g, neighbours) in gathered.iter_mut().zip(&neighbours) {
+            if *neighbours > 0.0 {
                 g[0] = 0.0;
             }
         }
     }
 
-    /// Columns and rows of the image that the sheet may touch.
+    /// Returns the columns and rows of the image that the sheet may cover.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the image")]
-    fn reach(&self, size: [usize; 2], view: &View) -> [Range<usize>; 2] {
+    fn covered_pixels(&self, size: [usize; 2], grid: &PixelGrid) -> [Range<usize>; 2] {
         [0, 1].map(|axis| {
             let bounds = |(low, high): (f64, f64), v: &Vertex| (low.min(v[axis]), high.max(v[axis]));
             let (low, high) = self.vertices.iter().fold((f64::INFINITY, f64::NEG_INFINITY), bounds);
-            // Half a pixel, as pixels reach that far from their centres.
+            // Half a pixel, from its centre to its border.
             let pixel = |x: f64, end: f64| {
-                ((x - view.origin[axis]) / view.pixel + 0.5 + end).clamp(0.0, size[axis] as f64) as usize
+                ((x - grid.origin[axis]) / grid.pixel_size + 0.5 + end).clamp(0.0, size[axis] as f64) as usize
             };
             pixel(low, 0.0)..pixel(high, 1.0)
         })
     }
 }
 
-/// The linear thickness through three corners, negative where the triangle shows its back, so that the sweep adds it all the same.
+/// Returns the linear thickness through three corners; negated for a back-facing triangle, so that the sweep adds it as
+/// positive.
 fn plane([(a, da), (b, db), (c, dc)]: [(Point, f64); 3]) -> Plane {
     let area = cross(a, b, c);
     let plane = if area.abs() < 2.0 * SLIVER {
@@ -136,29 +144,30 @@ fn plane([(a, da), (b, db), (c, dc)]: [(Point, f64); 3]) -> Plane {
     if area < 0.0 { plane.map(|p| -p) } else { plane }
 }
 
-/// What an edge adds to a pixel: to its thickness, and to the growth of thickness from there on, from column to column.
+/// Contribution of an edge to a pixel: to its thickness, and to the increase of thickness from column to column.
 type Step = [f64; 2];
 
-/// Sums the steps of [`ABREAST`] rows, each a column longer than its line, from left to right; what is not above `nothing` becomes 0.
+/// Integrates the steps of [`ROWS_AT_ONCE`] rows from left to right; each has one column more than its line. Values up
+/// to `negligible` become 0.
 #[multiversion(targets = "simd")]
-fn integrate(lines: &mut [f64], steps: &[Step], nothing: f64) {
-    let width = lines.len() / ABREAST;
-    let (mut value, mut growth) = ([0.0; ABREAST], [0.0; ABREAST]);
+fn integrate(lines: &mut [f64], steps: &[Step], negligible: f64) {
+    let width = lines.len() / ROWS_AT_ONCE;
+    let (mut value, mut growth) = ([0.0; ROWS_AT_ONCE], [0.0; ROWS_AT_ONCE]);
     let mut rows = steps.chunks_exact(width + 1);
-    let rows: [&[Step]; ABREAST] = std::array::from_fn(|_| rows.next().map_or(&[][..], |row| &row[..width]));
+    let rows: [&[Step]; ROWS_AT_ONCE] = std::array::from_fn(|_| rows.next().map_or(&[][..], |row| &row[..width]));
     let mut out = lines.chunks_exact_mut(width);
-    let out: [&mut [f64]; ABREAST] = std::array::from_fn(|_| out.next().unwrap_or_default());
-    // A sum waits for the one before: rows side by side wait together.
+    let out: [&mut [f64]; ROWS_AT_ONCE] = std::array::from_fn(|_| out.next().unwrap_or_default());
+    // Each sum depends on the previous one; several rows hide that latency.
     for column in 0..width {
-        for k in 0..ABREAST {
-            let [even, slope] = rows[k][column];
-            value[k] += growth[k] + even;
+        for k in 0..ROWS_AT_ONCE {
+            let [value_step, slope] = rows[k][column];
+            value[k] += growth[k] + value_step;
             growth[k] += slope;
             out[k][column] = value[k];
         }
     }
     for value in lines {
-        *value = if value.abs() > nothing { *value } else { 0.0 };
+        *value = if value.abs() > negligible { *value } else { 0.0 };
     }
 }
 
@@ -170,8 +179,8 @@ fn add(pixels: &mut [f32], values: &[f64]) {
     }
 }
 
-/// Adds all edges. A triangle is what lies right of its edges that run up, less what lies right of those that run down; each edge
-/// stands for both its triangles by the difference of their planes.
+/// Adds all edges. A triangle is the region right of its upward edges minus the region right of its downward edges.
+/// Each edge adds the difference of the planes of its two triangles.
 #[multiversion(targets = "simd")]
 fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], planes: &[Plane]) {
     let (width, height) = ((stride - 1) as f64, (sums.len() / stride) as f64);
@@ -195,13 +204,13 @@ fn sweep(sums: &mut [Step], stride: usize, edges: &[Edge], places: &[Point], pla
     }
 }
 
-/// Adds `plane` over all that lies right of the edge from `a` down to `b`, row by row. Unless the edge is `CLIPPED` it lies within
-/// the canvas.
+/// Adds `plane` to the region right of the edge from `a` down to `b`, row by row. Unless `CLIPPED`, the edge is within
+/// the image.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rows clipped to the image")]
 fn add_edge<const CLIPPED: bool>(sums: &mut [Step], stride: usize, a: Point, b: Point, plane: Plane) {
     let slope = (b[0] - a[0]) / (b[1] - a[1]);
-    // Unused where the edge is upright.
+    // Unused for a vertical edge.
     let per_column = 1.0 / slope;
     let (mut from, mut bottom) = (a, b[1]);
     if CLIPPED {
@@ -226,14 +235,14 @@ fn add_edge<const CLIPPED: bool>(sums: &mut [Step], stride: usize, a: Point, b: 
     }
 }
 
-/// The part of an edge within one row, pixel by pixel.
+/// Adds the part of an edge within one row, pixel by pixel.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "columns clipped to the image")]
 fn add_run<const CLIPPED: bool>(line: &mut [Step], from: Point, to: Point, per_column: f64, plane: Plane) {
     let columns = line.len() as f64;
     let column = |x: f64| if CLIPPED { (x.clamp(-1.0, columns) + 1.0) as i32 - 1 } else { x as i32 };
     let (mut at, end) = (column(from[0]), column(to[0]));
-    // The border to the next pixel on the way lies this much beyond the pixel's own.
+    // Direction, and offset of the border to the next pixel.
     let (way, border) = if from[0] < to[0] { (1, 1) } else { (-1, 0) };
     let mut here = from;
     while at != end {
@@ -246,30 +255,31 @@ fn add_run<const CLIPPED: bool>(line: &mut [Step], from: Point, to: Point, per_c
     add_piece(line, end, here, to, plane);
 }
 
-/// The part of an edge within one pixel: its share there, and all of what lies further right.
+/// Adds the part of an edge within one pixel: the covered fraction of the pixel, and everything further right.
 #[inline(always)]
 #[expect(clippy::cast_sign_loss, reason = "columns clipped to the image")]
 fn add_piece(line: &mut [Step], column: i32, a: Point, b: Point, [p0, p1, p2]: Plane) {
     let dy = b[1] - a[1];
     let half = 0.5 * p1;
-    // The plane in the middle of pixel column i, p₀ + p₁ (i + ½) + p₂ ȳ.
-    let middle = |i: f64| p0 + half + p1 * i + p2 * (0.5 * (a[1] + b[1]));
+    // The plane at the centre of pixel column i, p₀ + p₁ (i + ½) + p₂ ȳ.
+    let centre = |i: f64| p0 + half + p1 * i + p2 * (0.5 * (a[1] + b[1]));
     if column < 0 {
-        line[0][0] += dy * middle(0.0);
+        line[0][0] += dy * centre(0.0);
         line[0][1] += dy * p1;
         return;
     }
     let left = f64::from(column);
     if let Some([here, next]) = line[column as usize..].first_chunk_mut() {
-        // Right of the piece, r wide, lies r (q − ½ p₁ r), where q is the plane at the pixel's right border. Along the piece r runs
-        // from r̄ − h to r̄ + h and q from q̄ − k to q̄ + k, and the mean of a product of the two is r̄ q̄ + h k / 3.
+        // The integral right of the piece, over a width r, is r (q − ½ p₁ r), where q is the plane at the right border
+        // of the pixel. Along the piece r runs from r̄ − h to r̄ + h and q from q̄ − k to q̄ + k; the mean of their
+        // product is r̄ q̄ + h k / 3.
         let mean = left + 1.0 - 0.5 * (a[0] + b[0]);
         let h = 0.5 * (a[0] - b[0]);
         let k = 0.5 * p2 * dy;
-        let middle = middle(left);
-        let share = dy * (mean * (middle + half - half * mean) + h * (k - half * h) * (1.0 / 3.0));
-        here[0] += share;
-        next[0] += dy * (middle + p1) - share;
+        let centre = centre(left);
+        let covered = dy * (mean * (centre + half - half * mean) + h * (k - half * h) * (1.0 / 3.0));
+        here[0] += covered;
+        next[0] += dy * (centre + p1) - covered;
         next[1] += dy * p1;
     }
 }
@@ -281,8 +291,8 @@ mod tests {
     use crate::{Cloth, ClothParams};
     use portable_numerics::random::uniform;
 
-    const VIEW: View = View { origin: [-90.0, -140.0], pixel: 1.3 };
-    const PLAIN: View = View { origin: [0.0, 0.0], pixel: 1.0 };
+    const GRID: PixelGrid = PixelGrid { origin: [-90.0, -140.0], pixel_size: 1.3 };
+    const PLAIN: PixelGrid = PixelGrid { origin: [0.0, 0.0], pixel_size: 1.0 };
 
     fn profile(r: f64) -> f64 {
         1.4 - r * r
@@ -292,13 +302,18 @@ mod tests {
         Cloth::new(&ClothParams::default()).unwrap().crumple(&wavy(3.0, 0.15), &mut rng(3)).unwrap()
     }
 
-    fn picture(sheet: &Sheet, [width, height]: [usize; 2], view: &View, thickness: impl Fn(f64) -> f64) -> Vec<f64> {
+    fn rendered(
+        sheet: &Sheet,
+        [width, height]: [usize; 2],
+        grid: &PixelGrid,
+        thickness: impl Fn(f64) -> f64,
+    ) -> Vec<f64> {
         let mut image = vec![0.0_f32; width * height];
-        sheet.thickness_into(&mut image, width, view, thickness);
+        sheet.thickness_into(&mut image, width, grid, thickness);
         image.into_iter().map(f64::from).collect()
     }
 
-    /// A square of two triangles, tilted about y, with its corner at (10, 10).
+    /// Returns a square of two triangles, tilted about y, with its corner at (10, 10).
     fn square(side: f64, slope: f64) -> Sheet {
         let rest = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]];
         let cos = 1.0 / (1.0 + slope * slope).sqrt();
@@ -307,47 +322,47 @@ mod tests {
     }
 
     #[test]
-    fn law_25_the_picture_holds_the_sheets_volume() {
-        // Triangles of the hem have no area where the outline has corners.
+    fn the_image_contains_the_volume_of_the_sheet() {
+        // Triangles at the rim have no area at corners of the outline.
         let outline = [[10.0, 5.0], [90.0, 12.0], [70.0, 40.0], [95.0, 80.0], [30.0, 90.0], [4.0, 50.0]];
         let cloth = Cloth::new(&ClothParams { vertices: 400, ..ClothParams::default() }).unwrap();
         let cornered = (0..6).map(|seed| (cloth.crumple(&outline, &mut rng(seed)).unwrap(), [100; 2], PLAIN));
-        for (sheet, size, view) in cornered.chain([(crumpled(), [190, 185], VIEW)]) {
-            let image = picture(&sheet, size, &view, profile);
-            let sum = image.iter().sum::<f64>() * view.pixel * view.pixel;
+        for (sheet, size, grid) in cornered.chain([(crumpled(), [190, 185], GRID)]) {
+            let image = rendered(&sheet, size, &grid, profile);
+            let sum = image.iter().sum::<f64>() * grid.pixel_size * grid.pixel_size;
             assert!((sum / sheet.volume(profile) - 1.0).abs() < 1e-7, "{sum}");
             assert!(image.iter().all(|&v| v >= 0.0));
         }
     }
 
     #[test]
-    fn law_25_a_flat_sheet_is_even() {
+    fn a_flat_sheet_is_uniform() {
         let mut sheet = crumpled();
         for (v, r) in sheet.vertices.iter_mut().zip(&sheet.rest) {
             *v = [30.0 + r[0], -20.0 + r[1], 0.0];
         }
-        let image = picture(&sheet, [190, 185], &VIEW, |_| 0.7);
+        let image = rendered(&sheet, [190, 185], &GRID, |_| 0.7);
         let (inside, rim): (Vec<f64>, Vec<f64>) = image.iter().filter(|&&v| v > 0.0).partition(|&&v| v > 0.7 - 1e-6);
         assert!(inside.len() > 15_000 && rim.len() < 1000, "{} {}", inside.len(), rim.len());
         assert!(inside.iter().all(|v| (v - 0.7).abs() < 1e-6));
     }
 
     #[test]
-    fn law_25_a_tilted_plane_is_thicker_by_its_normal_and_pixels_hold_their_exact_share() {
+    fn a_tilted_plane_is_thicker_by_its_normal_and_edge_pixels_are_exact() {
         for (slope, side) in [(0.0, 1.5), (0.5, 1.5), (3.0, 7.0)] {
-            // A square whose corner lies a quarter into a pixel.
-            let view = View { origin: [10.25, 10.25], pixel: 1.0 };
+            // A square with its corner a quarter into a pixel.
+            let grid = PixelGrid { origin: [10.25, 10.25], pixel_size: 1.0 };
             // |n_z| = 1 / √(1 + slope²)
             let steep = libm::sqrt(1.0 + slope * slope);
             let part = |k: usize, side: f64| (side + 0.25 - k as f64).clamp(0.0, if k == 0 { 0.75 } else { 1.0 });
-            for (k, value) in picture(&square(side, slope), [9; 2], &view, |_| 0.3).iter().enumerate() {
+            for (k, value) in rendered(&square(side, slope), [9; 2], &grid, |_| 0.3).iter().enumerate() {
                 let wanted = 0.3 * steep * part(k % 9, side / steep) * part(k / 9, side);
                 assert!((value - wanted).abs() < 1e-6, "{k}: {value} {wanted}");
             }
         }
     }
 
-    /// The picture by brute force: many points in each triangle, some of which show their backs.
+    /// Compares with many sample points in each triangle, some of which are back-facing.
     #[test]
     fn the_sweep_agrees_with_sampling() {
         let mut rng = rng(4);
@@ -358,7 +373,7 @@ mod tests {
             (0..9).map(|_| value(1.0)).collect(),
             vec![[0, 1, 4], [4, 3, 0], [1, 2, 5], [5, 4, 1], [3, 4, 7], [6, 3, 7], [4, 5, 8], [7, 4, 8]],
         );
-        let image = picture(&sheet, [10; 2], &PLAIN, |r| 1.0 + r);
+        let image = rendered(&sheet, [10; 2], &PLAIN, |r| 1.0 + r);
         let places: Vec<Point> = sheet.vertices.iter().map(|v| [v[0], v[1]]).collect();
         let mut gathered = [[0.0; 2]; 9];
         for (t, corners) in sheet.triangles.iter().enumerate() {
@@ -392,41 +407,44 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_the_picture_is_the_part_of_the_picture() {
+    fn a_window_of_the_image_is_rendered_alone() {
         let sheet = crumpled();
-        let whole = picture(&sheet, [190, 185], &VIEW, profile);
-        let view = View { origin: [VIEW.origin[0] + 70.0 * VIEW.pixel, VIEW.origin[1] + 60.0 * VIEW.pixel], ..VIEW };
-        for (k, value) in picture(&sheet, [50, 40], &view, profile).iter().enumerate() {
+        let whole = rendered(&sheet, [190, 185], &GRID, profile);
+        let grid = PixelGrid {
+            origin: [GRID.origin[0] + 70.0 * GRID.pixel_size, GRID.origin[1] + 60.0 * GRID.pixel_size],
+            ..GRID
+        };
+        for (k, value) in rendered(&sheet, [50, 40], &grid, profile).iter().enumerate() {
             let wanted = whole[(60 + k / 50) * 190 + 70 + k % 50];
             assert!((value - wanted).abs() < 1e-5, "{k}: {value} {wanted}");
         }
-        let away = picture(&sheet, [10; 2], &View { origin: [1e4, 0.0], pixel: 1.0 }, profile);
+        let away = rendered(&sheet, [10; 2], &PixelGrid { origin: [1e4, 0.0], pixel_size: 1.0 }, profile);
         assert_eq!(away, [0.0; 100]);
     }
 
     #[test]
-    fn a_corner_on_edge_leaves_its_volume_to_its_neighbours() {
+    fn a_vertical_triangle_passes_its_volume_to_its_neighbours() {
         let Sheet { vertices, rest, triangles, .. } = square(10.0, 0.0);
-        // A triangle that stands on the square's corner like a flag on its pole.
+        // A vertical triangle at the corner of the square.
         let sheet = Sheet::new(
             [&vertices[..], &[[10.0, 10.0, 7.0], [10.0, 10.0, 9.0]]].concat(),
             [&rest[..], &[[-1.0, 0.0], [0.0, -1.0]]].concat(),
             vec![0.5; 6],
             [&triangles[..], &[[0, 4, 5]]].concat(),
         );
-        let sum: f64 = picture(&sheet, [30; 2], &PLAIN, |_| 1.0).iter().sum();
+        let sum: f64 = rendered(&sheet, [30; 2], &PLAIN, |_| 1.0).iter().sum();
         assert!((sum - 100.5).abs() < 1e-4, "{sum}");
     }
 
     #[test]
-    #[should_panic(expected = "no whole rows")]
-    fn an_image_has_whole_rows() {
-        square(1.0, 0.0).thickness_into(&mut [0.0; 10], 3, &VIEW, |_| 1.0);
+    #[should_panic(expected = "not a multiple")]
+    fn a_partial_row_is_rejected() {
+        square(1.0, 0.0).thickness_into(&mut [0.0; 10], 3, &GRID, |_| 1.0);
     }
 
     #[test]
-    #[should_panic(expected = "pixel = 0")]
-    fn pixels_have_a_size() {
-        square(1.0, 0.0).thickness_into(&mut [0.0; 9], 3, &View { pixel: 0.0, ..VIEW }, |_| 1.0);
+    #[should_panic(expected = "pixel_size = 0")]
+    fn a_pixel_size_of_zero_is_rejected() {
+        square(1.0, 0.0).thickness_into(&mut [0.0; 9], 3, &PixelGrid { pixel_size: 0.0, ..GRID }, |_| 1.0);
     }
 }

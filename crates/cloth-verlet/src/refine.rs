@@ -1,4 +1,4 @@
-//! From the solver's mesh to the one that is seen: smooth inside, exactly on the outline at its rim.
+//! The final mesh of a sheet: optionally subdivided, with its rim exactly on the outline.
 
 use crate::mesh::Disc;
 use crate::outline::Outline;
@@ -7,17 +7,18 @@ use crate::{Point, Sheet, Smoothing, Vertex};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Part of a side of the rim within which a corner of the outline counts as the side's end.
-const SAME: f64 = 1e-9;
+/// Distance from the end of a rim side, as a fraction of its length, within which a corner of the outline is merged
+/// with it.
+const MERGE_DISTANCE: f64 = 1e-9;
 
-/// The finer mesh and how its vertices follow from the coarse ones.
+/// The final mesh, and its vertices as weighted means of the solver's vertices.
 #[derive(Debug)]
 pub(crate) struct Refinement {
-    /// The disc, flat.
+    /// The flat disc.
     flat: Sheet,
     stencils: Stencils,
-    /// The rim's vertices in order, and the triangle inside each of its sides.
-    hem: Vec<(u32, u32)>,
+    /// The vertices of the rim in order, and the triangle at each of its sides.
+    rim: Vec<(u32, u32)>,
 }
 
 impl Refinement {
@@ -31,8 +32,8 @@ impl Refinement {
         let points: Vec<Point> = mean(&stencils, &disc.points).collect();
         let radius = points.iter().map(|[x, y]| (x * x + y * y).sqrt().min(1.0)).collect();
         let flat = Sheet::new(points.iter().map(|&[x, y]| [x, y, 0.0]).collect(), points, radius, triangles);
-        let hem = rim(&flat.edges);
-        Refinement { flat, stencils, hem }
+        let rim = rim(&flat.edges);
+        Refinement { flat, stencils, rim }
     }
 
     pub(crate) fn apply(&self, vertices: &[Vertex], rest: &[Point]) -> Sheet {
@@ -41,12 +42,12 @@ impl Refinement {
         Sheet { vertices, rest, radius: Arc::clone(radius), triangles: Arc::clone(triangles), edges: Arc::clone(edges) }
     }
 
-    /// Lays the rim on the outline: its vertices at equal arcs, and one more at each corner between them. The rest state is only
-    /// divided, so that areas stay what they were.
-    pub(crate) fn hem(&self, sheet: &mut Sheet, outline: &Outline, offset: f64) {
-        let count = self.hem.len();
+    /// Moves the rim onto the outline: its vertices to equal arc lengths, and inserts a vertex at each corner between
+    /// them. The rest state is only divided, so that its area does not change.
+    pub(crate) fn snap_rim(&self, sheet: &mut Sheet, outline: &Outline, offset: f64) {
+        let count = self.rim.len();
         let radius = Arc::make_mut(&mut sheet.radius);
-        for (&(v, _), p) in self.hem.iter().zip(outline.resampled(count, offset)) {
+        for (&(v, _), p) in self.rim.iter().zip(outline.resampled(count, offset)) {
             sheet.vertices[v as usize][0] = p[0];
             sheet.vertices[v as usize][1] = p[1];
             radius[v as usize] = 1.0;
@@ -54,19 +55,19 @@ impl Refinement {
         for corners in outline.corners(count, offset).chunk_by(|a, b| a.0 == b.0) {
             self.fan(sheet, corners);
         }
-        sheet.pair_up();
+        sheet.update_edges();
     }
 
-    /// Divides the triangle inside the side of the rim that the corners lie on into a fan, one more for each corner.
+    /// Divides the triangle at the rim side with these corners into a fan, with one more triangle for each corner.
     fn fan(&self, sheet: &mut Sheet, corners: &[(usize, f64, Point)]) {
         let side = corners[0].0;
-        let ((a, triangle), (b, _)) = (self.hem[side], self.hem[(side + 1) % self.hem.len()]);
+        let ((a, triangle), (b, _)) = (self.rim[side], self.rim[(side + 1) % self.rim.len()]);
         let old = sheet.triangles[triangle as usize];
         let Some(&apex) = old.iter().find(|&&v| v != a && v != b) else { return };
         let (ra, rb) = (sheet.rest[a as usize], sheet.rest[b as usize]);
         let (za, zb) = (sheet.vertices[a as usize][2], sheet.vertices[b as usize][2]);
         let mut last = a;
-        for &(_, part, [x, y]) in corners.iter().filter(|c| (SAME..=1.0 - SAME).contains(&c.1)) {
+        for &(_, part, [x, y]) in corners.iter().filter(|c| (MERGE_DISTANCE..=1.0 - MERGE_DISTANCE).contains(&c.1)) {
             let new = index(sheet.vertices.len());
             sheet.vertices.push([x, y, za + part * (zb - za)]);
             sheet.rest.push([ra[0] + part * (rb[0] - ra[0]), ra[1] + part * (rb[1] - ra[1])]);
@@ -83,7 +84,7 @@ pub(crate) fn index(value: usize) -> u32 {
     value as u32
 }
 
-/// For each vertex of the finer mesh, the coarse ones it is the weighted mean of.
+/// For each vertex of the final mesh, the solver's vertices and their weights.
 type Stencils = Vec<Vec<(u32, f64)>>;
 
 fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterator<Item = [f64; D]> {
@@ -98,8 +99,8 @@ fn mean<const D: usize>(stencils: &Stencils, values: &[[f64; D]]) -> impl Iterat
     })
 }
 
-/// One step of Loop's subdivision inside (Loop 1987), plain halving on the rim. It is linear, so that flat stays flat, and it acts
-/// on the rest state as on the pressed one, so that an unstrained sheet stays unstrained.
+/// Applies one step of Loop's subdivision inside (Loop 1987), and halves the sides of the rim. It is linear, so that a
+/// flat sheet stays flat. It also applies to the rest state, so that an unstrained sheet stays unstrained.
 fn subdivided(disc: &Disc) -> (Vec<[u32; 3]>, Stencils) {
     let mut edges = edges(&disc.triangles, disc.points.len());
     edges.sort_unstable_by_key(|e| e.ends);
@@ -124,7 +125,7 @@ fn subdivided(disc: &Disc) -> (Vec<[u32; 3]>, Stencils) {
         ([a, b], &[c, d]) => vec![(a, 0.375), (b, 0.375), (c, 0.125), (d, 0.125)],
         ([a, b], _) => vec![(a, 0.5), (b, 0.5)],
     }));
-    // The middles of the edges follow the vertices.
+    // Edge midpoints come after the vertices.
     let middle = |i: u32, j: u32| index(neighbours.len() + edges.partition_point(|e| e.ends < [i.min(j), i.max(j)]));
     let quarters = |&[a, b, c]: &[u32; 3]| {
         let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));

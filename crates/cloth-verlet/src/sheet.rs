@@ -3,15 +3,15 @@ use crate::{Point, Vertex};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Stands for the outside where an edge has a triangle on one side only.
+/// Marks the missing triangle of a boundary edge.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
 
-/// A pressed sheet: a triangle mesh with its flat rest state, in the unit of the outline.
+/// A crumpled sheet: a triangle mesh with its flat rest state, in the unit of the outline.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) rest: Vec<Point>,
-    /// What sheets of one mesh have in common belongs to all of them, until one of them is folded.
+    /// Shared by all sheets of one mesh until one of them is folded.
     pub(crate) radius: Arc<Vec<f64>>,
     pub(crate) triangles: Arc<Vec<[u32; 3]>>,
     pub(crate) edges: Arc<Vec<Edge>>,
@@ -25,7 +25,7 @@ pub(crate) struct Edge {
 }
 
 impl Edge {
-    /// The third corners of its one or two triangles, in the order of these.
+    /// Returns the third corners of the one or two triangles, in the order of the triangles.
     pub(crate) fn opposite(&self, triangles: &[[u32; 3]]) -> Vec<u32> {
         let mut sides = self.sides;
         sides.sort_unstable();
@@ -40,18 +40,19 @@ impl Sheet {
         Sheet { vertices, rest, radius: Arc::new(radius), triangles: Arc::new(triangles), edges }
     }
 
-    /// Finds the edges anew, after triangles have been divided.
-    pub(crate) fn pair_up(&mut self) {
+    /// Recomputes the edges, after triangles have been divided.
+    pub(crate) fn update_edges(&mut self) {
         self.edges = Arc::new(edges(&self.triangles, self.vertices.len()));
     }
 
-    /// Where the sheet is. z ≥ 0 is the height above the ground.
+    /// Returns the positions of the vertices. z ≥ 0 is the height above the ground.
     #[must_use]
     pub fn vertices(&self) -> &[Vertex] {
         &self.vertices
     }
 
-    /// Unit normals of the vertices: the mean of the triangles around each, weighted by their areas; up where the sheet is flat.
+    /// Returns the unit normals of the vertices: means of the adjacent triangles, weighted by area; up where the sheet
+    /// is flat.
     #[must_use]
     pub fn normals(&self) -> Vec<Vertex> {
         let mut normals = vec![[0.0; 3]; self.vertices.len()];
@@ -72,25 +73,25 @@ impl Sheet {
         normals
     }
 
-    /// Indices of the triangles' corners.
+    /// Returns the vertex indices of the triangles.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Where each vertex was in the flat sheet, its centre of mass near the origin.
+    /// Returns the position of each vertex in the flat sheet, whose centroid is near the origin.
     #[must_use]
-    pub fn rest(&self) -> &[Point] {
+    pub fn rest_positions(&self) -> &[Point] {
         &self.rest
     }
 
-    /// Each vertex's distance from the centre of the flat sheet over that of the rim, 0 to 1.
+    /// Returns the distance of each vertex from the centre of the flat sheet, relative to that of the rim, 0 to 1.
     #[must_use]
     pub fn rest_radius(&self) -> &[f64] {
         &self.radius
     }
 
-    /// Area of the flat sheet.
+    /// Returns the area of the flat sheet.
     #[must_use]
     pub fn rest_area(&self) -> f64 {
         (0..self.triangles.len()).map(|t| self.rest_area_of(t)).sum()
@@ -101,14 +102,14 @@ impl Sheet {
         0.5 * cross(a, b, c).abs()
     }
 
-    /// Volume of the sheet under a thickness that depends on [`Sheet::rest_radius`], linear within each triangle: what
-    /// [`Sheet::thickness_into`] spreads over the picture.
+    /// Returns the volume of the sheet for a thickness that is a function of [`Sheet::rest_radius`], linear within each
+    /// triangle. [`Sheet::thickness_into`] distributes this volume over the image.
     pub fn volume(&self, thickness: impl Fn(f64) -> f64) -> f64 {
         let mean = |t: &[u32; 3]| t.iter().map(|&v| thickness(self.radius[v as usize])).sum::<f64>() / 3.0;
         self.triangles.iter().enumerate().map(|(t, corners)| self.rest_area_of(t) * mean(corners)).sum()
     }
 
-    /// Root mean square of the edges' relative change in length.
+    /// Returns the root mean square of the relative length changes of the edges.
     #[must_use]
     pub fn edge_strain_rms(&self) -> f64 {
         let mut sum = 0.0;
@@ -123,7 +124,7 @@ impl Sheet {
     }
 }
 
-/// The rim from vertex 0 on: each vertex with the triangle inside the side that starts there.
+/// Returns the rim from vertex 0 on: each vertex with the triangle at the boundary edge that starts there.
 pub(crate) fn rim(edges: &[Edge]) -> Vec<(u32, u32)> {
     let outer = edges.iter().filter_map(|e| match e.sides {
         [t, OUTSIDE] => Some((e.ends[0], (e.ends[1], t))),
@@ -136,9 +137,9 @@ pub(crate) fn rim(edges: &[Edge]) -> Vec<(u32, u32)> {
     (0..next.len()).map_while(step).collect()
 }
 
-/// Pairs up the sides of all triangles.
+/// Returns the edges of all triangles.
 pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
-    // Each vertex keeps a list of the edges whose smaller end it is, chained through `next`.
+    // Each vertex has a linked list, through `next`, of the edges whose smaller end it is.
     const NONE: u32 = u32::MAX;
     let mut first = vec![NONE; vertices];
     let mut next: Vec<u32> = Vec::with_capacity(triangles.len() * 2);
@@ -148,7 +149,7 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
         let (t, new) = (t as u32, |edges: &Vec<Edge>| edges.len() as u32);
         for (i, j) in [(a, b), (b, c), (c, a)] {
             let (low, high) = (i.min(j), i.max(j));
-            // The left of an edge from its smaller end is the triangle that runs that way.
+            // A triangle is left of an edge if it runs from its smaller to its larger end.
             let side = usize::from(i > j);
             let mut at = first[low as usize];
             while at != NONE && edges[at as usize].ends[1] != high {
@@ -168,7 +169,7 @@ pub(crate) fn edges(triangles: &[[u32; 3]], vertices: usize) -> Vec<Edge> {
     edges
 }
 
-/// Twice the signed area of a triangle.
+/// Returns twice the signed area of a triangle.
 pub(crate) fn cross(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
 }
@@ -180,7 +181,7 @@ mod tests {
     use crate::{Cloth, ClothParams};
 
     #[test]
-    fn normals_are_those_of_the_triangles_around() {
+    fn normals_are_means_of_the_adjacent_triangles() {
         let (up, ridge) = ([0.0, 0.0, 1.0], 0.5_f64.sqrt());
         let folded = |height: f64| {
             let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, height], [1.0, 1.0, height], [2.0, 0.5, height]];

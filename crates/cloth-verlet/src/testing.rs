@@ -9,7 +9,7 @@ pub(crate) fn rng(stream: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(0x63_6c6f_7468 + stream)
 }
 
-/// A closed curve r = 100 (1 + depth cos(waves θ + 1)) of 200 points, off the origin.
+/// Returns the closed curve r = 100 (1 + depth cos(waves θ + 1)) of 200 points, off the origin.
 pub(crate) fn wavy(waves: f64, depth: f64) -> Vec<Point> {
     (0..200)
         .map(|k| TAU * f64::from(k) / 200.0)
@@ -18,7 +18,7 @@ pub(crate) fn wavy(waves: f64, depth: f64) -> Vec<Point> {
         .collect()
 }
 
-/// An L, walked the other way round than [`wavy`].
+/// An L, in the orientation opposite to that of [`wavy`].
 pub(crate) fn angular() -> Vec<Point> {
     vec![[0.0, 0.0], [0.0, 9.0], [4.0, 9.0], [4.0, 4.5], [8.0, 4.5], [8.0, 0.0]]
 }

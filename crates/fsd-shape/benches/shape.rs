@@ -1,4 +1,4 @@
-//! How many outlines a second can be traced, resampled, described, looked at for crossings, drawn?
+//! Outlines per second: tracing, resampling, descriptors, self-intersections, draws, fits.
 
 #[path = "../examples/support/mod.rs"]
 mod support;
@@ -14,16 +14,16 @@ fn shapes(c: &mut Criterion) {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xBE9C);
     let cells = support::polygons(70, 100.0, &support::CELL, &mut rng);
     let nuclei = support::polygons(70, 16.0, &support::NUCLEUS, &mut rng);
-    let cytoplasm = ShapeModel::fit(&cells, &ShapeModelParams::default()).expect("polygons have a model");
+    let cytoplasm = ShapeModel::fit(&cells, &ShapeModelParams::default()).expect("polygons are valid");
     let nucleus = ShapeModel::fit(&nuclei, &ShapeModelParams { harmonics: 8, ..ShapeModelParams::default() })
-        .expect("polygons have a model");
+        .expect("polygons are valid");
 
     let mut group = c.benchmark_group("outlines");
     group.throughput(Throughput::Elements(1));
     group.bench_function("draw, 40 harmonics", |b| b.iter(|| cytoplasm.draw(black_box(100.0), &mut rng)));
     group.bench_function("draw, 8 harmonics", |b| b.iter(|| nucleus.draw(black_box(16.0), &mut rng)));
     let outline = resample(&cells[0], 420);
-    let descriptors = Descriptors::from_outline(&outline).expect("a polygon has descriptors");
+    let descriptors = Descriptors::from_outline(&outline).expect("polygons are valid");
     let smooth = descriptors.truncated(40);
     group.bench_function("descriptors of 420 points", |b| b.iter(|| Descriptors::from_outline(black_box(&outline))));
     group.bench_function("420 points of 40 harmonics", |b| b.iter(|| black_box(&smooth).outline(420)));

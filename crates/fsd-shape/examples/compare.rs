@@ -1,14 +1,15 @@
-//! How well models of outlines reproduce them: circularity, low harmonics, fine detail, and the share of draws that cross themselves.
+//! Compares drawn with real outlines: circularity, low harmonics, fine detail, and the fraction of draws that intersect
+//! themselves.
 //!
-//! `cargo run --release -p fsd-shape --example compare -- outlines.csv [harmonics]`; the table has the columns outline, k, x_px, y_px.
-//! Without it, polygons made in code take the place of real outlines.
+//! `cargo run --release -p fsd-shape --example compare -- outlines.csv [harmonics]`; the table has the columns outline,
+//! k, x_px, y_px. Without a table it uses synthetic polygons.
 
 #![expect(clippy::print_stdout, reason = "an example prints its table")]
 
 mod support;
 
 use fsd_shape::{
-    Descriptors, Point, Rng, ShapeModel, ShapeModelParams, ShapeStatistics, Spread, circularity, resample,
+    CovarianceModel, Descriptors, Point, Rng, ShapeModel, ShapeModelParams, ShapeStatistics, circularity, resample,
     self_intersects,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -17,7 +18,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 const DRAWS: usize = 10_000;
 const NAMES: [&str; 8] = ["circularity", "|u-1|", "|u2|", "|u3|", "|u-2|", "|u-3|", "rms |l|>3", "rms |l|>10"];
 
-/// The columns of the table for one outline, at so many harmonics.
+/// Returns the columns of the table for one outline.
 fn measure(shape: &Descriptors, harmonics: usize) -> [f64; 8] {
     let shape = shape.truncated(harmonics).normalised();
     let beyond = |least: i32| {
@@ -38,8 +39,12 @@ fn measure(shape: &Descriptors, harmonics: usize) -> [f64; 8] {
     ]
 }
 
-/// Share of the paper's draws, none rejected, that cross themselves at the paper's number of points.
-fn crossing_share<R: Rng + ?Sized>(of: &ShapeStatistics, points: usize, rng: &mut R) -> Result<f64, fsd_shape::Error> {
+/// Returns the fraction of draws, without rejection, that intersect themselves.
+fn crossing_fraction<R: Rng + ?Sized>(
+    of: &ShapeStatistics,
+    points: usize,
+    rng: &mut R,
+) -> Result<f64, fsd_shape::Error> {
     let mut crossing = 0;
     for _ in 0..DRAWS {
         let mut terms: Vec<Point> = Vec::with_capacity(2 * of.harmonics + 1);
@@ -54,7 +59,7 @@ fn crossing_share<R: Rng + ?Sized>(of: &ShapeStatistics, points: usize, rng: &mu
     Ok(f64::from(crossing) / DRAWS as f64)
 }
 
-/// Two standard normals (Box and Muller).
+/// Returns two standard normal numbers (Box and Muller).
 fn normal_pair<R: Rng + ?Sized>(rng: &mut R) -> [f64; 2] {
     let uniform = |rng: &mut R| (f64::from(rng.next_u32()) + 0.5) / (f64::from(u32::MAX) + 1.0);
     let length = (-2.0 * libm::log(uniform(rng))).sqrt();
@@ -77,8 +82,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let ours = ShapeModelParams { harmonics, ..ShapeModelParams::default() };
     let models = [
-        ("the paper's, all harmonics", ShapeModelParams::paper_cytoplasm()),
-        ("the paper's, fewer harmonics", ShapeModelParams { spread: Spread::Independent, ..ours.clone() }),
+        ("paper, all harmonics", ShapeModelParams::paper_cytoplasm()),
+        ("paper, fewer harmonics", ShapeModelParams { covariance: CovarianceModel::Independent, ..ours.clone() }),
         ("default", ours),
     ];
     for (name, params) in models {
@@ -96,11 +101,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             rejected += draw.rejected;
             drawn.push(measure(&draw.descriptors, shown));
         }
-        let share = f64::from(rejected) / (f64::from(rejected) + DRAWS as f64);
+        let fraction = f64::from(rejected) / (f64::from(rejected) + DRAWS as f64);
         let of = model.statistics();
         println!(
-            "{name}: {:.2} % of tries rejected; {} components, roughness {:.3}, local {:.3}, ln radius {:.3} ± {:.3}",
-            100.0 * share,
+            "{name}: {:.2} % of attempts rejected; {} components, roughness {:.3}, local {:.3}, ln radius {:.3} ± {:.3}",
+            100.0 * fraction,
             of.components.len(),
             of.roughness_sd,
             of.local_roughness,
@@ -110,8 +115,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if of.components.is_empty() {
             let points = 2 * params.harmonics + 2;
             println!(
-                "  crossing themselves at {points} points: {:.2} %",
-                100.0 * crossing_share(of, points, &mut rng)?
+                "  self-intersecting at {points} points: {:.2} %",
+                100.0 * crossing_fraction(of, points, &mut rng)?
             );
         }
         let checks = 16 * params.harmonics;
@@ -120,7 +125,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let smooth = Descriptors::from_outline(&resample(outline, 1024))?.truncated(params.harmonics);
             real_crossing += u32::from(self_intersects(&smooth.outline(checks)));
         }
-        println!("  real outlines crossing themselves at so many harmonics: {real_crossing} of {}", outlines.len());
+        println!(
+            "  self-intersecting real outlines at {} harmonics: {real_crossing} of {}",
+            params.harmonics,
+            outlines.len()
+        );
         println!("  at {shown} harmonics      real mean ± sd      drawn mean ± sd   off by (s.e.)   sd ratio");
         for (k, label) in NAMES.iter().enumerate() {
             let (real_mean, real_sd) = column(&real, k);

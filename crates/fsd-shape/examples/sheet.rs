@@ -1,7 +1,7 @@
-//! A sheet of drawn outlines: four rows of cytoplasm, one of nuclei.
+//! Draws a sheet of outlines: four rows of cytoplasm, one of nuclei.
 //!
-//! `cargo run --release -p fsd-shape --example sheet -- sheet.png [outlines.csv]`; the models are fitted to polygons made in code, or
-//! the cytoplasm's to a table with the columns outline, k, x_px, y_px.
+//! `cargo run --release -p fsd-shape --example sheet -- sheet.png [outlines.csv]`; the models are fitted to synthetic
+//! polygons, or the one of cytoplasm to a table with the columns outline, k, x_px, y_px.
 
 mod support;
 
@@ -13,8 +13,8 @@ use rand_xoshiro::rand_core::SeedableRng;
 const COLUMNS: u32 = 8;
 const ROWS: u32 = 5;
 const TILE: u32 = 112;
-/// Sub-samples of a pixel across and down.
-const FINE: u32 = 4;
+/// Sub-samples of a pixel along each axis.
+const SUBSAMPLES: u32 = 4;
 const PAPER: f64 = 255.0;
 const INK: [f64; 2] = [196.0, 96.0];
 
@@ -35,12 +35,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let is_nucleus = row + 1 == ROWS;
         let (model, median) = if is_nucleus { (&nucleus, 24.0) } else { (&cytoplasm, 38.0) };
         for column in 0..COLUMNS {
-            // Sizes vary as in the outlines fitted, about a median that fits the tile.
+            // Sizes vary as in the training outlines, around a median that fits the tile.
             let radius =
                 median * (model.draw_radius(&mut rng) / libm::exp(model.statistics().ln_radius_mean)).clamp(0.8, 1.15);
             let draw = model.draw(radius, &mut rng)?;
-            let middle = |k: u32| f64::from(k * TILE + TILE / 2);
-            let outline = draw.descriptors.translated([middle(column), middle(row)]).outline(512);
+            let centre = |k: u32| f64::from(k * TILE + TILE / 2);
+            let outline = draw.descriptors.translated([centre(column), centre(row)]).outline(512);
             paint(&mut sheet, &outline, INK[usize::from(is_nucleus)]);
         }
     }
@@ -51,11 +51,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Fills an outline, even-odd, with smooth edges.
+/// Fills an outline by the even-odd rule, with anti-aliased edges.
 fn paint(sheet: &mut GrayImage, outline: &[Point], ink: f64) {
     let mut coverage = vec![0_u32; (sheet.width() * sheet.height()) as usize];
-    let sample = |k: u32| (f64::from(k) + 0.5) / f64::from(FINE) - 0.5;
-    for line in 0..sheet.height() * FINE {
+    let sample = |k: u32| (f64::from(k) + 0.5) / f64::from(SUBSAMPLES) - 0.5;
+    for line in 0..sheet.height() * SUBSAMPLES {
         let y = sample(line);
         let mut crossings: Vec<f64> = outline
             .iter()
@@ -67,15 +67,15 @@ fn paint(sheet: &mut GrayImage, outline: &[Point], ink: f64) {
             continue;
         }
         crossings.sort_by(f64::total_cmp);
-        for column in 0..sheet.width() * FINE {
+        for column in 0..sheet.width() * SUBSAMPLES {
             if crossings.partition_point(|&x| x < sample(column)) % 2 == 1 {
-                coverage[(line / FINE * sheet.width() + column / FINE) as usize] += 1;
+                coverage[(line / SUBSAMPLES * sheet.width() + column / SUBSAMPLES) as usize] += 1;
             }
         }
     }
     for (pixel, &hits) in sheet.pixels_mut().zip(&coverage) {
-        let share = f64::from(hits) / f64::from(FINE * FINE);
-        let value = f64::from(pixel.0[0]) - share * (PAPER - ink);
+        let coverage_fraction = f64::from(hits) / f64::from(SUBSAMPLES * SUBSAMPLES);
+        let value = f64::from(pixel.0[0]) - coverage_fraction * (PAPER - ink);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of a byte")]
         let byte = value.round().clamp(0.0, 255.0) as u8;
         pixel.0[0] = byte;

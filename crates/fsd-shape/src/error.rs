@@ -1,21 +1,19 @@
-//! What can be wrong with a mask, an outline, a parameter or a set of statistics.
+//! Errors.
 
-/// Everything this crate can refuse.
+/// An invalid mask, outline, parameter or set of statistics.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The mask's length is no multiple of its width.
-    #[error(
-        "mask of {len} values is no whole number of rows of width {width}; width must be at least 1 and divide the length"
-    )]
+    /// The length of the mask is not a multiple of its width.
+    #[error("mask of {len} values, width {width}: expected a width of at least 1 that divides the number of values")]
     MaskSize {
-        /// Number of values given.
+        /// Number of values.
         len: usize,
-        /// Width given.
+        /// The width.
         width: usize,
     },
     /// A value of the mask is NaN or infinite.
-    #[error("mask value {value} at x {x}, y {y} is not finite")]
+    #[error("mask value {value} at x {x}, y {y}: expected a finite number")]
     MaskValue {
         /// The value.
         value: f32,
@@ -25,72 +23,72 @@ pub enum Error {
         y: usize,
     },
     /// No value of the mask exceeds the level.
-    #[error("mask is empty: no value exceeds the level {level}")]
+    #[error("empty mask: no value exceeds the level {level}")]
     EmptyMask {
-        /// The level asked for.
+        /// The level.
         level: f32,
     },
-    /// The mask holds more than one object.
-    #[error("mask holds {count} components above the level; an outline needs exactly 1")]
+    /// The mask contains more than one object.
+    #[error("the mask has {count} components above the level: expected 1")]
     SeveralComponents {
-        /// How many there are.
+        /// Number of components.
         count: usize,
     },
     /// An outline has too few points.
-    #[error("outline has {count} points; at least {needed} are needed")]
+    #[error("the outline has {count} points: expected at least {needed}")]
     TooFewPoints {
-        /// Number of points given.
+        /// Number of points.
         count: usize,
-        /// Fewest accepted.
+        /// Smallest accepted number.
         needed: usize,
     },
     /// A coordinate is NaN or infinite.
-    #[error("point {index} of the outline is not finite")]
+    #[error("point {index} of the outline: expected finite coordinates")]
     PointValue {
-        /// Which point.
+        /// Index of the point.
         index: usize,
     },
-    /// An outline encloses nothing.
-    #[error("outline encloses no area")]
+    /// An outline encloses no area.
+    #[error("the outline encloses no area")]
     NoArea,
-    /// One outline of a training set is unusable.
+    /// An outline of a training set is invalid.
     #[error("outline {index} of the training set: {source}")]
     TrainingOutline {
-        /// Which outline, from 0.
+        /// Index of the outline, from 0.
         index: usize,
-        /// What is wrong with it.
+        /// The cause.
         source: Box<Error>,
     },
-    /// Too few outlines to fit a model to.
-    #[error("{count} outlines to fit a shape model to; at least {needed} are needed")]
+    /// Too few outlines to fit a model.
+    #[error("{count} outlines are too few for a shape model: expected at least {needed}")]
     TooFewOutlines {
-        /// Number of outlines given.
+        /// Number of outlines.
         count: usize,
-        /// Fewest accepted.
+        /// Smallest accepted number.
         needed: usize,
     },
-    /// A parameter lies outside its range.
-    #[error("{field} is {value}; accepted: {accepted}")]
+    /// A parameter is out of range.
+    #[error("{field} = {value} is out of range: expected {accepted}")]
     Parameter {
         /// Name of the parameter.
         field: &'static str,
-        /// Value given.
+        /// The value.
         value: f64,
-        /// What would be accepted.
+        /// The accepted range.
         accepted: &'static str,
     },
-    /// Statistics that do not fit together.
+    /// Inconsistent statistics.
     #[error("shape statistics: {field} {problem}")]
     Statistics {
         /// Name of the field.
         field: &'static str,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
-    /// Every try of a draw crossed itself or ran the wrong way round.
-    #[error("no simple outline in {tries} tries; the statistics are too wild for {harmonics} harmonics")]
+    /// All attempts of a draw intersected themselves or had negative area.
+    #[error("no simple outline in {tries} attempts: the standard deviations are too large for {harmonics} harmonics")]
     NoSimpleOutline {
-        /// Number of tries made.
+        /// Number of attempts.
         tries: u32,
         /// Harmonics of the model.
         harmonics: usize,

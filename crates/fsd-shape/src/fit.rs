@@ -1,87 +1,90 @@
-//! From a set of outlines to their statistics.
+//! Fits a shape model to a set of outlines.
 
 use nalgebra::DMatrix;
 use portable_numerics::statistics::{deviation, mean};
 
 use crate::descriptors::Descriptors;
 use crate::outline::{Point, resample, signed_area};
-use crate::roughness::{Fine, dot};
-use crate::sample::Bend;
+use crate::roughness::{DetailStatistics, dot};
+use crate::sample::FleishmanPolynomial;
 use crate::statistics::{PrincipalComponent, Residual, ShapeStatistics, add_scaled};
 use crate::steps::to_steps;
 use crate::{Error, ShapeModel};
 
-/// Fewest outlines to fit a model to: fewer have no spread.
-const FEWEST_OUTLINES: usize = 3;
-/// Fewest outlines whose third and fourth moments and roughness are believed.
-const ENOUGH_FOR_MOMENTS: usize = 30;
-/// Standard errors by which a skewness or kurtosis must differ from 0 to be kept.
-const NOTABLE: f64 = 1.0;
-/// Share of the variance that the kept components explain; the rest goes into the residual. 1 % of the variance is a
-/// tenth of the standard deviation, about what the shrinkage blurs anyway, and it halves the size of the model.
+/// Minimum number of outlines of a fit.
+const MIN_OUTLINES: usize = 3;
+/// Minimum number of outlines for estimates of third and fourth moments and of roughness.
+const MIN_OUTLINES_FOR_MOMENTS: usize = 30;
+/// Standard errors by which a skewness or kurtosis must differ from 0; others are set to 0.
+const MIN_STANDARD_ERRORS: f64 = 1.0;
+/// Fraction of the variance that the components explain; the remainder is in the residual. 1 % of the variance is a
+/// tenth of the standard deviation, similar to the effect of the shrinkage, and halves the size of the model.
 const EXPLAINED: f64 = 0.99;
-/// Points per harmonic at which outlines are sampled: descriptors of a polygon fall with l², so at 8 points a harmonic, aliases are below 2 %.
+/// Sample points per harmonic. Descriptors of a polygon decrease with l², so that aliasing is below 2 % with 8 points.
 const POINTS_PER_HARMONIC: usize = 8;
-/// Fewest points at which outlines are sampled.
-const FEWEST_SAMPLES: usize = 256;
+/// Minimum number of sample points.
+const MIN_SAMPLES: usize = 256;
 
-/// What kind of model to fit.
+/// Parameters of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeModelParams {
-    /// Highest |l| of the descriptors kept, 1..=4096. The paper names none; the authors' programs keep 4 for nuclei and all for
-    /// cytoplasm. Default 40 (ours), for cytoplasm; 4 to 10 for nuclei, whose masks show no more.
+    /// Highest |l| of the descriptors, 1..=4096. The paper states none; the authors' programs use 4 for nuclei and all
+    /// for cytoplasm. Default 40 (ours), for cytoplasm; 4 to 10 are sufficient for nuclei.
     pub harmonics: usize,
-    /// How shapes vary. Default `Spread::Shrinkage { lambda: 0.1 }` (ours).
-    pub spread: Spread,
+    /// Model of shape variation. Default `CovarianceModel::Shrinkage { lambda: 0.1 }` (ours).
+    pub covariance: CovarianceModel,
 }
 
 impl Default for ShapeModelParams {
     fn default() -> Self {
-        Self { harmonics: 40, spread: Spread::Shrinkage { lambda: 0.1 } }
+        Self { harmonics: 40, covariance: CovarianceModel::Shrinkage { lambda: 0.1 } }
     }
 }
 
 impl ShapeModelParams {
-    /// The paper's nuclei: independent normals for each descriptor up to |l| = 4.
+    /// Returns the paper's parameters for nuclei: independent normals for indexed descriptor up to |l| = 4.
     pub fn paper_nucleus() -> Self {
-        Self { harmonics: 4, spread: Spread::Independent }
+        Self { harmonics: 4, covariance: CovarianceModel::Independent }
     }
 
-    /// The paper's cytoplasm: independent normals for each descriptor of 420 points, all of them (|l| ≤ 209).
+    /// Returns the paper's parameters for cytoplasm: independent normals for indexed descriptor of 420 points, all of
+    /// them (|l| ≤ 209).
     pub fn paper_cytoplasm() -> Self {
-        Self { harmonics: 209, spread: Spread::Independent }
+        Self { harmonics: 209, covariance: CovarianceModel::Independent }
     }
 }
 
-/// How descriptors vary from shape to shape.
+/// Covariance of the descriptors of a population of shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Spread {
-    /// The paper ("Shape generation"): a mean and a standard deviation for each descriptor, real and imaginary part, drawn independently.
-    /// Neither start point nor rotation is normalised, so outlines must be given in a common pose for the means to be worth much.
+pub enum CovarianceModel {
+    /// The paper ("Shape generation"): a mean and a standard deviation for indexed descriptor, real and imaginary part,
+    /// drawn independently. Neither start point nor rotation is normalised, so that the means are only meaningful for
+    /// outlines in a common pose.
     Independent,
-    /// Ours: outlines are aligned first; their coordinates vary together along principal components, whose scores keep skewness and tails; the
-    /// covariance is shrunk towards its diagonal; roughness varies from shape to shape and along the outline.
+    /// Ours: outlines are aligned, and their coordinates vary jointly along principal components, whose scores have the
+    /// skewness and kurtosis of the training set. The covariance is shrunk towards its diagonal. Roughness varies from
+    /// shape to shape and along the outline.
     Shrinkage {
-        /// Weight of the diagonal, 0..=1. 0 draws only combinations of the components, 1 independent coordinates. Default 0.1 (ours): the
-        /// sample covariance of n outlines has rank n - 1, and without shrinkage a draw could do nothing they did not.
+        /// Weight of the diagonal, 0..=1. With 0 all draws are combinations of the components, with 1 coordinates are
+        /// independent. Default 0.1 (ours): the sample covariance of n outlines only has rank n - 1.
         lambda: f64,
     },
 }
 
 impl ShapeModel {
-    /// Fits a model to outlines in a common scale: closed polygons of any number of points, in either direction.
+    /// Fits a model to outlines in a common scale: closed polygons of any number of points, in either orientation.
     ///
-    /// Each is resampled at equal arc length, turned to positive area, and described by Eqs. 2 and 3.
+    /// Each outline is resampled at equal arc length, oriented to positive area, and described by Eqs. 2 and 3.
     ///
     /// # Errors
     ///
-    /// If a parameter is out of range, there are fewer than 3 outlines, or one of them is unusable.
+    /// If a parameter is out of range, there are fewer than 3 outlines, or an outline is invalid.
     pub fn fit(outlines: &[Vec<Point>], params: &ShapeModelParams) -> Result<Self, Error> {
-        let lambda = match params.spread {
-            Spread::Independent => None,
-            Spread::Shrinkage { lambda } if (0.0..=1.0).contains(&lambda) => Some(lambda),
-            Spread::Shrinkage { lambda } => {
+        let lambda = match params.covariance {
+            CovarianceModel::Independent => None,
+            CovarianceModel::Shrinkage { lambda } if (0.0..=1.0).contains(&lambda) => Some(lambda),
+            CovarianceModel::Shrinkage { lambda } => {
                 return Err(Error::Parameter { field: "lambda", value: lambda, accepted: "0..=1" });
             }
         };
@@ -89,8 +92,8 @@ impl ShapeModel {
             let value = params.harmonics as f64;
             return Err(Error::Parameter { field: "harmonics", value, accepted: "1..=4096" });
         }
-        if outlines.len() < FEWEST_OUTLINES {
-            return Err(Error::TooFewOutlines { count: outlines.len(), needed: FEWEST_OUTLINES });
+        if outlines.len() < MIN_OUTLINES {
+            return Err(Error::TooFewOutlines { count: outlines.len(), needed: MIN_OUTLINES });
         }
         let mut ln_radii = Vec::with_capacity(outlines.len());
         let mut shapes: Vec<Vec<f64>> = Vec::with_capacity(outlines.len());
@@ -101,7 +104,7 @@ impl ShapeModel {
             let shape = described.normalised();
             let shape = if lambda.is_some() { shape.aligned() } else { shape };
             // Re u₋ₕ, Im u₋ₕ, … without u₀.
-            shapes.push(shape.each().filter(|&(l, _)| l != 0.0).flat_map(|(_, u)| u).collect());
+            shapes.push(shape.indexed().filter(|&(l, _)| l != 0.0).flat_map(|(_, u)| u).collect());
         }
         let mut statistics = ShapeStatistics {
             harmonics: params.harmonics,
@@ -120,33 +123,34 @@ impl ShapeModel {
         }
         statistics.residual_sd = sd_of(&shapes);
         if let Some(lambda) = lambda {
-            correlate(&mut statistics, &shapes, lambda);
-            let fine = Fine::new(&shapes, params.harmonics).filter(|_| shapes.len() >= ENOUGH_FOR_MOMENTS);
-            if let Some(fine) = fine {
-                statistics.roughness_sd = fine.roughness_sd(&statistics);
-                statistics.local_roughness = fine.local_roughness();
+            shrink_covariance(&mut statistics, &shapes, lambda);
+            let detail =
+                DetailStatistics::new(&shapes, params.harmonics).filter(|_| shapes.len() >= MIN_OUTLINES_FOR_MOMENTS);
+            if let Some(detail) = detail {
+                statistics.roughness_sd = detail.roughness_sd(&statistics);
+                statistics.local_roughness = detail.local_roughness();
             }
         }
         Self::from_statistics(statistics)
     }
 }
 
-/// Descriptors of one outline in the model's terms: positive area, equal arc length.
+/// Returns the descriptors of an outline, with positive area and equal arc length.
 fn describe(outline: &[Point], harmonics: usize) -> Result<Descriptors, Error> {
-    // Looks at the points before they are resampled, so that what is wrong is named by its own index.
+    // Validates the points before they are resampled, so that an error has the caller's index.
     Descriptors::from_outline(outline)?;
-    let samples = (POINTS_PER_HARMONIC * harmonics).next_power_of_two().max(FEWEST_SAMPLES);
+    let samples = (POINTS_PER_HARMONIC * harmonics).next_power_of_two().max(MIN_SAMPLES);
     let mut points = resample(outline, samples);
     if signed_area(&points) < 0.0 {
-        // The start point stays.
+        // The start point does not change.
         points[1..].reverse();
     }
     Ok(Descriptors::from_outline(&points)?.truncated(harmonics))
 }
 
-/// Shrinkage: Σ = (1 − λ) S + λ diag S, the diagonal taken in directions and steps; as components of (1 − λ) S and residuals
-/// that restore the diagonal.
-fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: f64) {
+/// Applies shrinkage: Σ = (1 − λ) S + λ diag S, with the diagonal in directions and steps. The result is stored as
+/// components of (1 − λ) S and residuals that restore the diagonal.
+fn shrink_covariance(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: f64) {
     let axes = principal_axes(deviations);
     let total: f64 = axes.iter().map(|axis| axis.variance).sum();
     let mut explained = 0.0;
@@ -157,12 +161,12 @@ fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: 
         explained += axis.variance;
         let sd = axis.variance.sqrt();
         let scores: Vec<f64> = deviations.iter().map(|row| dot(row, &axis.direction) / sd).collect();
-        let (skewness, excess_kurtosis) = notable_moments(&scores);
+        let (skewness, excess_kurtosis) = significant_moments(&scores);
         let scale = sd * (1.0 - lambda).sqrt();
         let loading = axis.direction.iter().map(|v| v * scale).collect();
         statistics.components.push(PrincipalComponent { loading, skewness, excess_kurtosis });
     }
-    // What the components leave of the variance of each direction and step.
+    // The remaining variance of indexed direction and step.
     let in_steps = |row: &Vec<f64>| {
         let mut row = row.clone();
         to_steps(&mut row);
@@ -177,10 +181,10 @@ fn correlate(statistics: &mut ShapeStatistics, deviations: &[Vec<f64>], lambda: 
     }
 }
 
-/// Skewness and excess kurtosis (the unbiased estimators G₁ and G₂) of standardised scores, as far as they stand out from
-/// their standard errors, and within what a draw can follow.
-fn notable_moments(scores: &[f64]) -> (f64, f64) {
-    if scores.len() < ENOUGH_FOR_MOMENTS {
+/// Returns the skewness and excess kurtosis (the unbiased estimators G₁ and G₂) of standardised scores: 0 unless they
+/// exceed their standard errors, and clamped to the accepted range.
+fn significant_moments(scores: &[f64]) -> (f64, f64) {
+    if scores.len() < MIN_OUTLINES_FOR_MOMENTS {
         return (0.0, 0.0);
     }
     let n = scores.len() as f64;
@@ -190,24 +194,24 @@ fn notable_moments(scores: &[f64]) -> (f64, f64) {
     let g2 = power(4) / (variance * variance) - 3.0;
     let skewness = g1 * (n * (n - 1.0)).sqrt() / (n - 2.0);
     let kurtosis = (n - 1.0) / ((n - 2.0) * (n - 3.0)) * ((n + 1.0) * g2 + 6.0);
-    let notable = |value: f64, error: f64| {
-        if value.abs() > NOTABLE * error { value } else { 0.0 }
+    let significant = |value: f64, error: f64| {
+        if value.abs() > MIN_STANDARD_ERRORS * error { value } else { 0.0 }
     };
-    let skewness = notable(skewness, (6.0 / n).sqrt())
-        .clamp(-PrincipalComponent::MOST_SKEWNESS, PrincipalComponent::MOST_SKEWNESS);
-    let kurtosis =
-        notable(kurtosis, (24.0 / n).sqrt()).clamp(Bend::least_kurtosis(skewness), PrincipalComponent::MOST_KURTOSIS);
+    let skewness = significant(skewness, (6.0 / n).sqrt())
+        .clamp(-PrincipalComponent::MAX_SKEWNESS, PrincipalComponent::MAX_SKEWNESS);
+    let kurtosis = significant(kurtosis, (24.0 / n).sqrt())
+        .clamp(FleishmanPolynomial::min_kurtosis(skewness), PrincipalComponent::MAX_KURTOSIS);
     (skewness, kurtosis)
 }
 
-/// A direction of unit length and the variance along it.
+/// A unit vector and the variance along it.
 struct Axis {
     variance: f64,
     direction: Vec<f64>,
 }
 
-/// Axes of the sample covariance of `deviations` (rows whose mean is 0), by falling variance; those without variance are left out.
-/// The largest entry of a direction is positive.
+/// Returns the axes of the sample covariance of `deviations` (rows of mean 0), by descending variance, without those of
+/// variance 0. The largest entry of a direction is positive.
 fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
     let (count, dims) = (deviations.len(), deviations.first().map_or(0, Vec::len));
     let freedom = count as f64 - 1.0;
@@ -223,7 +227,7 @@ fn principal_axes(deviations: &[Vec<f64>]) -> Vec<Axis> {
         let eigen = rows.tr_mul(&rows).symmetric_eigen();
         (eigen.eigenvalues, eigen.eigenvectors)
     };
-    // What is left of a variance of 0 after rounding; the mean takes one degree of freedom, so there always is one.
+    // Rounding error of a variance of 0; one variance is always 0, because the mean was subtracted.
     let floor = eigen.max() * f64::EPSILON * count.min(dims) as f64;
     let mut axes: Vec<Axis> = eigen
         .iter()
@@ -246,7 +250,7 @@ fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {
     mean
 }
 
-/// Standard deviation of each column of rows with mean 0.
+/// Returns the standard deviation of indexed column of rows of mean 0.
 fn sd_of(deviations: &[Vec<f64>]) -> Vec<f64> {
     let freedom = deviations.len() as f64 - 1.0;
     (0..deviations[0].len())
@@ -261,7 +265,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     #[test]
-    fn axes_are_eigenvectors_of_the_covariance_whichever_side_is_longer() {
+    fn axes_are_eigenvectors_of_the_covariance() {
         for (count, dims) in [(9, 30), (40, 12), (12, 12), (2, 5)] {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(0x9CA);
             let mut value = |k: usize| f64::from(rng.next_u32() >> 16) / (k + 1) as f64;

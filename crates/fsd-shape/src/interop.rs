@@ -1,11 +1,12 @@
-//! Outlines, masks and matrices in types of other libraries.
+//! Conversions of outlines, masks and matrices to types of other libraries.
 
 #[cfg(any(feature = "mint", feature = "nalgebra"))]
 use crate::Descriptors;
 
 #[cfg(any(feature = "mint", feature = "nalgebra"))]
 impl Descriptors {
-    /// [`Descriptors::outline`] as points of `mint`. Other libraries' points become `[f64; 2]` by `into`.
+    /// Returns [`Descriptors::outline`] as points of `mint`. Points of other libraries convert to `[f64; 2]` with
+    /// `into`.
     ///
     /// ```
     /// use fsd_shape::Descriptors;
@@ -22,7 +23,7 @@ impl Descriptors {
         self.outline(count).into_iter().map(Into::into)
     }
 
-    /// [`Descriptors::outline`] as points of `nalgebra`.
+    /// Returns [`Descriptors::outline`] as points of `nalgebra`.
     ///
     /// ```
     /// # use nalgebra::Point2;
@@ -39,13 +40,13 @@ impl Descriptors {
 
 #[cfg(feature = "nalgebra")]
 impl crate::ShapeModel {
-    /// Covariance of the coordinates of a shape, in the order of [`ShapeStatistics::mean`](crate::ShapeStatistics::mean).
-    /// Roughness is left out.
+    /// Returns the covariance of the coordinates of a shape, in the order of
+    /// [`ShapeStatistics::mean`](crate::ShapeStatistics::mean), without roughness.
     ///
     /// ```
     /// use fsd_shape::{ShapeModel, ShapeModelParams};
     ///
-    /// // Ellipses whose half axes are 10 and 10 to 19.
+    /// // Ellipses with semi-axes of 10 and 10 to 19.
     /// let angles = || (0..64).map(|k| std::f64::consts::TAU * f64::from(k) / 64.0);
     /// let ellipse = |n| angles().map(|t: f64| [10.0 * t.cos(), (10.0 + f64::from(n)) * t.sin()]).collect();
     /// let outlines: Vec<Vec<[f64; 2]>> = (0..10).map(ellipse).collect();
@@ -53,7 +54,7 @@ impl crate::ShapeModel {
     ///
     /// let covariance = model.covariance();
     /// assert_eq!(covariance.shape(), (24, 24));
-    /// // Nearly all of the variance lies in one direction.
+    /// // Nearly all of the variance is in one direction.
     /// assert!(covariance.symmetric_eigenvalues().max() > 0.85 * covariance.trace());
     /// # Ok::<(), fsd_shape::Error>(())
     /// ```
@@ -61,7 +62,7 @@ impl crate::ShapeModel {
     pub fn covariance(&self) -> nalgebra::DMatrix<f64> {
         let statistics = self.statistics();
         let size = statistics.coordinates();
-        // Each column is what one normal deviate adds to a shape.
+        // Each column is the contribution of one normal deviate.
         let mut columns: Vec<f64> = statistics.components.iter().flat_map(|c| c.loading.iter().copied()).collect();
         for (k, &sd) in statistics.residual_sd.iter().enumerate() {
             let mut column = vec![0.0; size];
@@ -76,7 +77,8 @@ impl crate::ShapeModel {
     }
 }
 
-/// [`trace`](crate::trace) for a mask of 8 bits: pixels count where they exceed `level`, 0 to 254.
+/// Traces an 8-bit mask like [`trace`](crate::trace): a pixel belongs to the object if its value exceeds `level`, 0 to
+/// 254.
 ///
 /// ```
 /// use image::{GrayImage, Luma};

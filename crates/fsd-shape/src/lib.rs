@@ -22,10 +22,10 @@ pub use crossing::self_intersects;
 pub use descriptors::Descriptors;
 pub use error::Error;
 #[cfg(feature = "fit")]
-pub use fit::{ShapeModelParams, Spread};
+pub use fit::{CovarianceModel, ShapeModelParams};
 #[cfg(feature = "image")]
 pub use interop::trace_image;
-pub use model::{Draw, ShapeModel};
+pub use model::{DrawnShape, ShapeModel};
 pub use outline::{Point, centroid, circularity, perimeter, resample, resample_along, signed_area};
 pub use rand_core::Rng;
 pub use statistics::{PrincipalComponent, Residual, ShapeStatistics};

@@ -1,4 +1,4 @@
-//! New outlines drawn from the statistics of old ones.
+//! Draws new outlines from the statistics of a population.
 
 use portable_numerics::random::{Normals, direction, normal};
 use rand_core::Rng;
@@ -7,75 +7,79 @@ use crate::Error;
 use crate::crossing::self_intersects;
 use crate::descriptors::{Descriptors, modulus, multiply, unit};
 use crate::outline::Point;
-use crate::sample::Bend;
+use crate::sample::FleishmanPolynomial;
 use crate::statistics::{Residual, ShapeStatistics, add_scaled, finest_coarse, order, terms};
 use crate::steps::from_steps;
 
-/// Tries of a draw before it gives up. The paper's model, the worst in use, fails less than half of the time.
+/// Maximum number of attempts of a draw. The paper's model, the worst in use, fails in less than half of its attempts.
 const TRIES: u32 = 200;
-/// Points per harmonic at which a draw is looked at for crossings: a sixteenth of the finest wave.
+/// Points per harmonic of the self-intersection check: a sixteenth of the shortest wavelength.
 const CHECKS_PER_HARMONIC: usize = 16;
-/// Fewest points at which it is looked at.
+/// Minimum number of points of the self-intersection check.
 const FEWEST_CHECKS: usize = 64;
-/// Harmonics of the modulation of roughness, as a share of the curve's: at an eighth (5 of 40) the patches of rough and smooth outline
-/// are as long as real ones.
-const MODULATION_SHARE: usize = 8;
+/// Ratio of the harmonics of the curve and of the roughness modulation: at 8 (5 of 40), rough and smooth parts of an
+/// outline are as long as real ones.
+const MODULATION_RATIO: usize = 8;
 
-/// Fewest harmonics at which roughness can vary along the outline.
-pub(crate) const LEAST_FOR_LOCAL: usize = 16;
+/// Minimum number of harmonics for roughness that varies along the outline.
+pub(crate) const MIN_HARMONICS_FOR_LOCAL: usize = 16;
 
-/// A population of shapes, from which new ones are drawn.
+/// A statistical model of a population of shapes.
 ///
-/// Made by [`ShapeModel::fit`] or from stored numbers by [`ShapeModel::from_statistics`].
+/// Created by [`ShapeModel::fit`], or from stored statistics by [`ShapeModel::from_statistics`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeModel {
     statistics: ShapeStatistics,
-    bends: Vec<Bend>,
+    polynomials: Vec<FleishmanPolynomial>,
     modulation: Option<Modulation>,
 }
 
 /// A shape drawn from a model.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Draw {
-    /// The outline: centred, positive area, random rotation, |u₁| as asked for.
+pub struct DrawnShape {
+    /// The outline: centred, with positive area, random rotation and the requested |u₁|.
     pub descriptors: Descriptors,
-    /// Tries thrown away before it, because they crossed themselves or ran the wrong way round.
+    /// Number of rejected attempts, which intersected themselves or had negative area.
     pub rejected: u32,
 }
 
 impl ShapeModel {
-    /// A model of given statistics.
+    /// Creates a model from statistics.
     ///
     /// # Errors
     ///
-    /// If the numbers are out of range or do not fit together.
+    /// If the numbers are out of range or inconsistent.
     pub fn from_statistics(statistics: ShapeStatistics) -> Result<Self, Error> {
         statistics.check()?;
-        let bends = statistics.components.iter().filter_map(|c| c.bend()).collect();
+        let polynomials = statistics.components.iter().filter_map(|c| c.polynomial()).collect();
         let modulation = Modulation::new(&statistics);
-        Ok(Self { statistics, bends, modulation })
+        Ok(Self { statistics, polynomials, modulation })
     }
 
-    /// The numbers behind the model; they hold no outline it was fitted to.
+    /// Returns the statistics of the model, which contain no training outline.
     pub fn statistics(&self) -> &ShapeStatistics {
         &self.statistics
     }
 
-    /// A radius |u₁| in px, log-normal as in the outlines fitted.
+    /// Draws a radius |u₁|, in px, from the log-normal distribution of the training outlines.
     pub fn draw_radius<R: Rng + ?Sized>(&self, rng: &mut R) -> f64 {
         libm::exp(self.statistics.ln_radius_mean + self.statistics.ln_radius_sd * normal(rng))
     }
 
-    /// A new shape of radius |u₁| = `radius_px`, in a random rotation.
+    /// Draws a shape of radius |u₁| = `radius_px`, in a random rotation.
     ///
-    /// Draws that cross themselves or enclose a negative area are rejected, counted, and repeated.
+    /// Attempts that intersect themselves or have negative area are rejected, counted, and repeated.
     ///
     /// # Errors
     ///
-    /// If `radius_px` is not positive and finite, or 200 tries in a row are rejected.
-    pub fn draw<R: Rng + ?Sized>(&self, radius_px: f64, rng: &mut R) -> Result<Draw, Error> {
+    /// If `radius_px` is not positive and finite, or 200 attempts are rejected.
+    pub fn draw<R: Rng + ?Sized>(&self, radius_px: f64, rng: &mut R) -> Result<DrawnShape, Error> {
         if !(radius_px.is_finite() && radius_px > 0.0) {
-            return Err(Error::Parameter { field: "radius_px", value: radius_px, accepted: "positive and finite" });
+            return Err(Error::Parameter {
+                field: "radius_px",
+                value: radius_px,
+                accepted: "a positive finite number",
+            });
         }
         let harmonics = self.statistics.harmonics;
         let checks = (CHECKS_PER_HARMONIC * harmonics).max(FEWEST_CHECKS);
@@ -87,18 +91,18 @@ impl ShapeModel {
             for u in &mut terms {
                 *u = multiply(*u, scale);
             }
-            // A first harmonic of 0 ends here too.
+            // Fails if the first harmonic is 0.
             let Ok(descriptors) = Descriptors::from_harmonics(terms) else {
                 continue;
             };
             if descriptors.area() > 0.0 && !self_intersects(&descriptors.outline(checks)) {
-                return Ok(Draw { descriptors, rejected });
+                return Ok(DrawnShape { descriptors, rejected });
             }
         }
         Err(Error::NoSimpleOutline { tries: TRIES, harmonics })
     }
 
-    /// Descriptors u₋ₕ … uₕ of a normalised shape, not looked at yet.
+    /// Draws descriptors u₋ₕ … uₕ of a normalised shape, without checks.
     fn draw_terms<R: Rng + ?Sized>(&self, rng: &mut R) -> Vec<Point> {
         let of = &self.statistics;
         let mut normals = Normals::new(rng);
@@ -107,8 +111,8 @@ impl ShapeModel {
         if of.residual == Residual::Steps {
             from_steps(&mut deviation);
         }
-        for (component, bend) in of.components.iter().zip(&self.bends) {
-            add_scaled(&mut deviation, &component.loading, bend.apply(normals.draw()));
+        for (component, polynomial) in of.components.iter().zip(&self.polynomials) {
+            add_scaled(&mut deviation, &component.loading, polynomial.apply(normals.draw()));
         }
         if of.roughness_sd > 0.0 {
             // Mean square 1: E e^{2(σz − σ²)} = 1.
@@ -129,14 +133,15 @@ impl ShapeModel {
     }
 }
 
-/// Roughness that varies along the outline: the fine detail of a curve multiplied by 1 + σf(t), f a random periodic function of variance 1.
+/// Roughness that varies along the outline: the fine detail is multiplied by 1 + σf(t), where f is a random periodic
+/// function of variance 1.
 #[derive(Clone, Debug, PartialEq)]
 struct Modulation {
-    /// σ for each real and imaginary part of the harmonics of f.
+    /// Standard deviation of the real and imaginary parts of the harmonics of σf.
     sd: f64,
     /// Highest harmonic of f.
-    reach: usize,
-    /// What each term u₋ₕ … uₕ is multiplied by afterwards, so that its mean square stays; 0 for the form, which is left alone.
+    order_max: usize,
+    /// Factor of each term u₋ₕ … uₕ that restores its mean square; 0 for coarse terms, which are not modulated.
     gains: Vec<f64>,
 }
 
@@ -144,46 +149,46 @@ impl Modulation {
     fn new(statistics: &ShapeStatistics) -> Option<Self> {
         let sigma = statistics.local_roughness;
         let harmonics = statistics.harmonics;
-        if sigma == 0.0 || harmonics < LEAST_FOR_LOCAL {
+        if sigma == 0.0 || harmonics < MIN_HARMONICS_FOR_LOCAL {
             return None;
         }
-        let reach = harmonics / MODULATION_SHARE;
-        // Σ over ±m of E|fₘ|² = 1, with real and imaginary part alike.
-        let sd = sigma / (4.0 * reach as f64).sqrt();
+        let order_max = harmonics / MODULATION_RATIO;
+        // Σ over ±m of E|fₘ|² = 1, with equal real and imaginary parts.
+        let sd = sigma / (4.0 * order_max as f64).sqrt();
         let coarse = finest_coarse(harmonics);
-        let detail = |place: usize| place.abs_diff(harmonics) > coarse;
+        let detail = |index: usize| index.abs_diff(harmonics) > coarse;
         let powers: Vec<f64> = statistics
             .powers()
             .into_iter()
             .enumerate()
-            .map(|(place, power)| if detail(place) { power } else { 0.0 })
+            .map(|(index, power)| if detail(index) { power } else { 0.0 })
             .collect();
         let gains = (0..powers.len())
-            .map(|place| {
-                let near = place.saturating_sub(reach)..=(place + reach).min(2 * harmonics);
-                let others = powers[near].iter().sum::<f64>() - powers[place];
-                let modulated = powers[place] + 2.0 * sd * sd * others;
-                if powers[place] > 0.0 { (powers[place] / modulated).sqrt() } else { 0.0 }
+            .map(|index| {
+                let near = index.saturating_sub(order_max)..=(index + order_max).min(2 * harmonics);
+                let others = powers[near].iter().sum::<f64>() - powers[index];
+                let modulated = powers[index] + 2.0 * sd * sd * others;
+                if powers[index] > 0.0 { (powers[index] / modulated).sqrt() } else { 0.0 }
             })
             .collect();
-        Some(Self { sd, reach, gains })
+        Some(Self { sd, order_max, gains })
     }
 
-    /// The product of two curves is the convolution of their harmonics.
+    /// Modulates the detail: the product of two curves is the convolution of their harmonics.
     fn apply<R: Rng + ?Sized>(&self, terms: &mut [Point], normals: &mut Normals<'_, R>) {
-        let reach = self.reach;
-        let mut factor = vec![[0.0, 0.0]; 2 * reach + 1];
-        factor[reach] = [1.0, 0.0];
-        for m in 1..=reach {
+        let order_max = self.order_max;
+        let mut factor = vec![[0.0, 0.0]; 2 * order_max + 1];
+        factor[order_max] = [1.0, 0.0];
+        for m in 1..=order_max {
             let (re, im) = (self.sd * normals.draw(), self.sd * normals.draw());
-            factor[reach + m] = [re, im];
-            factor[reach - m] = [re, -im];
+            factor[order_max + m] = [re, im];
+            factor[order_max - m] = [re, -im];
         }
         let mut modulated = vec![[0.0, 0.0]; terms.len()];
-        for (place, &u) in terms.iter().enumerate().filter(|&(place, _)| self.gains[place] > 0.0) {
-            // Place of the first product; what falls outside the curve's harmonics is lost.
-            let first = place.saturating_sub(reach);
-            let skipped = reach.saturating_sub(place);
+        for (index, &u) in terms.iter().enumerate().filter(|&(index, _)| self.gains[index] > 0.0) {
+            // Index of the first product; products beyond the harmonics of the curve are dropped.
+            let first = index.saturating_sub(order_max);
+            let skipped = order_max.saturating_sub(index);
             for (sum, &f) in modulated[first..].iter_mut().zip(&factor[skipped..]) {
                 let product = multiply(u, f);
                 *sum = [sum[0] + product[0], sum[1] + product[1]];

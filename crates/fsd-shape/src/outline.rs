@@ -1,16 +1,17 @@
-//! Closed polygons: length, area, roundness, and points at equal distances.
+//! Closed polygons: perimeter, area, circularity, and resampling at equal distances.
 
 /// A point or complex number: x right, y down, in pixels, pixel centres at integers.
 pub type Point = [f64; 2];
 
-/// How often [`resample`] corrects its spacing at most. Each pass shrinks the spread of the chords several times over;
-/// only needles narrower than one spacing are left after this many.
+/// Maximum number of corrections of the spacing in [`resample`]. Each pass reduces the variation of the chords several
+/// times, except at spikes narrower than the spacing.
 const SPACING_PASSES: usize = 40;
 
-/// Spread of the chord lengths (standard deviation over mean) at which [`resample`] is content.
+/// Coefficient of variation of the chord lengths at which [`resample`] stops.
 const SPACING_SPREAD: f64 = 1e-4;
 
-/// Area enclosed, in px², positive if the outline runs clockwise on the screen (x right, y down), as [`crate::trace`] makes it.
+/// Returns the enclosed area, in px², positive if the outline runs clockwise on the screen (x right, y down), like the
+/// outlines of [`crate::trace`].
 ///
 /// ```
 /// assert_eq!(fsd_shape::signed_area(&[[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]]), 12.0);
@@ -23,7 +24,8 @@ pub fn signed_area(outline: &[Point]) -> f64 {
     twice / 2.0
 }
 
-/// Centre of gravity of the enclosed area; of an outline without area, the mean of its points; of none, the origin.
+/// Returns the centroid of the enclosed area; of an outline without area, the mean of its points; of an empty one, the
+/// origin.
 pub fn centroid(outline: &[Point]) -> Point {
     let Some(&origin) = outline.first() else {
         return [0.0, 0.0];
@@ -38,19 +40,20 @@ pub fn centroid(outline: &[Point]) -> Point {
         moment = [moment[0] + (p[0] + q[0]) * c, moment[1] + (p[1] + q[1]) * c];
         sum = [sum[0] + p[0], sum[1] + p[1]];
     }
-    // Three times twice the area: the centroid of the triangle (0, p, q) is a third of p + q.
+    // Six times the area: the centroid of the triangle (0, p, q) is (p + q) / 3.
     let (sum, divisor) = if twice_area == 0.0 { (sum, outline.len() as f64) } else { (moment, 3.0 * twice_area) };
     [origin[0] + sum[0] / divisor, origin[1] + sum[1] / divisor]
 }
 
-/// Length of the closed outline, in px.
+/// Returns the length of the closed outline, in px.
 pub fn perimeter(outline: &[Point]) -> f64 {
     edges(outline).map(|(p, q)| distance(p, q)).sum()
 }
 
-/// Isoperimetric quotient 4πA / P²: 1 for a circle, π/4 for a square, 0 for an outline without area or length.
+/// Returns the isoperimetric quotient 4πA / P²: 1 for a circle, π/4 for a square, 0 for an outline without area or
+/// length.
 ///
-/// It falls with every wiggle of the perimeter, so compare outlines of equal harmonics only.
+/// It decreases with the detail of an outline, so compare only outlines with the same number of harmonics.
 pub fn circularity(outline: &[Point]) -> f64 {
     let length = perimeter(outline);
     if length == 0.0 {
@@ -59,22 +62,22 @@ pub fn circularity(outline: &[Point]) -> f64 {
     4.0 * core::f64::consts::PI * signed_area(outline).abs() / (length * length)
 }
 
-/// `count` points on the outline at equal distances from each other, starting at its first point.
+/// Returns `count` points on the outline at equal distances from each other, starting at its first point.
 ///
-/// The points lie on the given polygon. First they are set at equal arc length, then moved along it until the chords between
-/// neighbours are equal too (spread below 0.1 %), which differs at corners. Where the polygon has needles
-/// narrower than the spacing this cannot be had, and the best found is returned. Fewer than two points are repeated.
+/// The points are on the given polygon. They start at equal arc lengths and move along it until the chords between
+/// neighbours are equal (coefficient of variation below 0.1 %), which differs at corners. If the polygon has spikes
+/// narrower than the spacing, the best approximation is returned. An outline of a single point is repeated.
 ///
 /// ```
 /// let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
 /// assert_eq!(fsd_shape::resample(&square, 8)[3], [2.0, 1.0]);
 /// ```
 pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
-    let Some((arc, mut places)) = even_places(outline, count) else {
+    let Some((arc, mut positions)) = equidistant_positions(outline, count) else {
         return outline.first().map_or(Vec::new(), |&first| vec![first; count]);
     };
-    let length = places[count];
-    let mut points = place(outline, &arc, &places[..count]);
+    let length = positions[count];
+    let mut points = points_at(outline, &arc, &positions[..count]);
     let mut best = points.clone();
     let mut best_spread = f64::INFINITY;
     let mut chords = vec![0.0; count + 1];
@@ -96,7 +99,7 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
         if spread <= SPACING_SPREAD {
             break;
         }
-        // Arc length as a function of chord length, read at equal chords.
+        // Interpolates arc length as a function of chord length at equal chords.
         let mut moved = Vec::with_capacity(count + 1);
         let mut k = 0;
         for target in (0..count).map(|k| k as f64 * mean) {
@@ -104,31 +107,32 @@ pub fn resample(outline: &[Point], count: usize) -> Vec<Point> {
                 k += 1;
             }
             let t = ratio(target - chords[k], chords[k + 1] - chords[k]);
-            moved.push(places[k] + t * (places[k + 1] - places[k]));
+            moved.push(positions[k] + t * (positions[k + 1] - positions[k]));
         }
         moved.push(length);
-        places = moved;
-        points = place(outline, &arc, &places[..count]);
+        positions = moved;
+        points = points_at(outline, &arc, &positions[..count]);
     }
     best
 }
 
-/// `count` points on the outline at equal distances along it, starting at its first point: [`resample`] without its correction of
-/// chords, many times as fast. Chords are shorter across corners.
+/// Returns `count` points at equal arc lengths, starting at the first point of the outline. Many times as fast as
+/// [`resample`], which also equalises the chords; chords are shorter across corners.
 ///
 /// ```
 /// let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
 /// assert_eq!(fsd_shape::resample_along(&square, 16)[3], [1.5, 0.0]);
 /// ```
 pub fn resample_along(outline: &[Point], count: usize) -> Vec<Point> {
-    let Some((arc, places)) = even_places(outline, count) else {
+    let Some((arc, positions)) = equidistant_positions(outline, count) else {
         return outline.first().map_or(Vec::new(), |&first| vec![first; count]);
     };
-    place(outline, &arc, &places[..count])
+    points_at(outline, &arc, &positions[..count])
 }
 
-/// The arc length at each vertex and at the end, and `count` even arc lengths and the whole; nothing if the outline has no length.
-fn even_places(outline: &[Point], count: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+/// Returns the arc length at each vertex and at the end, and `count` equidistant arc lengths and the total; none if the
+/// outline has no length.
+fn equidistant_positions(outline: &[Point], count: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     let mut arc = Vec::with_capacity(outline.len() + 1);
     arc.push(0.0);
     let mut length = 0.0;
@@ -137,13 +141,14 @@ fn even_places(outline: &[Point], count: usize) -> Option<(Vec<f64>, Vec<f64>)> 
         arc.push(length);
     }
     let step = length / count as f64;
-    let mut places: Vec<f64> = (0..count).map(|k| k as f64 * step).collect();
-    places.push(length);
-    (length > 0.0 && length.is_finite()).then_some((arc, places))
+    let mut positions: Vec<f64> = (0..count).map(|k| k as f64 * step).collect();
+    positions.push(length);
+    (length > 0.0 && length.is_finite()).then_some((arc, positions))
 }
 
-/// Points of the polygon at ascending arc lengths `places`; `arc` holds the arc length at each vertex and at the end.
-fn place(outline: &[Point], arc: &[f64], places: &[f64]) -> Vec<Point> {
+/// Returns the points of the polygon at ascending arc lengths `positions`; `arc` holds the arc length at each vertex
+/// and at the end.
+fn points_at(outline: &[Point], arc: &[f64], positions: &[f64]) -> Vec<Point> {
     let mut edge = 0;
     let at = |&s: &f64| {
         while edge + 1 < outline.len() && arc[edge + 1] <= s {
@@ -153,15 +158,15 @@ fn place(outline: &[Point], arc: &[f64], places: &[f64]) -> Vec<Point> {
         let t = ratio(s - arc[edge], arc[edge + 1] - arc[edge]);
         [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]
     };
-    places.iter().map(at).collect()
+    positions.iter().map(at).collect()
 }
 
-/// Place of a part within a whole, 0..=1; 0 in a whole of no length.
+/// Returns part / whole, clamped to 0..=1; 0 if `whole` is 0.
 fn ratio(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { (part / whole).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// The edges of the closed outline, the last one back to the start.
+/// Returns the edges of the closed outline, including the one from the last to the first point.
 pub(crate) fn edges(outline: &[Point]) -> impl Iterator<Item = (Point, Point)> + '_ {
     let next = outline.iter().skip(1).chain(outline.first());
     outline.iter().copied().zip(next.copied())

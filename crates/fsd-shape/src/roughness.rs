@@ -1,28 +1,29 @@
-//! Roughness: what the fine detail of outlines has beyond a normal field that is alike from shape to shape and all along the outline.
+//! Roughness: the variation of fine detail from shape to shape and along the outline, beyond that of a stationary
+//! normal field.
 
 use portable_numerics::statistics::deviation;
 
 use crate::descriptors::Descriptors;
-use crate::model::LEAST_FOR_LOCAL;
+use crate::model::MIN_HARMONICS_FOR_LOCAL;
 use crate::statistics::{ShapeStatistics, finest_coarse, order, terms};
 
-/// Places per harmonic at which detail is looked at.
-const PLACES_PER_HARMONIC: usize = 8;
+/// Sample points per harmonic.
+const SAMPLES_PER_HARMONIC: usize = 8;
 
-/// The fine detail of a training set: what the terms with |l| above [`finest_coarse`] add to each outline.
+/// The fine detail of a training set: the terms with |l| above [`finest_coarse`].
 ///
-/// Few components reach so far, so a draw makes its detail from the residuals: a normal field, alike all along the outline
-/// and from shape to shape. What real detail has beyond that is roughness.
-pub(crate) struct Fine {
+/// Few components contain these terms, so that drawn detail comes from the residuals: a stationary normal field, with
+/// the same variance for all shapes. Roughness describes the additional variation of real detail.
+pub(crate) struct DetailStatistics {
     harmonics: usize,
-    /// Coordinates of the detail, the rest set to 0.
+    /// Coordinates of each outline, with those of the coarse form set to 0.
     details: Vec<Vec<f64>>,
-    /// Mean square of each outline's detail.
+    /// Mean square of the detail of each outline.
     energies: Vec<f64>,
 }
 
-impl Fine {
-    /// None if an outline has no detail at all.
+impl DetailStatistics {
+    /// Returns none if an outline has no detail.
     pub(crate) fn new(deviations: &[Vec<f64>], harmonics: usize) -> Option<Self> {
         let coarse = finest_coarse(harmonics);
         let detail = |(k, &v): (usize, &f64)| if order(k, harmonics) > coarse { v } else { 0.0 };
@@ -33,12 +34,14 @@ impl Fine {
         there.then_some(Self { harmonics, details, energies })
     }
 
-    /// Spread of the logarithm of a shape's root-mean-square detail, beyond what chance gives draws without roughness.
+    /// Returns the standard deviation of the logarithm of the root-mean-square detail, beyond that of draws without
+    /// roughness.
     pub(crate) fn roughness_sd(&self, of: &ShapeStatistics) -> f64 {
         let logs: Vec<f64> = self.energies.iter().map(|e| libm::log(*e) / 2.0).collect();
         let spread = deviation(&logs);
         // The energy of a normal draw has mean tr Σ and variance 2 tr Σ², Σ being the loadings' products and, on the
-        // diagonal, the residual variances. (Tails of the scores add to this variance, but little to that of its logarithm.)
+        // diagonal, the residual variances. (Tails of the scores add to this variance, but little to that of its
+        // logarithm.)
         let coarse = finest_coarse(self.harmonics);
         let is_fine = |k: usize| order(k, self.harmonics) > coarse;
         let loadings: Vec<Vec<f64>> = of
@@ -60,40 +63,41 @@ impl Fine {
                 variance += 4.0 * product * product;
             }
         }
-        // It behaves as a χ² of so many degrees of freedom; the variance of ½ ln χ² is ψ₁(ν/2) / 4.
+        // Its distribution is close to χ² with ν degrees of freedom; the variance of ½ ln χ² is ψ₁(ν/2) / 4.
         let freedom = 2.0 * mean * mean / variance;
         let chance = trigamma(freedom / 2.0) / 4.0;
         (spread * spread - chance).max(0.0).sqrt().min(1.0)
     }
 
-    /// Modulation of the detail along the outline, from how much its fourth moment exceeds that of an even normal field.
+    /// Returns the modulation of the detail along the outline, from the excess of its fourth moment over that of a
+    /// stationary normal field.
     pub(crate) fn local_roughness(&self) -> f64 {
-        if self.harmonics < LEAST_FOR_LOCAL {
+        if self.harmonics < MIN_HARMONICS_FOR_LOCAL {
             return 0.0;
         }
-        let places = PLACES_PER_HARMONIC * self.harmonics;
+        let samples = SAMPLES_PER_HARMONIC * self.harmonics;
         let mut fourth = 0.0;
         for (row, energy) in self.details.iter().zip(&self.energies) {
             let Ok(detail) = Descriptors::from_harmonics(terms(row)) else {
                 return 0.0;
             };
-            for h in detail.outline(places) {
+            for h in detail.outline(samples) {
                 let square = (h[0] * h[0] + h[1] * h[1]) / energy;
                 fourth += square * square;
             }
         }
-        // An even normal field of complex numbers has E|h|⁴ = 2 (E|h|²)²; modulated by 1 + σf with f a standard normal,
-        // this grows by (1 + 6s + 3s²) / (1 + s)², s = σ². Solved for s: √(2 / (3 − growth)) − 1.
-        let even = 2.0 * places as f64 * self.details.len() as f64;
-        let growth = (fourth / even).clamp(1.0, GREATEST_GROWTH);
+        // A stationary normal field of complex numbers has E|h|⁴ = 2 (E|h|²)²; modulated by 1 + σf with f a standard
+        // normal, this grows by (1 + 6s + 3s²) / (1 + s)², s = σ². Solved for s: √(2 / (3 − growth)) − 1.
+        let stationary = 2.0 * samples as f64 * self.details.len() as f64;
+        let growth = (fourth / stationary).clamp(1.0, MAX_GROWTH);
         ((2.0 / (3.0 - growth)).sqrt() - 1.0).sqrt()
     }
 }
 
-/// Growth of the fourth moment at a modulation of 1: (1 + 6 + 3) / 4.
-const GREATEST_GROWTH: f64 = 2.5;
+/// Growth of the fourth moment for a modulation of 1: (1 + 6 + 3) / 4.
+const MAX_GROWTH: f64 = 2.5;
 
-/// ψ₁(x) by recurrence and its asymptotic series; 1e-8 for x >= 1/2.
+/// Returns ψ₁(x) by recurrence and its asymptotic series; error below 1e-8 for x >= 1/2.
 fn trigamma(x: f64) -> f64 {
     let mut sum = 0.0;
     let mut x = x;

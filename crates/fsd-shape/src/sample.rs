@@ -1,28 +1,29 @@
-//! Normal numbers bent to a given skewness and kurtosis.
+//! Random numbers of given skewness and kurtosis.
 
-/// Fleishman's polynomial −c + bz + cz² + dz³ of a standard normal z: mean 0, variance 1, and the skewness and excess
-/// kurtosis asked for (doi:10.1007/BF02293811).
+/// Fleishman's polynomial −c + bz + cz² + dz³ of a standard normal number z, with mean 0, variance 1, and given
+/// skewness and excess kurtosis (doi:10.1007/BF02293811).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Bend {
+pub(crate) struct FleishmanPolynomial {
     b: f64,
     c: f64,
     d: f64,
 }
 
-/// Steps from the normal distribution to the moments asked for; each start lies so close to its solution that Newton's method finds it.
+/// Continuation steps from the normal distribution to the target moments, small enough for Newton's method to converge.
 const STEPS: u32 = 32;
-/// Newton steps at each.
+/// Newton iterations of each continuation step.
 const NEWTON_STEPS: u32 = 8;
-/// Largest error of the moments accepted in the end.
+/// Maximum final error of the moments.
 const TOLERANCE: f64 = 1e-8;
 
-impl Bend {
-    /// The least excess kurtosis this crate takes at a skewness. Fleishman's polynomials begin a little lower.
-    pub(crate) fn least_kurtosis(skewness: f64) -> f64 {
+impl FleishmanPolynomial {
+    /// Returns the minimum accepted excess kurtosis for a skewness. The limit of Fleishman's polynomials is slightly
+    /// lower.
+    pub(crate) fn min_kurtosis(skewness: f64) -> f64 {
         1.7 * skewness * skewness - 1.0
     }
 
-    /// None if no polynomial has these moments.
+    /// Returns the polynomial with these moments, if there is one.
     pub(crate) fn new(skewness: f64, excess_kurtosis: f64) -> Option<Self> {
         let mut p = [1.0, 0.0, 0.0];
         for step in 1..=STEPS {
@@ -44,7 +45,7 @@ impl Bend {
         ((self.d * z + self.c) * z + self.b) * z - self.c
     }
 
-    /// Variance − 1, skewness and excess kurtosis of the polynomial, less those wanted.
+    /// Returns the errors of variance, skewness and excess kurtosis of the polynomial.
     fn errors([b, c, d]: [f64; 3], skewness: f64, kurtosis: f64) -> [f64; 3] {
         [
             b * b + 6.0 * b * d + 2.0 * c * c + 15.0 * d * d - 1.0,
@@ -73,7 +74,7 @@ impl Bend {
     }
 }
 
-/// x with Mx = y, by Cramer's rule.
+/// Solves Mx = y by Cramer's rule.
 fn solve(m: [[f64; 3]; 3], y: [f64; 3]) -> Option<[f64; 3]> {
     let determinant = |m: [[f64; 3]; 3]| {
         m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
@@ -98,12 +99,12 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     #[test]
-    fn bent_normals_have_the_moments_asked_for() {
+    fn polynomials_have_the_target_moments() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xBE4D);
         for (skewness, kurtosis) in [(-1.5, 3.4), (1.6, 7.0), (0.0, 5.0), (0.6, -0.3), (0.0, -1.0)] {
-            let bend = Bend::new(skewness, kurtosis).unwrap();
+            let polynomial = FleishmanPolynomial::new(skewness, kurtosis).unwrap();
             let mut normals = Normals::new(&mut rng);
-            let values: Vec<f64> = (0..400_000).map(|_| bend.apply(normals.draw())).collect();
+            let values: Vec<f64> = (0..400_000).map(|_| polynomial.apply(normals.draw())).collect();
             let power = |p: usize| values.iter().map(|v| [*v; 4][..p].iter().product::<f64>()).sum::<f64>() / 4e5;
             let excess_bound = 0.2 * (1.0 + kurtosis.abs());
             let bounds = [(0.0, 4.0 / 4e5_f64.sqrt()), (1.0, 0.03), (skewness, 0.1), (3.0 + kurtosis, excess_bound)];
@@ -114,16 +115,16 @@ mod tests {
     }
 
     #[test]
-    fn every_accepted_pair_of_moments_has_a_polynomial() {
+    fn all_accepted_moments_have_a_polynomial() {
         for s in -8..=8 {
             let skewness = f64::from(s) / 4.0;
-            let least = Bend::least_kurtosis(skewness);
+            let least = FleishmanPolynomial::min_kurtosis(skewness);
             for k in 0..=20 {
                 let kurtosis = least + (12.0 - least) * f64::from(k) / 20.0;
-                assert!(Bend::new(skewness, kurtosis).is_some(), "{skewness} {kurtosis}");
+                assert!(FleishmanPolynomial::new(skewness, kurtosis).is_some(), "{skewness} {kurtosis}");
             }
         }
-        assert!(Bend::new(3.0, 0.0).is_none());
-        assert_eq!(Bend::new(0.0, 0.0).unwrap().apply(1.25), 1.25);
+        assert!(FleishmanPolynomial::new(3.0, 0.0).is_none());
+        assert_eq!(FleishmanPolynomial::new(0.0, 0.0).unwrap().apply(1.25), 1.25);
     }
 }

@@ -1,14 +1,14 @@
-//! What a shape model knows: numbers about a population of outlines, none of the outlines.
+//! The statistics of a shape model: numbers that describe a population of outlines.
 
 use crate::Error;
 use crate::outline::Point;
-use crate::sample::Bend;
+use crate::sample::FleishmanPolynomial;
 use crate::steps;
 
-/// Most harmonics accepted; far more than any outline holds, a guard against nonsense in files.
-const MOST_HARMONICS: usize = 4096;
+/// Maximum number of harmonics, far above that of any outline; limits the memory for invalid files.
+const MAX_HARMONICS: usize = 4096;
 
-/// Statistics of a population of outlines in terms of their normalised descriptors (Eq. 3), enough to draw new ones.
+/// Statistics of the normalised descriptors (Eq. 3) of a population of outlines, from which new ones can be drawn.
 ///
 /// A shape is a vector of *coordinates*, Re u₋ₕ, Im u₋ₕ, …, Re uₕ, Im uₕ without u₀: four times `harmonics` numbers in
 /// units of |u₁|. It is drawn as
@@ -17,15 +17,16 @@ const MOST_HARMONICS: usize = 4096;
 /// x = mean + R · (Σ scoreₖ · loadingₖ + residual_sd · normal)
 /// ```
 ///
-/// (if the residual is by steps, the residual's sum is turned back into descriptors first) with scores of mean 0, variance 1 and the component's skewness and kurtosis, and R the roughness: a factor for each shape, of mean square 1,
-/// upon |l| ≥ 2, and a random modulation along the outline, upon the fine detail |l| > harmonics / 5.
+/// A residual in steps is transformed to descriptors first. Scores have mean 0, variance 1, and the skewness and
+/// kurtosis of their component. R is the roughness: for |l| ≥ 2 a factor for each shape, of mean square 1, and for the
+/// fine detail |l| > harmonics / 5 a random modulation along the outline.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ShapeStatistics {
     /// Highest |l|, 1..=4096.
     pub harmonics: usize,
-    /// Number of outlines these statistics were taken from; for information.
+    /// Number of training outlines; for information.
     pub outlines: usize,
     /// Mean of ln |u₁|, |u₁| in px.
     pub ln_radius_mean: f64,
@@ -33,11 +34,11 @@ pub struct ShapeStatistics {
     pub ln_radius_sd: f64,
     /// Mean of the coordinates.
     pub mean: Vec<f64>,
-    /// Directions in which the coordinates vary together, by falling variance; none in the paper's model.
+    /// Principal components in order of descending variance; none in the paper's model.
     pub components: Vec<PrincipalComponent>,
-    /// What the residual is independent in.
+    /// Coordinates in which the residual is independent.
     pub residual: Residual,
-    /// Standard deviation of what each coordinate does on its own, >= 0.
+    /// Standard deviation of the residual of each coordinate, >= 0.
     pub residual_sd: Vec<f64>,
     /// Standard deviation of the logarithm of the roughness factor of a shape, 0..=1.
     pub roughness_sd: f64,
@@ -51,43 +52,44 @@ pub struct ShapeStatistics {
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Residual {
-    /// The descriptors: the paper's way.
+    /// The descriptors, as in the paper.
     Descriptors,
-    /// Steps along the outline: in place of u₁₊ₘ stands the m-th harmonic of the direction of the steps, in place of u₁₋ₘ that of their
-    /// length, for 3 ≤ m < harmonics. The points of a real outline lie at equal steps, so the second is small; with independent
-    /// descriptors it would be as large as the first.
+    /// Steps along the outline: u₁₊ₘ is replaced by the m-th harmonic of the direction of the steps, u₁₋ₘ by that of
+    /// their length, for 3 ≤ m < harmonics. The points of a real outline are equidistant, so the second is small; with
+    /// independent descriptors it would be as large as the first.
     Steps,
 }
 
-/// A direction in which the coordinates of a shape vary together.
+/// A principal component of the coordinates of a shape.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct PrincipalComponent {
-    /// One standard deviation of it, in coordinates.
+    /// Direction of the component, with the length of one standard deviation.
     pub loading: Vec<f64>,
-    /// Skewness of its score, -2..=2.
+    /// Skewness of the score, -2..=2.
     pub skewness: f64,
-    /// Excess kurtosis of its score, from 1.7 skewness² - 1 to 12.
+    /// Excess kurtosis of the score, from 1.7 skewness² - 1 to 12.
     pub excess_kurtosis: f64,
 }
 
 impl PrincipalComponent {
     /// Largest |skewness| of a score.
-    pub(crate) const MOST_SKEWNESS: f64 = 2.0;
+    pub(crate) const MAX_SKEWNESS: f64 = 2.0;
     /// Largest excess kurtosis of a score.
-    pub(crate) const MOST_KURTOSIS: f64 = 12.0;
+    pub(crate) const MAX_KURTOSIS: f64 = 12.0;
 
-    /// The bend of a normal that gives its score.
-    pub(crate) fn bend(&self) -> Option<Bend> {
-        let kurtosis = Bend::least_kurtosis(self.skewness)..=Self::MOST_KURTOSIS;
-        let possible = self.skewness.abs() <= Self::MOST_SKEWNESS && kurtosis.contains(&self.excess_kurtosis);
-        possible.then(|| Bend::new(self.skewness, self.excess_kurtosis)).flatten()
+    /// Returns the polynomial that maps a standard normal number to a score; none if the moments are out of range.
+    pub(crate) fn polynomial(&self) -> Option<FleishmanPolynomial> {
+        let kurtosis = FleishmanPolynomial::min_kurtosis(self.skewness)..=Self::MAX_KURTOSIS;
+        let possible = self.skewness.abs() <= Self::MAX_SKEWNESS && kurtosis.contains(&self.excess_kurtosis);
+        possible.then(|| FleishmanPolynomial::new(self.skewness, self.excess_kurtosis)).flatten()
     }
 }
 
 impl ShapeStatistics {
-    /// The same statistics with every number rounded to `digits` significant decimal digits (1..=17), so that they print short.
+    /// Returns the statistics with every number rounded to `digits` significant decimal digits (1..=17), for compact
+    /// files.
     ///
     /// Five digits change drawn outlines by less than a hundredth of a pixel per 100 px of radius.
     ///
@@ -98,7 +100,7 @@ impl ShapeStatistics {
         if !(1..=17).contains(&digits) {
             return Err(Error::Parameter { field: "digits", value: digits as f64, accepted: "1..=17" });
         }
-        // The nearest number of so many digits, by way of its decimal form: exact, and the same everywhere.
+        // Rounds through the decimal representation, which is exact on every platform.
         let round = |v: &mut f64| *v = format!("{v:.*e}", digits - 1).parse().unwrap_or(*v);
         let mut rounded = self.clone();
         let Self { ln_radius_mean, ln_radius_sd, roughness_sd, local_roughness, .. } = &mut rounded;
@@ -106,8 +108,8 @@ impl ShapeStatistics {
         rounded.mean.iter_mut().chain(&mut rounded.residual_sd).for_each(round);
         for PrincipalComponent { loading, skewness, excess_kurtosis } in &mut rounded.components {
             loading.iter_mut().chain([&mut *skewness, &mut *excess_kurtosis]).for_each(round);
-            // Rounding may carry a score just past what its skewness allows.
-            *excess_kurtosis = excess_kurtosis.max(Bend::least_kurtosis(*skewness));
+            // Rounding may reduce the kurtosis below the minimum for its skewness.
+            *excess_kurtosis = excess_kurtosis.max(FleishmanPolynomial::min_kurtosis(*skewness));
         }
         Ok(rounded)
     }
@@ -116,7 +118,7 @@ impl ShapeStatistics {
         4 * self.harmonics
     }
 
-    /// Variance that the residual gives each coordinate.
+    /// Returns the variance of each coordinate due to the residual.
     pub(crate) fn residual_squares(&self) -> Vec<f64> {
         let mut squares: Vec<f64> = self.residual_sd.iter().map(|sd| sd * sd).collect();
         if self.residual == Residual::Steps {
@@ -125,7 +127,7 @@ impl ShapeStatistics {
         squares
     }
 
-    /// Mean square of each term u₋ₕ … uₕ of a shape.
+    /// Returns the mean square of each term u₋ₕ … uₕ of a shape.
     pub(crate) fn powers(&self) -> Vec<f64> {
         let mut squares = self.residual_squares();
         for (square, m) in squares.iter_mut().zip(&self.mean) {
@@ -142,8 +144,8 @@ impl ShapeStatistics {
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        if !(1..=MOST_HARMONICS).contains(&self.harmonics) {
-            return wrong("harmonics", format!("is {}; accepted: 1..={MOST_HARMONICS}", self.harmonics));
+        if !(1..=MAX_HARMONICS).contains(&self.harmonics) {
+            return wrong("harmonics", format!("= {}: expected 1..={MAX_HARMONICS}", self.harmonics));
         }
         check_number("ln_radius_mean", self.ln_radius_mean, -100.0, 100.0)?;
         check_number("ln_radius_sd", self.ln_radius_sd, 0.0, 10.0)?;
@@ -153,11 +155,11 @@ impl ShapeStatistics {
         self.check_vector("residual_sd", &self.residual_sd, 0.0)?;
         for (k, component) in self.components.iter().enumerate() {
             self.check_vector("components.loading", &component.loading, f64::MIN)?;
-            if component.bend().is_none() {
+            if component.polynomial().is_none() {
                 return wrong(
                     "components",
                     format!(
-                        "number {k} has skewness {} and excess kurtosis {}; accepted: -2..=2 and from 1.7 skewness² - 1 to 12",
+                        "[{k}]: skewness {} and excess kurtosis {} are out of range: expected -2..=2 and 1.7 skewness² - 1 to 12",
                         component.skewness, component.excess_kurtosis
                     ),
                 );
@@ -168,8 +170,12 @@ impl ShapeStatistics {
 
     fn check_vector(&self, field: &'static str, values: &[f64], least: f64) -> Result<(), Error> {
         if values.len() != self.coordinates() {
-            let problem =
-                format!("has {} numbers; {} harmonics need {}", values.len(), self.harmonics, self.coordinates());
+            let problem = format!(
+                "has {} numbers: expected {} for {} harmonics",
+                values.len(),
+                self.coordinates(),
+                self.harmonics
+            );
             return wrong(field, problem);
         }
         values.iter().try_for_each(|&v| check_number(field, v, least, f64::MAX))
@@ -182,33 +188,33 @@ fn check_number(field: &'static str, value: f64, least: f64, most: f64) -> Resul
     }
     let least = if least == f64::MIN { "any".to_owned() } else { least.to_string() };
     let most = if most == f64::MAX { "finite".to_owned() } else { most.to_string() };
-    wrong(field, format!("holds {value}; accepted: {least}..={most}"))
+    wrong(field, format!("contains {value}: expected {least}..={most}"))
 }
 
 fn wrong(field: &'static str, problem: String) -> Result<(), Error> {
     Err(Error::Statistics { field, problem })
 }
 
-/// |l| of coordinate k.
+/// Returns |l| of coordinate k.
 pub(crate) fn order(k: usize, harmonics: usize) -> usize {
     let place = k / 2;
     if place < harmonics { harmonics - place } else { place + 1 - harmonics }
 }
 
-/// Descriptors of the coordinates of a shape, u₀ = 0.
+/// Returns the descriptors with these coordinates, with u₀ = 0.
 pub(crate) fn terms(coordinates: &[f64]) -> Vec<Point> {
     let mut terms: Vec<Point> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
     terms.insert(terms.len() / 2, [0.0, 0.0]);
     terms
 }
 
-/// Highest |l| that counts as form, not as detail: a fifth of the harmonics. Of 40 that is 8, up to where the components explain
-/// outlines of cells; beyond, the residual does.
+/// Returns the highest |l| of the coarse form, a fifth of the harmonics; terms above are detail. For 40 harmonics it is
+/// 8, up to which the components explain outlines of cells.
 pub(crate) fn finest_coarse(harmonics: usize) -> usize {
     (harmonics / 5).max(1)
 }
 
-/// a += weight · b.
+/// Computes a += weight · b.
 pub(crate) fn add_scaled(a: &mut [f64], b: &[f64], weight: f64) {
     for (x, y) in a.iter_mut().zip(b) {
         *x += weight * y;

@@ -1,16 +1,16 @@
-//! Descriptors of an outline of equal steps, split into where the steps point and how long they are.
+//! Transforms descriptors to the directions and lengths of steps along the outline, and back.
 //!
-//! The derivative of a normalised curve is i2π e^{i2πt} (1 + Σ dₘ e^{i2πmt}) with dₘ = (1 + m) u₁₊ₘ. Along a walk of equal
-//! steps the bracket turns but hardly stretches. So of the two harmonics
+//! The derivative of a normalised curve is i2π e^{i2πt} (1 + Σ dₘ e^{i2πmt}) with dₘ = (1 + m) u₁₊ₘ. Along an outline
+//! of equal steps, the phase of the bracket varies, but its modulus hardly. So of the two harmonics
 //!
 //! ```text
 //! dₘ = step + i · direction,   d₋ₘ = conj(step) + i · conj(direction)
 //! ```
 //!
-//! the step is small (a fifth of the direction in outlines of cells), which ties u₁₊ₘ to u₁₋ₘ. Independent descriptors break
-//! that tie: the points of such a draw crowd here and spread there, and its perimeter comes out too short.
+//! the step is small (a fifth of the direction in outlines of cells), which couples u₁₊ₘ and u₁₋ₘ. Independent
+//! descriptors lose this coupling: the points of a draw are unevenly spaced, and its perimeter is too short.
 
-/// The first m whose pair is free: below it u₀, u₁, u₋₁ belong to the pose.
+/// The first m that is transformed: pairs of smaller m contain u₀, u₁ or u₋₁, which the pose determines.
 const FIRST: usize = 3;
 
 /// Replaces each pair u₁₊ₘ, u₁₋ₘ of coordinates by direction and step.
@@ -32,7 +32,7 @@ pub(crate) fn from_steps(coordinates: &mut [f64]) {
     });
 }
 
-/// Mean squares of coordinates whose directions and steps are independent and have these mean squares.
+/// Replaces mean squares of independent directions and steps by those of the coordinates.
 pub(crate) fn squares_from_steps(squares: &mut [f64]) {
     change_pairs(squares, |direction, step, up, down| {
         let sums = [step[0] + direction[1], step[1] + direction[0]];
@@ -40,7 +40,7 @@ pub(crate) fn squares_from_steps(squares: &mut [f64]) {
     });
 }
 
-/// Replaces each pair u₁₊ₘ, u₁₋ₘ by what `change` makes of it and of 1 + m and 1 − m.
+/// Replaces each pair u₁₊ₘ, u₁₋ₘ by the result of `change`, which also takes 1 + m and 1 − m.
 fn change_pairs(coordinates: &mut [f64], change: impl Fn([f64; 2], [f64; 2], f64, f64) -> [[f64; 2]; 2]) {
     // As pairs of Re u₋ₕ, Im u₋ₕ, … without u₀.
     let (terms, _) = coordinates.as_chunks_mut();
@@ -59,7 +59,7 @@ mod tests {
     use crate::statistics::terms;
 
     #[test]
-    fn there_and_back() {
+    fn the_transform_is_invertible() {
         for harmonics in [1, 3, 4, 5, 12] {
             let before: Vec<f64> = (0..4 * harmonics).map(|k| libm::sin((k * k) as f64)).collect();
             let mut after = before.clone();
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn a_direction_turns_the_steps_and_a_step_stretches_them() {
+    fn a_direction_rotates_steps_and_a_step_changes_their_length() {
         let harmonics = 12;
         let spread = |place_of: fn(usize, usize) -> usize| {
             let mut coordinates = vec![0.0; 4 * harmonics];

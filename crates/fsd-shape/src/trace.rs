@@ -1,20 +1,21 @@
-//! From a mask to its outline: marching squares with linear interpolation, walked along the boundary.
+//! Traces the outline of a mask: marching squares with linear interpolation, along the boundary.
 
 use crate::Error;
 use crate::outline::{Point, signed_area};
 
-/// The closed outer boundary of the one object in `mask`, where its values cross `level`.
+/// Returns the closed outer boundary of the single object in `mask`, where its values cross `level`.
 ///
-/// The mask is row-major, top row first; outside it counts as 0, so objects that touch the border are closed. A pixel
-/// belongs to the object if its value exceeds `level`. Points lie between pixel centres, linearly interpolated; a pixel of
-/// 1 among zeros at level 0.5 becomes the diamond through its four edge centres. The outline starts at the top row's leftmost crossing
-/// and runs clockwise on the screen, so that [`signed_area`] is positive with x right and y down. Holes are ignored.
-/// Pixels that meet at a corner are joined if the mean of the four around it reaches the level, so in a binary mask at level 0.5 they are.
+/// The mask is row-major, top row first. Values outside count as 0, so that objects at the border are closed. A pixel
+/// belongs to the object if its value exceeds `level`. Points are linearly interpolated between pixel centres: a pixel
+/// of 1 among zeros at level 0.5 gives the diamond through its four edge centres. The outline starts at the leftmost
+/// crossing of the top row and runs clockwise on the screen, so that [`signed_area`] is positive with x right and y
+/// down. Holes are ignored. Pixels that touch at a corner are connected if the mean of the four pixels around it
+/// reaches the level; in a binary mask at level 0.5 they are.
 ///
 /// # Errors
 ///
-/// If the length is no multiple of the width, `level` is not positive and finite, a value is not finite, no
-/// value exceeds the level, or the object falls into several components.
+/// If the length is not a multiple of the width, `level` is not positive and finite, a value is not finite, no value
+/// exceeds the level, or the mask has several components.
 ///
 /// ```
 /// let mask = [0.0, 1.0, 0.0,
@@ -30,17 +31,14 @@ pub fn trace(mask: &[f32], width: usize, level: f32) -> Result<Vec<Point>, Error
         return Err(Error::MaskSize { len: mask.len(), width });
     }
     if !(level.is_finite() && level > 0.0) {
-        return Err(Error::Parameter {
-            field: "level",
-            value: f64::from(level),
-            accepted: "positive and finite (outside the mask counts as 0)",
-        });
+        return Err(Error::Parameter { field: "level", value: f64::from(level), accepted: "a positive finite number" });
     }
     if let Some(i) = mask.iter().position(|v| !v.is_finite()) {
         return Err(Error::MaskValue { value: mask[i], x: i % width, y: i / width });
     }
     let field = Field { mask, width, level };
-    // Every loop, outer or hole, somewhere runs upwards past the west side of an inside pixel: each such place starts a loop or lies on one walked before.
+    // Every loop, outer or hole, runs upwards along the left side of at least one inside pixel. Each of these pixels
+    // starts a loop or is part of a previous one.
     let mut seen = vec![false; mask.len()];
     let mut outline = Vec::new();
     let mut count = 0;
@@ -51,11 +49,11 @@ pub fn trace(mask: &[f32], width: usize, level: f32) -> Result<Vec<Point>, Error
             if !starts {
                 continue;
             }
-            let walked = field.walk(i, &mut seen);
-            if signed_area(&walked) > 0.0 {
+            let traced = field.trace_loop(i, &mut seen);
+            if signed_area(&traced) > 0.0 {
                 count += 1;
                 if count == 1 {
-                    outline = walked;
+                    outline = traced;
                 }
             }
         }
@@ -88,7 +86,7 @@ impl Field<'_> {
         self.at(pixel) > self.level
     }
 
-    /// Where the mask crosses the level between an outside and an inside pixel.
+    /// Returns the point where the mask crosses the level between an outside and an inside pixel.
     fn crossing(&self, outside: Pixel, inside: Pixel) -> Point {
         let (a, b) = (f64::from(self.at(outside)), f64::from(self.at(inside)));
         let t = (f64::from(self.level) - a) / (b - a);
@@ -96,27 +94,28 @@ impl Field<'_> {
         [along(0), along(1)]
     }
 
-    /// The loop that runs upwards past the west side of pixel `start`; marks each such place it passes.
+    /// Returns the loop that runs upwards along the left side of pixel `start`, and marks each pixel with such a side.
     ///
-    /// The walker stands between an outside pixel at its left hand and an inside pixel at its right, and looks at the two
-    /// pixels ahead of these: both outside, it turns right; both inside, left; else straight on, or at a saddle as the mean says.
-    fn walk(&self, start: usize, seen: &mut [bool]) -> Vec<Point> {
+    /// The current position is between an outside pixel on the left and an inside pixel on the right. The next two
+    /// pixels ahead determine the direction: both outside, right; both inside, left; otherwise straight on, or at a
+    /// saddle by the mean.
+    fn trace_loop(&self, start: usize, seen: &mut [bool]) -> Vec<Point> {
         #[expect(clippy::cast_possible_wrap, reason = "no image has 2^63 columns or rows")]
         let first: Pixel = [(start % self.width) as isize, (start / self.width) as isize];
         let (mut left, mut right) = ([first[0] - 1, first[1]], first);
         let mut points: Vec<Point> = Vec::new();
         loop {
             let point = self.crossing(left, right);
-            // Where an outside pixel equals the level, several crossings fall on its centre.
+            // If an outside pixel equals the level, several crossings coincide at its centre.
             if points.last() != Some(&point) {
                 points.push(point);
             }
             if right[0] == left[0] + 1 {
-                #[expect(clippy::cast_sign_loss, reason = "inside pixels lie in the image")]
+                #[expect(clippy::cast_sign_loss, reason = "inside pixels are in the image")]
                 let index = right[1] as usize * self.width + right[0] as usize;
                 seen[index] = true;
             }
-            // Ahead is the direction from left to right, turned left by a quarter.
+            // Ahead is the direction from left to right, rotated left by a quarter turn.
             let ahead = [right[1] - left[1], left[0] - right[0]];
             let ahead_left = [left[0] + ahead[0], left[1] + ahead[1]];
             let ahead_right = [right[0] + ahead[0], right[1] + ahead[1]];

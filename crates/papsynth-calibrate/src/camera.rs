@@ -1,7 +1,7 @@
 //! Gain, noise and non-uniformity of a camera, by photon transfer.
 
 use ccd_noise::Error as Noise;
-use ccd_noise::calibrate::{self, Calibration, CalibrationParams, Light, PhotonTransfer, Shading};
+use ccd_noise::calibrate::{self, Calibration, CalibrationParams, LightLevel, PhotonTransfer, Shading};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -9,8 +9,8 @@ use crate::error::Error;
 /// Size of the averaging window of the shading correction, px; frames must be larger.
 const SHADING_PX: usize = 15;
 
-/// Smallest difference between the brightest flat and the dark level, as a fraction of full scale. Below it, noise dominates the
-/// measured gain.
+/// Smallest difference between the brightest flat and the dark level, as a fraction of full scale. Below it, noise
+/// dominates the measured gain.
 const MIN_LIGHT: f64 = 0.01;
 
 /// The measured camera.
@@ -73,7 +73,7 @@ impl Level {
     fn new(name: &str, level: &calibrate::Level) -> Self {
         Self {
             name: name.to_owned(),
-            dark: level.light == Light::Dark,
+            dark: level.light == LightLevel::Dark,
             frames: level.frames,
             mean_dn: level.mean_dn,
             variance_dn2: level.variance_dn2,
@@ -119,7 +119,7 @@ impl Flats {
     ///
     /// # Errors
     /// If frames differ in size, are too small, have grey levels beyond the bits, or cannot be measured.
-    pub fn add(&mut self, name: &str, frames: &[Frame<'_>], light: Light) -> Result<(), Error> {
+    pub fn add(&mut self, name: &str, frames: &[Frame<'_>], light: LightLevel) -> Result<(), Error> {
         for frame in frames {
             let found = [frame.width, frame.grey.len() / frame.width.max(1)];
             let expected = *self.size.get_or_insert(found);
@@ -157,7 +157,7 @@ impl Flats {
         let Calibration { gain_dn_per_e, offset_dn, dark_noise_e, dsnu_e, prnu, .. } = found;
         let saturation = match found.saturation {
             calibrate::Saturation::Reached { dn, e } => Saturation { reached: true, dn, e },
-            calibrate::Saturation::Above { dn, e } => Saturation { reached: false, dn, e },
+            calibrate::Saturation::NotReached { dn, e } => Saturation { reached: false, dn, e },
         };
         Ok(Camera {
             bits: self.bits,

@@ -10,8 +10,8 @@ use crate::error::Error;
 use crate::instrument::Instrument;
 use crate::nucleus::{Nucleus, standard_error};
 
-/// Largest number of nuclei, of planes on each side, and largest blur of a plane. The fit of each nucleus is slow, and more data
-/// does not improve the estimate.
+/// Largest number of nuclei, of planes on each side, and largest blur of a plane. The fit of each nucleus is slow, and
+/// more data does not improve the estimate.
 const MAX_NUCLEI: usize = 5;
 const MAX_PLANES: usize = 4;
 const MAX_BLUR_PX: f64 = 4.0;
@@ -104,7 +104,8 @@ impl Condenser {
     }
 }
 
-/// Selects a few planes at equal distances around focus that still show detail. Returns them and their distance in planes.
+/// Selects a few planes at equal distances around focus that still show detail. Returns them and their distance in
+/// planes.
 fn select_planes<'a>(planes: &[&'a [f32]], nucleus: &Nucleus) -> (Vec<&'a [f32]>, usize) {
     let focused = nucleus.focused;
     let sides = [focused, planes.len() - 1 - focused];

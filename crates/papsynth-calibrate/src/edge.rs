@@ -58,15 +58,15 @@ impl Edge {
                 (window, calibrate::edge(image, width, window).map_err(Error::Edge)?)
             }
         };
-        let EdgeFit { sigma_px, dark, light, normal, difference } = fit;
+        let EdgeFit { sigma_px, dark, light, normal, rms_residual: difference } = fit;
         // From least squares: ∫ t²φ² = 1 ∕ (4√π).
         let length = window.width.min(window.height) as f64;
         let error_px = difference / (light - dark) * (4.0 * PI.sqrt() * sigma_px / length).sqrt();
         Ok(Self { window: find::numbers(window), sigma_px, error_px, dark, light, normal, difference })
     }
 
-    /// Returns the distance of each pixel of the window from the edge, positive on the light side, and its grey level. The position
-    /// of the edge minimizes the residuals.
+    /// Returns the distance of each pixel of the window from the edge, positive on the light side, and its grey level.
+    /// The position of the edge minimizes the residuals.
     ///
     /// # Panics
     /// If the window extends beyond the image.
@@ -114,8 +114,8 @@ fn square_around([x0, y0, x1, y1]: [f64; 4], width: usize, height: usize) -> Opt
     inside.then_some(Window { left: left as usize, top: top as usize, width: side as usize, height: side as usize })
 }
 
-/// Simulates a sharp edge of the same contrast and direction with this microscope. Returns σ of its image, and σ of the additional
-/// Gaussian blur that makes it as wide as the measured edge, or 0 if it is not narrower; px.
+/// Simulates a sharp edge of the same contrast and direction with this microscope. Returns σ of its image, and σ of the
+/// additional Gaussian blur that makes it as wide as the measured edge, or 0 if it is not narrower; px.
 pub(crate) fn extra_blur(edge: &Edge, microscope: &MicroscopeParams) -> Result<[f64; 2], optics_psf::Error> {
     /// Sizes of the image and of the central window, px.
     const SIDE: usize = 96;

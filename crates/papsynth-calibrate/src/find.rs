@@ -82,7 +82,7 @@ pub(crate) fn straight_edge(image: &[f32], width: usize) -> Option<(Window, Edge
     windows.sort_by(|a, b| b.0.total_cmp(&a.0));
     let fits =
         windows.iter().take(MAX_EDGES).filter_map(|(_, window)| Some((*window, edge(image, width, *window).ok()?)));
-    let straight = fits.filter(|(_, fit)| fit.difference <= MAX_RESIDUAL * (fit.light - fit.dark));
+    let straight = fits.filter(|(_, fit)| fit.rms_residual <= MAX_RESIDUAL * (fit.light - fit.dark));
     let slope = |fit: &EdgeFit| (fit.light - fit.dark) / fit.sigma_px;
     straight.max_by(|a, b| slope(&a.1).total_cmp(&slope(&b.1)))
 }

@@ -119,8 +119,8 @@ impl Focus {
     /// Measures a stack of planes at equal distances on both sides of focus, each with rows of `width` pixels.
     ///
     /// # Errors
-    /// If there are fewer than 3 planes, no nucleus is found, a given window or all detected ones cannot be measured, or the
-    /// aperture of the condenser cannot be estimated.
+    /// If there are fewer than 3 planes, no nucleus is found, a given window or all detected ones cannot be measured,
+    /// or the aperture of the condenser cannot be estimated.
     ///
     /// # Panics
     /// If planes differ in size or are not complete rows.

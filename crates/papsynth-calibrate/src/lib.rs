@@ -14,7 +14,7 @@ mod recipe;
 
 pub use calibration::Calibration;
 pub use camera::{Camera, Flats, Frame, Level, Saturation};
-pub use ccd_noise::calibrate::Light;
+pub use ccd_noise::calibrate::LightLevel;
 pub use condenser::{Bound, Condenser};
 pub use edge::{Edge, EdgeAt};
 pub use error::Error;

@@ -43,8 +43,8 @@ impl Section {
 }
 
 impl Calibration {
-    /// Returns the sections `[optics]` and `[light]` of a bright-field microscope in TOML; `None` if lengths in micrometres are
-    /// unknown, or neither condenser nor edge were measured.
+    /// Returns the sections `[optics]` and `[light]` of a bright-field microscope in TOML; `None` if lengths in
+    /// micrometres are unknown, or neither condenser nor edge were measured.
     ///
     /// # Errors
     /// If a parameter of the microscope is out of range.
@@ -90,8 +90,8 @@ impl Calibration {
         Ok(Some(format!("{}\n{}", section.to_toml(), light.table())))
     }
 
-    /// Returns the section `[optics]` with the Gaussians of the paper in TOML; `None` if lengths in micrometres are unknown, or
-    /// neither focus nor edge were measured.
+    /// Returns the section `[optics]` with the Gaussians of the paper in TOML; `None` if lengths in micrometres are
+    /// unknown, or neither focus nor edge were measured.
     #[must_use]
     pub fn gaussian_toml(&self) -> Option<String> {
         let instrument = self.microscope.as_ref()?;

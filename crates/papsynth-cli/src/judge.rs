@@ -132,7 +132,7 @@ fn note_few_slides(folder: &Path, side: &Side) {
         let slides = counted(slides.len() as u64, "slide", "slides");
         exit::note(format!(
             "{folder}: {fields} from {slides}; stains differ between slides, so generate more slides for a fair test: \
-             --set slide.fields=1"
+             --set slide.fields_per_slide=1"
         ));
     }
 }

@@ -65,8 +65,8 @@ pub(crate) fn render(args: Render) -> Result<(), ExitError> {
     let mut planes = Vec::new();
     let finished = image(&setup, scene, |plane| planes.push(plane.clone()))?;
     let frame = Frame { planes, finished };
-    let (picture, scene) = (frame.picture(), &frame.finished.scene);
-    out.write_levels(&picture, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
+    let (levels, scene) = (frame.image(), &frame.finished.scene);
+    out.write_levels(&levels, scene.view.width, scene.channels(), scene.camera.bits, scene.view.pixel_um)?;
     print_size(&args.out, scene)
 }
 

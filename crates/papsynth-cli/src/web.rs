@@ -25,7 +25,7 @@ fn open(address: &str) {
 
 /// `papsynth view`: shows a data set or a slide in the browser.
 pub(crate) fn view(args: &View) -> Result<(), ExitError> {
-    let view = papsynth_web::View::open(&args.dir)?;
+    let view = papsynth_web::Viewer::open(&args.dir)?;
     let server = Server::bind(args.port.unwrap_or(0))?;
     let stop = exit::stop_flag()?;
     let address = server.address();

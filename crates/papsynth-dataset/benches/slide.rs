@@ -1,4 +1,4 @@
-//! A shard of a whole slide, full of the default contents: made, and written with labels, pyramids and tables. One thread.
+//! Generation and writing of a shard of a slide with the default contents, on one thread.
 
 use std::fs;
 use std::hint::black_box;
@@ -25,7 +25,7 @@ fn shard(c: &mut Criterion) {
     group.bench_function("rendered", |b| {
         b.iter(|| {
             let slide = engine.slide(1, 0).expect("a slide");
-            black_box(slide.picture([0, 0], [SIDE_PX; 2], Threads::One).expect("a picture"))
+            black_box(slide.picture([0, 0], [SIDE_PX; 2], Threads::One).expect("an image"))
         });
     });
     group.bench_function("written", |b| {

@@ -1,4 +1,4 @@
-//! How long does it take to write a frame of 1376 x 1038 pixels with its truth, and how long a mask?
+//! Writing of a frame of 1376 x 1038 pixels with ground truth, and encoding of a mask.
 
 use std::fs;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use papsynth_dataset::{Dataset, DatasetInfo, Layout, rle};
 
 const SEED: u64 = 1;
 
-/// Removes its folder at the end.
+/// A folder that is removed at the end.
 struct Scratch(PathBuf);
 
 impl Drop for Scratch {

@@ -1,7 +1,7 @@
-//! Writes a small data set and its contact sheet, which is the picture in the README.
+//! Writes a small data set and its contact sheet, the image in the README.
 //!
-//! `cargo run --release --example dataset [FOLDER [PLANES]]`; without a folder it goes to `target/dataset-example`,
-//! with a number of planes above 1 it is one of focus stacks.
+//! `cargo run --release --example dataset [FOLDER [PLANES]]`; the default folder is `target/dataset-example`.
+//! With more than 1 plane, the frames are focus stacks.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;

@@ -23,12 +23,13 @@ pub struct Cleaned {
     pub skipped: u64,
 }
 
-/// Removes temporary files of killed runs from a data set or slide. With `untracked`, also removes every other file that
-/// does not belong to it, and the folders that are then empty. Files of the desktop, such as `.DS_Store`, are ignored.
+/// Removes temporary files of killed runs from a data set or slide. With `untracked`, also removes every other file
+/// that does not belong to it, and the folders that are then empty. Files of the desktop, such as `.DS_Store`, are
+/// ignored.
 ///
 /// # Errors
-/// If there is no data set or slide, a file cannot be removed, or untracked files are unknown: a record cannot be read, or
-/// the data set is not merged and other processes may still write.
+/// If there is no data set or slide, a file cannot be removed, or untracked files are unknown: a record cannot be read,
+/// or the data set is not merged and other processes may still write.
 pub fn clean(location: impl Into<Location>, untracked: bool) -> Result<Cleaned, Error> {
     let folder = Folder::new(location);
     clean_in(&folder, untracked).map_err(|error| folder.named(error))

@@ -84,15 +84,18 @@ pub enum Problem {
     #[error("there is no such {0}")]
     Missing(&'static str),
     /// The path is a folder.
-    #[error("expected a file, found a folder")]
+    #[error("is a folder; expected a file")]
     Folder,
     /// The file, or a folder in its path, is a symbolic link.
     #[error("the path contains a symbolic link; links in a data set are not followed")]
     Link,
+    /// The path is a pipe, device or socket.
+    #[error("is a pipe, device or socket; expected a regular file")]
+    NotAFile,
     /// The file is of another format.
-    #[error("is neither a PNG nor a TIFF file")]
+    #[error("is not a PNG, JPEG or TIFF file")]
     Format,
-    /// The "PNG" or "TIFF" file is truncated.
+    /// The "PNG", "JPEG" or "TIFF" file is truncated.
     #[error("the {0} file is truncated")]
     Truncated(&'static str),
     /// The file does not follow its format.
@@ -148,7 +151,7 @@ pub enum Problem {
     #[error("{0}")]
     Unfit(String),
     /// A folder without images.
-    #[error("contains no PNG or TIFF file")]
+    #[error("contains no PNG, JPEG or TIFF file")]
     NoImages,
     /// A line of a table is invalid.
     #[error("line {line}: {message}")]

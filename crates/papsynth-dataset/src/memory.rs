@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use papsynth::recipe::{Colour, Imaging, Light, Microscope, Mixing, Number, Optics, Recipe};
+use papsynth::recipe::{Colour, Imaging, LightSection, Microscope, Mixing, Number, Optics, Recipe};
 
 use crate::formats::{Format, Layout};
 
@@ -28,7 +28,8 @@ const BORDER_PX: f64 = 256.0;
 
 const MIB: f64 = 1_048_576.0;
 
-/// Estimated memory of the frames of a recipe, bytes: at least the measured use, and less than 2.5 times the measured use.
+/// Estimated memory of the frames of a recipe, bytes: at least the measured use, and less than 2.5 times the measured
+/// use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MemoryEstimate {
     /// Memory of the program without frames.
@@ -51,7 +52,8 @@ pub struct MemoryPlan {
 }
 
 impl MemoryEstimate {
-    /// Returns the estimate for the largest frame of a recipe. `tests/memory.rs` of papsynth-cli measures the constants.
+    /// Returns the estimate for the largest frame of a recipe. `tests/memory.rs` of papsynth-cli measures the
+    /// constants.
     #[must_use]
     pub fn of(recipe: &Recipe, layout: &Layout) -> Self {
         let most = |number: &Number| number.bounds()[1];
@@ -70,9 +72,9 @@ impl MemoryEstimate {
         };
         // Channels of the image, and light groups that are imaged at the same time.
         let (channels, lights) = match &recipe.light {
-            Light::Monochrome(_) => (1.0, 1.0),
-            Light::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
-            Light::Colour(_) => (3.0, 3.0),
+            LightSection::Monochrome(_) => (1.0, 1.0),
+            LightSection::Colour(Colour { mixing: Mixing::PerWavelength, .. }) => (3.0, 1.0),
+            LightSection::Colour(_) => (3.0, 3.0),
         };
         let grid = samples * samples;
         let mut a_pixel = 10.0 + 25.0 * channels + 4.0 * grid * lights;
@@ -92,13 +94,14 @@ impl MemoryEstimate {
             let side = CELL_UM * size / pixel_um;
             side * side * grid
         };
-        let classes = recipe.cells.values().filter(|mix| most(&mix.count) > 0.0);
-        let cells: Vec<(f64, f64)> = classes.map(|mix| (most(&mix.count), of_cell(most(&mix.size)))).collect();
+        let area_mm2 = recipe.largest_populated_mm2();
+        let counts = recipe.cells.values().map(|mix| (mix.count.bounds(area_mm2)[1], of_cell(most(&mix.size))));
+        let cells: Vec<(f64, f64)> = counts.filter(|(count, _)| *count > 0.0).collect();
         let count: f64 = cells.iter().map(|(count, _)| count).sum();
         let all: f64 = cells.iter().map(|(count, samples)| count * samples).sum();
         let largest = cells.iter().map(|(_, samples)| *samples).fold(0.0, f64::max);
-        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all objects;
-        // buffers if threads share the frame.
+        // Bytes for each sample of a cell: kept between the planes of a stack; buffers of one thread, reused for all
+        // objects; buffers if threads share the frame.
         let (kept, buffers, shared_buffers) = match (is_filtered, lights > 1.0) {
             (false, _) => (0.0, 8.0, 8.0),
             (true, false) => (25.0, 136.0, 62.0),
@@ -122,9 +125,11 @@ impl MemoryEstimate {
         let grown = side * side / (recipe.field.width_px.bounds()[0] * recipe.field.height_px.bounds()[0]).max(1.0);
         let mut frame = recipe.clone();
         (frame.field.width_px, frame.field.height_px) = (side.into(), side.into());
-        frame.cells.values_mut().for_each(|mix| mix.count = (most(&mix.count) * grown).into());
+        for mix in frame.cells.values_mut().filter(|mix| !mix.count.is_density()) {
+            mix.count = (most(mix.count.number()) * grown).into();
+        }
         let of_frame = Self::of(&frame, &Layout::default());
-        let channels = if matches!(recipe.light, Light::Monochrome(_)) { 1.0 } else { 3.0 };
+        let channels = if matches!(recipe.light, LightSection::Monochrome(_)) { 1.0 } else { 3.0 };
         // Grey levels, three labels and layers of each pixel, and a copy while they are packed.
         let a_pixel = 2.0 * channels * most(&recipe.focus.planes) + 14.0;
         let shard = f64::from(shard_px) * f64::from(shard_px) * (a_pixel + 4.0 * channels);
@@ -132,8 +137,8 @@ impl MemoryEstimate {
         Self { program, frame: of_frame.frame + side * side * a_pixel, shared: f64::INFINITY }
     }
 
-    /// Returns the parallelism that fits into a budget in bytes: at most `workers` frames at once or, with `shared`, one
-    /// frame on all threads. Returns `None` if one frame does not fit.
+    /// Returns the parallelism that fits into a budget in bytes: at most `workers` frames at once or, with `shared`,
+    /// one frame on all threads. Returns `None` if one frame does not fit.
     #[must_use]
     pub fn plan(&self, workers: usize, shared: bool, budget: Option<u64>) -> Option<MemoryPlan> {
         let budget = budget.map_or(f64::INFINITY, |bytes| bytes as f64);

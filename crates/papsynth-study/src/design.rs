@@ -178,8 +178,8 @@ pub(crate) fn check_name(subject: &str) -> Result<(), Error> {
     Err(Error::parameter("subject", format!("`{}`", subject.escape_debug()), expected))
 }
 
-/// Returns stage and sides (one, or two from left to right) of each trial, the training first. Within each stage, both sides,
-/// or both positions of the real patch, are equally frequent (an odd trial is random), in random order.
+/// Returns stage and sides (one, or two from left to right) of each trial, the training first. Within each stage, both
+/// sides, or both positions of the real patch, are equally frequent (an odd trial is random), in random order.
 pub(crate) fn order(params: &StudyParams, rng: &mut impl Rng) -> Vec<(Stage, Vec<Side>)> {
     let mut orders = Vec::with_capacity(params.training + params.trials);
     for (stage, count) in [(Stage::Training, params.training), (Stage::Counted, params.trials)] {
@@ -240,8 +240,8 @@ mod tests {
 
     #[test]
     fn the_position_in_the_order_does_not_predict_the_side() {
-        // Over many seeds, each trial is real in half of the cases, and a trial does not predict the next one: within 4.5
-        // standard errors of ½, over 119 positions.
+        // Over many seeds, each trial is real in half of the cases, and a trial does not predict the next one: within
+        // 4.5 standard errors of ½, over 119 positions.
         let runs = 2000;
         let params = StudyParams { training: 0, ..StudyParams::default() };
         let all: Vec<Vec<bool>> = (0..runs)

@@ -17,7 +17,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether the system failed (full disk, no permission), so that a retry may succeed. All other errors are in the input.
+    /// Whether the system failed (full disk, no permission), so that a retry may succeed. All other errors are in the
+    /// input.
     #[must_use]
     pub fn is_io(&self) -> bool {
         matches!(self, Self::Dataset(error) if error.is_io())

@@ -188,13 +188,13 @@ fn recipe(text: &str) -> BTreeMap<String, toml::Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::support::{Scratch, picture};
+    use crate::support::{Scratch, write_image};
 
     #[test]
     fn images_are_listed_in_natural_order() {
         let scratch = Scratch::new("fields");
         for name in ["f10.png", "f9.png", "f1.png", ".hidden.png"] {
-            picture(&scratch.join(name), 1, [64, 64]);
+            write_image(&scratch.join(name), 1, [64, 64]);
         }
         fs::write(scratch.join("notes.txt"), "not an image").unwrap();
         let fields = Root::new(&scratch).unwrap().fields().unwrap();
@@ -202,7 +202,7 @@ mod tests {
         assert!(fields.iter().all(|f| f.frame.is_none()));
         // Images may be in a subfolder `images`.
         let below = Scratch::new("fields-images");
-        picture(&below.join("images/a.png"), 1, [64, 64]);
+        write_image(&below.join("images/a.png"), 1, [64, 64]);
         assert_eq!(Root::new(&below).unwrap().fields().unwrap()[0].name, "images/a.png");
     }
 
@@ -231,8 +231,8 @@ mod tests {
         let (folder, elsewhere) = (scratch.join("folder"), scratch.join("folder-elsewhere"));
         fs::create_dir_all(&folder).unwrap();
         fs::create_dir_all(&elsewhere).unwrap();
-        picture(&folder.join("a.png"), 1, [64, 64]);
-        picture(&elsewhere.join("secret.png"), 2, [64, 64]);
+        write_image(&folder.join("a.png"), 1, [64, 64]);
+        write_image(&elsewhere.join("secret.png"), 2, [64, 64]);
         symlink(folder.join("a.png"), folder.join("b.png")).unwrap();
         // The folder itself may be a symbolic link.
         symlink(&folder, scratch.join("link")).unwrap();

@@ -24,7 +24,6 @@ pub(crate) type Parameters = BTreeMap<String, Value>;
 struct Row {
     part: String,
     kind: String,
-    #[serde(alias = "stain")]
     mean_absorbance: f64,
     bbox_x_px: f64,
     bbox_y_px: f64,
@@ -69,7 +68,7 @@ impl Objects {
         };
         let numbers = [
             ("field_cells_per_mm2", Some(cells(&self.0) / area_mm2)),
-            ("field_max_overlap", Some(f64::from(frame.summary.most_layers))),
+            ("field_max_overlap", Some(f64::from(frame.summary.max_overlap))),
             ("patch_cells", Some(part("cytoplasm").count() as f64)),
             ("patch_nuclei", Some(part("nucleus").count() as f64)),
             ("patch_debris", Some(touching.iter().filter(|row| row.kind != "cell").count() as f64)),
@@ -125,15 +124,18 @@ mod tests {
                 height: 1000,
                 pixel_um: 0.25,
                 bits: 8,
+                training_bits: 8,
                 channels: 1,
                 slide: 0,
                 planes_um: vec![-1.0, 0.0, 1.0],
-                saturated: Vec::new(),
-                floored: Vec::new(),
+                saturated_px: Vec::new(),
+                clipped_px: Vec::new(),
+                attempts: 1,
+                cells: std::collections::BTreeMap::new(),
                 objects: BTreeMap::new(),
                 truncated: 0,
-                most_layers: 3,
-                lost_px: BTreeMap::new(),
+                max_overlap: 3,
+                occluded_px: BTreeMap::new(),
             },
             recipe: Arc::new(recipe.into_iter().collect()),
         }

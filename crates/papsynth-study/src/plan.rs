@@ -10,9 +10,9 @@ use sha2::{Digest, Sha256};
 use crate::design::{Grey, Side, Stage, StudyParams, order};
 use crate::error::Error;
 use crate::fields::{Field, Frame, Root, bytes};
+use crate::grey_image::{self, GreyImage, Places, Raw};
 use crate::key::{Key, hex};
 use crate::parameters::{Objects, Parameters, varied};
-use crate::picture::{self, Picture, Places, Raw};
 
 /// Relative difference below which pixel sizes count as equal.
 const SAME_PIXEL: f64 = 0.005;
@@ -83,8 +83,8 @@ impl Folders {
 }
 
 impl Plan {
-    /// Draws a plan. Fields depend only on the seed, so that they are the same for all subjects; patches, order and noise also
-    /// depend on the subject.
+    /// Draws a plan. Fields depend only on the seed, so that they are the same for all subjects; patches, order and
+    /// noise also depend on the subject.
     pub(crate) fn draw(params: &StudyParams, folders: &Folders) -> Result<Self, Error> {
         let mut notes = Vec::new();
         let chosen = choose(params, folders, &mut notes);
@@ -141,14 +141,14 @@ impl Plan {
             self.trials.iter().map(|trial| vec![Vec::new(); trial.patches.len()]).collect();
         // One field at a time is in memory.
         for (index, record) in self.fields.iter().enumerate() {
-            let picture = record.picture(params, folders)?;
+            let image = record.shown_image(params, folders)?;
             for (number, trial) in self.trials.iter().enumerate() {
                 for (slot, patch) in trial.patches.iter().enumerate().filter(|(_, patch)| patch.field == index) {
-                    let levels = picture.square([patch.x_px, patch.y_px], params.patch_px);
+                    let levels = image.square([patch.x_px, patch.y_px], params.patch_px);
                     let levels = levels.ok_or_else(|| record.changed(folders))?;
                     let mut rng = key.stream("noise", patch_number(number, slot));
                     shown[number][slot] =
-                        picture::png(&picture::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
+                        grey_image::png(&grey_image::noisy(&levels, params.noise_dn, &mut rng), params.patch_px);
                 }
             }
         }
@@ -168,19 +168,19 @@ fn patch_number(trial: usize, slot: usize) -> usize {
 
 impl FieldRecord {
     /// Returns the field as shown, before noise.
-    fn picture(&self, params: &StudyParams, folders: &Folders) -> Result<Picture, Error> {
+    fn write_image(&self, params: &StudyParams, folders: &Folders) -> Result<GreyImage, Error> {
         let field = folders.fields[self.side as usize].iter().find(|field| field.name == self.name);
         let raw = Raw::read(field.ok_or_else(|| self.changed(folders))?)?;
         if hex(&Sha256::digest(&raw.bytes)) != self.sha256 {
             return Err(self.changed(folders));
         }
-        let mut picture = raw.picture.reduced(self.reduce);
+        let mut image = raw.image.reduced(self.reduce);
         let scale = match params.grey {
             Grey::AsIs => full_scale(8) / self.full_scale,
             Grey::Glass => GLASS_LEVEL / self.glass,
         };
-        picture.levels.iter_mut().for_each(|level| *level *= scale);
-        Ok(picture)
+        image.levels.iter_mut().for_each(|level| *level *= scale);
+        Ok(image)
     }
 
     fn changed(&self, folders: &Folders) -> Error {
@@ -241,17 +241,17 @@ fn survey(
         };
         if full_scale == UNKNOWN {
             let deepest = &mut deepest[*side as usize];
-            *deepest = deepest.max(raw.picture.most());
+            *deepest = deepest.max(raw.image.most());
         }
-        let picture = raw.picture.reduced(reduce[index]);
-        places.push(picture.places(params.patch_px, needed[*side as usize], &mut key.stream("places", index)));
+        let image = raw.image.reduced(reduce[index]);
+        places.push(image.places(params.patch_px, needed[*side as usize], &mut key.stream("places", index)));
         fields.push(FieldRecord {
             side: *side,
             name: field.name.clone(),
             sha256,
             full_scale,
             // Avoids a division by zero for black images.
-            glass: picture.glass().max(1.0),
+            glass: image.glass().max(1.0),
             reduce: reduce[index],
         });
     }
@@ -294,8 +294,8 @@ fn take_in_turn(turns: &[usize], places: &[Places], needed: usize) -> Vec<(usize
     all.take(needed).collect()
 }
 
-/// Reads for each field the differing recipe values and the objects of its data set. They are only needed for the breakdown, so
-/// a failure is a note, not an error.
+/// Reads for each field the differing recipe values and the objects of its data set. They are only needed for the
+/// breakdown, so a failure is a note, not an error.
 fn field_parameters<'a>(
     folders: &Folders,
     chosen: &[(Side, &'a Field)],
@@ -323,7 +323,7 @@ mod tests {
 
     use super::*;
     use crate::design::TrialDesign;
-    use crate::support::{Scratch, exposed, picture, study_folders};
+    use crate::support::{Scratch, exposed, study_folders, write_image};
 
     fn params() -> StudyParams {
         StudyParams { trials: 12, patch_px: 48, ..StudyParams::default() }
@@ -365,7 +365,7 @@ mod tests {
         assert_ne!(sides(&first), sides(&draw(&other)));
         assert_ne!(sides(&first), sides(&draw(&StudyParams { seed: 3, ..params() })));
         // The same names with other pixels.
-        picture(&scratch.join("real/f0.png"), 99, [300, 240]);
+        write_image(&scratch.join("real/f0.png"), 99, [300, 240]);
         let changed = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
         assert_ne!(first, Plan::draw(&params(), &changed).unwrap());
         let error = first.patches(&params(), &changed).unwrap_err().to_string();
@@ -436,8 +436,8 @@ mod tests {
         let mean = |grey: Grey, dark: bool| {
             let params = StudyParams { grey, noise_dn: 0.0, trials: 4, ..params() };
             let plan = Plan::draw(&params, &folders).unwrap();
-            let picture = plan.fields[if dark { 0 } else { 2 }].picture(&params, &folders).unwrap();
-            picture.glass()
+            let image = plan.fields[if dark { 0 } else { 2 }].shown_image(&params, &folders).unwrap();
+            image.glass()
         };
         // The real test fields have a darker exposure.
         assert!((mean(Grey::Glass, true) - 230.0).abs() < 1.0 && (mean(Grey::Glass, false) - 230.0).abs() < 1.0);
@@ -450,7 +450,7 @@ mod tests {
         let scratch = Scratch::new("plan-deep");
         exposed(&scratch.join("real/a.png"), 1, [300, 240], 3500, 16);
         exposed(&scratch.join("real/b.png"), 1, [300, 240], 900, 16);
-        picture(&scratch.join("synthetic/a.png"), 1, [300, 240]);
+        write_image(&scratch.join("synthetic/a.png"), 1, [300, 240]);
         let folders = Folders::new(&scratch.join("real"), &scratch.join("synthetic")).unwrap();
         let plan = Plan::draw(&StudyParams { trials: 4, ..params() }, &folders).unwrap();
         // Both fit into 12 bits.

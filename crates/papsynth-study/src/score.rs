@@ -138,8 +138,9 @@ impl Proportion {
         (self.total > 0).then(|| self.hits as f64 / self.total as f64)
     }
 
-    /// Wilson's score interval of 95 % ([doi:10.1080/01621459.1927.10502953](https://doi.org/10.1080/01621459.1927.10502953)):
-    /// (p + z²/2n ± z √(p(1−p)/n + z²/4n²)) / (1 + z²/n). It is 0 to 1 without trials.
+    /// Wilson's score interval of 95 %
+    /// ([doi:10.1080/01621459.1927.10502953](https://doi.org/10.1080/01621459.1927.10502953)): (p + z²/2n ± z
+    /// √(p(1−p)/n + z²/4n²)) / (1 + z²/n). It is 0 to 1 without trials.
     #[must_use]
     pub fn wilson(&self) -> Interval {
         let Some(p) = self.value() else { return Interval { low: 0.0, high: 1.0 } };
@@ -166,8 +167,8 @@ impl Serialize for Proportion {
     }
 }
 
-/// Returns the number of trials for a half-width of the 95 % interval of a fraction near ½: z² / 4w², rounded; 384 for ±5
-/// points. Wilson's interval is slightly narrower.
+/// Returns the number of trials for a half-width of the 95 % interval of a fraction near ½: z² / 4w², rounded; 384 for
+/// ±5 points. Wilson's interval is slightly narrower.
 #[must_use]
 pub fn trials_for(half_width: f64) -> u64 {
     let exact = Z_95 * Z_95 / (4.0 * half_width * half_width);

@@ -38,7 +38,7 @@ impl Drop for Scratch {
 }
 
 /// Writes an 8-bit PNG file and creates its folder.
-pub(crate) fn picture(path: &Path, number: u32, side: [u32; 2]) {
+pub(crate) fn write_image(path: &Path, number: u32, side: [u32; 2]) {
     exposed(path, number, side, 230, 8);
 }
 

@@ -2,7 +2,7 @@
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "pixels are f32, and the recipe's check bounds every size and place far below what an integer holds"
+    reason = "pixels are f32, and the recipe check bounds all sizes and positions far below the integer range"
 )]
 
 mod debris;
@@ -29,7 +29,7 @@ mod words;
 use portable_numerics::random;
 
 pub use engine::{Engine, Inputs};
-pub use error::{Cause, Error, Flaw};
+pub use error::{Cause, Error, NucleusError};
 pub use frame::{Finished, Frame, Plane, white_level};
 pub use slide::Slide;
 pub use threads::Threads;

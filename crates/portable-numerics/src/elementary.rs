@@ -1,11 +1,11 @@
-//! Exponentials, logarithms and sines for loops over rows of numbers: multiplications, additions and conversions alone, so that
-//! vectors compute them and every instruction set gives the same bits.
+//! Exponentials, logarithms and sines for loops over rows of numbers. They consist of multiplications, additions and
+//! conversions, so that they vectorise and every instruction set gives the same bits.
 //!
-//! Single numbers in double precision are better left to `libm`, which errs less.
+//! For single numbers in double precision, `libm` is more accurate.
 
 use multiversion::multiversion;
 
-/// Replaces every value v, `from` a, by 10ˣ of x = a − v, for −37 ≤ x ≤ 37 (beyond that by 10⁻³⁷ and 10³⁷).
+/// Replaces each value v by 10ˣ with x = a − v, where a is the element of `from`. x is clamped to −37 to 37.
 ///
 /// Relative error below 3·10⁻⁷.
 #[multiversion(targets = "simd")]
@@ -15,23 +15,23 @@ pub fn exp10_from(from: &[f32], values: &mut [f32]) {
     }
 }
 
-/// 1.5·2²³: adding it rounds to a whole number, which the lowest bits then hold.
+/// 1.5·2²³: adding it rounds to an integer, which the lowest bits then hold.
 const ROUND: f32 = 12_582_912.0;
 
 #[inline(always)]
 fn exp10_one(x: f32) -> f32 {
-    /// log₁₀ 2 in two parts, the first short enough that its products with whole numbers are exact.
+    /// log₁₀ 2 in two parts, the first short enough that its products with integers are exact.
     const LOG10_2_HIGH: f32 = 77.0 / 256.0;
     const LOG10_2_LOW: f32 = 2.487_456_6e-4;
     let x = x.clamp(-37.0, 37.0);
     let shifted = x * core::f32::consts::LOG2_10 + ROUND;
     let whole = shifted - ROUND;
-    // What is left of x, from −½ log₁₀ 2 to ½ log₁₀ 2: the first difference is exact.
+    // The remainder of x, within ±½ log₁₀ 2: the first difference is exact.
     let rest = (x - whole * LOG10_2_HIGH) - whole * LOG10_2_LOW;
     scaled(rest * core::f32::consts::LN_10, shifted)
 }
 
-/// Returns eˣ for −85 ≤ x ≤ 85 (beyond that e⁻⁸⁵ and e⁸⁵), relative error below 3·10⁻⁷.
+/// Returns eˣ with a relative error below 3·10⁻⁷. x is clamped to −85 to 85.
 #[inline(always)]
 #[must_use]
 pub fn exp_f32(x: f32) -> f32 {
@@ -44,7 +44,7 @@ pub fn exp_f32(x: f32) -> f32 {
     scaled((x - whole * LN_2_HIGH) - whole * LN_2_LOW, shifted)
 }
 
-/// eᵗ·2ⁿ by its Taylor polynomial, for |t| ≤ ½ ln 2; n is the whole number that the lowest bits of `shifted` hold.
+/// Returns eᵗ·2ⁿ by its Taylor polynomial, for |t| ≤ ½ ln 2; n is the integer in the lowest bits of `shifted`.
 #[inline(always)]
 fn scaled(t: f32, shifted: f32) -> f32 {
     let p = 1.0
@@ -54,7 +54,7 @@ fn scaled(t: f32, shifted: f32) -> f32 {
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()))
 }
 
-/// Returns eˣ for |x| < 700, relative error below 1e-14.
+/// Returns eˣ for |x| < 700, with a relative error below 1e-14.
 #[inline(always)]
 #[must_use]
 pub fn exp_f64(x: f64) -> f64 {
@@ -63,7 +63,7 @@ pub fn exp_f64(x: f64) -> f64 {
     let shifted = ROUND + x * core::f64::consts::LOG2_E;
     let power = shifted - ROUND;
     let rest = (x - power * 0.693_147_180_369_123_8) - power * 1.908_214_929_270_587_7e-10;
-    // Taylor, as rest is at most ln 2 / 2: even and odd powers side by side.
+    // Taylor polynomial, for |rest| up to ½ ln 2. Even and odd powers are independent chains.
     let square = rest * rest;
     let (mut even, mut odd) = (1.0 / 479_001_600.0, 1.0 / 39_916_800.0);
     for (a, b) in [(3_628_800.0, 362_880.0), (40_320.0, 5_040.0), (720.0, 120.0), (24.0, 6.0), (2.0, 1.0)] {
@@ -74,8 +74,8 @@ pub fn exp_f64(x: f64) -> f64 {
     e * f64::from_bits((shifted.to_bits() << 52).wrapping_add(1.0_f64.to_bits()))
 }
 
-/// Returns cosine and sine of the angle word · 2π/2³², to 1.2e-7: by the nearest quarter turn, and what is left by the polynomials of
-/// Cephes' `sinf` and `cosf`.
+/// Returns the cosine and sine of the angle word · 2π/2³², with an error below 1.2e-7: reduced by the nearest quarter
+/// turn, then the polynomials of Cephes' `sinf` and `cosf`.
 #[inline(always)]
 #[must_use]
 pub fn cos_sin_of_turn(word: u32) -> [f32; 2] {
@@ -94,7 +94,7 @@ pub fn cos_sin_of_turn(word: u32) -> [f32; 2] {
     [f32::from_bits(first.to_bits() ^ first_sign), f32::from_bits(second.to_bits() ^ second_sign)]
 }
 
-/// Returns the natural logarithm of a normal positive number, to 1e-7 (the polynomial of Cephes' `logf`).
+/// Returns the natural logarithm of a normal positive number, with an error of 1e-7 (the polynomial of Cephes' `logf`).
 #[inline(always)]
 #[must_use]
 pub fn ln_f32(x: f32) -> f32 {
@@ -117,12 +117,12 @@ pub fn ln_f32(x: f32) -> f32 {
         m,
     );
     let square = m * m;
-    // ln 2 in two parts, the first of which is exact when multiplied by the exponent.
+    // ln 2 in two parts; the product of the first with the exponent is exact.
     let low = p * m * square - 2.121_944_4e-4 * exponent - 0.5 * square;
     0.693_359_4 * exponent + (m + low)
 }
 
-/// A polynomial, highest power first: even and odd powers side by side, which halves the wait.
+/// Evaluates a polynomial, highest power first. Even and odd powers are independent chains, which halves the latency.
 #[inline(always)]
 fn polynomial(terms: [f32; 9], x: f32) -> f32 {
     let square = x * x;
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn exponentials_agree_with_the_library_functions() {
+    fn exponentials_agree_with_libm() {
         for (found, exact, inputs, step) in [
             (exp10 as fn(f32) -> f32, libm::exp10 as fn(f64) -> f64, -60_000..10_000, 1.01e-4),
             (exp_f32, libm::exp, -84_000..84_000, 1.003e-3),
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_all_around() {
+    fn cosines_and_sines_agree_with_libm() {
         for i in 0..2_000_000_u32 {
             let word = i.wrapping_mul(2_147_483_629).wrapping_add(i >> 3);
             let angle = f64::from(word) * core::f64::consts::TAU / 4_294_967_296.0;
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn ln_is_the_logarithm() {
+    fn ln_agrees_with_libm() {
         for i in 1..1_000_000_u32 {
             let x = i as f32 * 1e-6;
             let exact = libm::log(f64::from(x));

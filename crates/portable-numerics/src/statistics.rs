@@ -1,12 +1,12 @@
 //! Statistics of small sets of numbers. Sums are made in the order of the values.
 
-/// Returns the mean; NaN of no values.
+/// Returns the mean; NaN for an empty slice.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Returns the standard deviation of a sample, with n − 1 below the sum; NaN of fewer than two values.
+/// Returns the sample standard deviation, with the denominator n − 1; NaN for fewer than two values.
 #[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     let mean = mean(values);
@@ -14,14 +14,14 @@ pub fn deviation(values: &[f64]) -> f64 {
     (sum / (values.len() as f64 - 1.0).max(0.0)).sqrt()
 }
 
-/// Returns the value below which a part `q`, 0 to 1, of the values lies, by linear interpolation between neighbours; NaN of no values.
-/// Sorts the values.
+/// Returns the `q`-quantile, q from 0 to 1, with linear interpolation between neighbours; NaN for an empty slice. Sorts
+/// the values.
 pub fn quantile(values: &mut [f64], q: f64) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     quantile_of_sorted(values, q)
 }
 
-/// Returns what [`quantile`] does, of values in ascending order.
+/// Returns the `q`-quantile of values in ascending order; see [`quantile`].
 #[must_use]
 pub fn quantile_of_sorted(values: &[f64], q: f64) -> f64 {
     let Some(last) = values.len().checked_sub(1) else { return f64::NAN };
@@ -32,12 +32,12 @@ pub fn quantile_of_sorted(values: &[f64], q: f64) -> f64 {
     values[i] + (place - i as f64) * (next - values[i])
 }
 
-/// Returns the middle value, or the mean of the two in the middle; NaN of no values. Sorts the values.
+/// Returns the median; NaN for an empty slice. Sorts the values.
 pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Returns Pearson's correlation of pairs; 0 if either does not vary.
+/// Returns Pearson's correlation coefficient; 0 if either sample is constant.
 #[must_use]
 pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (mean_a, mean_b) = (mean(a), mean(b));
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_lie_between_neighbours() {
+    fn quantiles_interpolate_between_neighbours() {
         assert_eq!(quantile(&mut [4.0, 1.0, 2.0, 3.0], 0.5), 2.5);
         assert_eq!([0.0, 1.0, 9.0].map(|q| quantile(&mut [4.0, 1.0], q)), [1.0, 4.0, 4.0]);
         assert_eq!(quantile_of_sorted(&[3.0], 0.25), 3.0);
@@ -64,14 +64,14 @@ mod tests {
     }
 
     #[test]
-    fn moments_and_correlations_of_known_numbers_are_known() {
+    fn moments_and_correlations_of_small_samples_are_exact() {
         assert_eq!((mean(&[1.0, 2.0, 6.0]), deviation(&[1.0, 3.0])), (3.0, 2.0_f64.sqrt()));
         assert!((correlation(&[1.0, 2.0, 3.0], &[5.0, 3.0, 1.0]) + 1.0).abs() < 1e-12);
         assert_eq!(correlation(&[1.0, 1.0], &[1.0, 2.0]), 0.0);
     }
 
     #[test]
-    fn what_has_no_value_is_nan() {
+    fn undefined_statistics_are_nan() {
         let values = [mean(&[]), deviation(&[]), deviation(&[1.0]), median(&mut [])];
         assert!(values.iter().all(|v| v.is_nan()), "{values:?}");
     }

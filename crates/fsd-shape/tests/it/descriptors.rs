@@ -1,4 +1,4 @@
-//! Laws of Fourier shape descriptors.
+//! Tests of Fourier shape descriptors.
 
 use crate::support;
 use std::f64::consts::{PI, TAU};
@@ -7,7 +7,7 @@ use fsd_shape::{Descriptors, Error, Point, resample, signed_area};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-/// An irregular outline of `count` points about (3, −2).
+/// Returns an irregular outline of `count` points around (3, −2).
 fn shape(count: usize, seed: u64) -> Vec<Point> {
     let polygon = support::polygon(1.0, &support::CELL, &mut Xoshiro256PlusPlus::seed_from_u64(seed));
     resample(&polygon, count).iter().map(|p| [p[0] + 3.0, p[1] - 2.0]).collect()
@@ -25,7 +25,7 @@ fn same(a: &Descriptors, b: &Descriptors, tolerance: f64) {
 }
 
 #[test]
-fn equation_2_by_its_definition() {
+fn descriptors_match_equation_2() {
     for count in [7, 12, 30] {
         let points = shape(count, 1);
         let descriptors = Descriptors::from_outline(&points).unwrap();
@@ -51,7 +51,7 @@ fn the_inverse_returns_the_outline() {
         let points = shape(count, 2);
         let descriptors = Descriptors::from_outline(&points).unwrap();
         close(&descriptors.outline(count), &points, 1e-12);
-        // Any multiple passes through the same points, a divisor takes every other.
+        // A multiple contains the same points, a half every second.
         let finer = descriptors.outline(3 * count);
         close(&finer.iter().step_by(3).copied().collect::<Vec<_>>(), &points, 1e-12);
         if count % 2 == 0 {
@@ -66,7 +66,7 @@ fn the_inverse_returns_the_outline() {
 }
 
 #[test]
-fn a_circle_is_u1_and_an_ellipse_u1_and_its_opposite() {
+fn a_circle_is_u1_and_an_ellipse_u1_and_u_minus_1() {
     let at = |a: f64, b: f64| -> Vec<Point> {
         (0..64).map(|k| libm::sincos(TAU * f64::from(k) / 64.0)).map(|(s, c)| [a * c, b * s]).collect()
     };
@@ -86,7 +86,7 @@ fn a_circle_is_u1_and_an_ellipse_u1_and_its_opposite() {
 fn areas_are_exact() {
     let points = shape(81, 3);
     let descriptors = Descriptors::from_outline(&points).unwrap();
-    // Polygon through the K points: (K/2) Σ |uₗ|² sin(2πl/K).
+    // Area of the polygon through the K points: (K/2) Σ |uₗ|² sin(2πl/K).
     let sum: f64 = (-40..=40)
         .map(|l| descriptors.magnitude(l) * descriptors.magnitude(l) * libm::sin(TAU * f64::from(l) / 81.0))
         .sum();
@@ -122,19 +122,19 @@ fn operations_on_descriptors_are_operations_on_points() {
 }
 
 #[test]
-fn equation_3_takes_place_and_size() {
+fn equation_3_removes_position_and_size() {
     let descriptors = Descriptors::from_outline(&shape(50, 5)).unwrap();
     let normalised = descriptors.normalised();
     assert!((normalised.radius() - 1.0).abs() < 1e-15);
     assert_eq!(normalised.harmonic(0), [0.0, 0.0]);
     same(&descriptors.translated([5.0, 5.0]).scaled(3.0).normalised(), &normalised, 1e-13);
-    // Without a first harmonic there is no size; nothing becomes infinite.
+    // Without a first harmonic the scale does not change.
     let flat = Descriptors::from_harmonics(vec![[1.0, 0.0], [2.0, 0.0], [0.0, 0.0]]).unwrap();
     assert_eq!(flat.normalised().as_slice(), [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
 }
 
 #[test]
-fn alignment_undoes_rotation_and_start() {
+fn alignment_removes_rotation_and_start_point() {
     for seed in 10..30 {
         let descriptors = Descriptors::from_outline(&shape(120, seed)).unwrap();
         let aligned = descriptors.aligned();
@@ -151,7 +151,7 @@ fn alignment_undoes_rotation_and_start() {
 }
 
 #[test]
-fn truncation_drops_the_highest_terms_only() {
+fn truncation_removes_only_the_highest_terms() {
     let descriptors = Descriptors::from_outline(&shape(101, 6)).unwrap();
     assert_eq!(descriptors.harmonics(), 50);
     let smooth = descriptors.truncated(7);
@@ -165,7 +165,7 @@ fn truncation_drops_the_highest_terms_only() {
 }
 
 #[test]
-fn bad_outlines_are_refused() {
+fn invalid_outlines_are_rejected() {
     let of = |points: &[Point]| Descriptors::from_outline(points);
     assert_eq!(of(&[[0.0, 0.0], [1.0, 1.0]]), Err(Error::TooFewPoints { count: 2, needed: 3 }));
     assert_eq!(of(&[[0.0, 0.0], [1.0, f64::NAN], [2.0, 1.0]]), Err(Error::PointValue { index: 1 }));
@@ -178,7 +178,7 @@ fn bad_outlines_are_refused() {
 
 #[cfg(feature = "serde")]
 #[test]
-fn descriptors_survive_json_and_bad_ones_do_not_enter() {
+fn descriptors_round_trip_through_json() {
     let descriptors = Descriptors::from_outline(&shape(9, 7)).unwrap();
     let text = serde_json::to_string(&descriptors).unwrap();
     assert_eq!(serde_json::from_str::<Descriptors>(&text).unwrap(), descriptors);

@@ -1,11 +1,11 @@
-//! Laws of the shape model, on outlines made in code.
+//! Tests of the shape model, on synthetic outlines.
 
 use crate::support;
 use std::f64::consts::TAU;
 
 use fsd_shape::{
-    Descriptors, Error, Point, PrincipalComponent, Residual, ShapeModel, ShapeModelParams, ShapeStatistics, Spread,
-    resample, self_intersects, signed_area,
+    CovarianceModel, Descriptors, Error, Point, PrincipalComponent, Residual, ShapeModel, ShapeModelParams,
+    ShapeStatistics, resample, self_intersects, signed_area,
 };
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -18,11 +18,11 @@ fn cells() -> Vec<Vec<Point>> {
     support::polygons(60, 100.0, &support::CELL, &mut rng(0xCE11))
 }
 
-fn params(harmonics: usize, spread: Spread) -> ShapeModelParams {
-    ShapeModelParams { harmonics, spread }
+fn params(harmonics: usize, covariance: CovarianceModel) -> ShapeModelParams {
+    ShapeModelParams { harmonics, covariance }
 }
 
-/// Statistics of circles, to be altered.
+/// Returns the statistics of circles.
 fn circles(harmonics: usize) -> ShapeStatistics {
     let mut mean = vec![0.0; 4 * harmonics];
     mean[2 * harmonics] = 1.0;
@@ -41,22 +41,22 @@ fn circles(harmonics: usize) -> ShapeStatistics {
 }
 
 #[test]
-fn defaults_and_the_papers_presets() {
-    assert_eq!(ShapeModelParams::default(), params(40, Spread::Shrinkage { lambda: 0.1 }));
-    assert_eq!(ShapeModelParams::paper_nucleus(), params(4, Spread::Independent));
-    // All descriptors of the paper's K = 420 points but the one shared by both signs.
-    assert_eq!(ShapeModelParams::paper_cytoplasm(), params(420 / 2 - 1, Spread::Independent));
+fn default_and_paper_parameters() {
+    assert_eq!(ShapeModelParams::default(), params(40, CovarianceModel::Shrinkage { lambda: 0.1 }));
+    assert_eq!(ShapeModelParams::paper_nucleus(), params(4, CovarianceModel::Independent));
+    // All descriptors of the paper's K = 420 points, except u_{K/2}.
+    assert_eq!(ShapeModelParams::paper_cytoplasm(), params(420 / 2 - 1, CovarianceModel::Independent));
 }
 
 #[test]
-fn draws_are_simple_centred_and_as_large_as_asked() {
+fn draws_are_simple_centred_and_of_the_requested_size() {
     let outlines = cells();
     for params in [
         ShapeModelParams::default(),
-        params(8, Spread::Shrinkage { lambda: 0.1 }),
-        params(40, Spread::Independent),
-        params(1, Spread::Shrinkage { lambda: 0.0 }),
-        params(3, Spread::Shrinkage { lambda: 1.0 }),
+        params(8, CovarianceModel::Shrinkage { lambda: 0.1 }),
+        params(40, CovarianceModel::Independent),
+        params(1, CovarianceModel::Shrinkage { lambda: 0.0 }),
+        params(3, CovarianceModel::Shrinkage { lambda: 1.0 }),
     ] {
         let model = ShapeModel::fit(&outlines, &params).unwrap();
         let mut rng = rng(0xD4A3);
@@ -85,8 +85,8 @@ fn the_same_seed_draws_the_same_shape() {
 }
 
 #[test]
-fn a_model_does_not_depend_on_direction_start_place_or_rotation() {
-    // Those with a clear pose: near the border of two poses, an outline may fall into either.
+fn a_model_does_not_depend_on_orientation_start_position_or_rotation() {
+    // Outlines with an unambiguous pose.
     let clear = |outline: &Vec<Point>| {
         let aligned = Descriptors::from_outline(&resample(outline, 512)).unwrap().normalised().aligned();
         aligned.harmonic(2)[0] > 0.005 && aligned.magnitude(-1) > 0.02
@@ -101,22 +101,22 @@ fn a_model_does_not_depend_on_direction_start_place_or_rotation() {
             outline.iter().rev().map(turn).collect()
         })
         .collect();
-    let one = ShapeModel::fit(&outlines, &params(12, Spread::Shrinkage { lambda: 0.1 })).unwrap();
-    let other = ShapeModel::fit(&moved, &params(12, Spread::Shrinkage { lambda: 0.1 })).unwrap();
+    let one = ShapeModel::fit(&outlines, &params(12, CovarianceModel::Shrinkage { lambda: 0.1 })).unwrap();
+    let other = ShapeModel::fit(&moved, &params(12, CovarianceModel::Shrinkage { lambda: 0.1 })).unwrap();
     let (one, other) = (one.statistics(), other.statistics());
     assert!((one.ln_radius_mean - other.ln_radius_mean).abs() < 1e-3);
-    // The start differs by less than a sample, which moves high harmonics a little.
+    // Start points differ by less than a sample, which slightly changes high harmonics.
     for (a, b) in one.mean.iter().zip(&other.mean) {
         assert!((a - b).abs() < 1e-3, "{a} {b}");
     }
 }
 
-/// Second moments of normalised, aligned draws about the model's mean, against those the statistics promise.
+/// Compares second moments of normalised, aligned draws with those of the statistics.
 #[test]
-fn draws_reproduce_the_variances_fitted() {
+fn draws_reproduce_the_fitted_variances() {
     let harmonics = 6;
-    let model = ShapeModel::fit(&cells(), &params(harmonics, Spread::Shrinkage { lambda: 0.1 })).unwrap();
-    // Small deviations, so that none is rejected and alignment stays with the training's.
+    let model = ShapeModel::fit(&cells(), &params(harmonics, CovarianceModel::Shrinkage { lambda: 0.1 })).unwrap();
+    // Small deviations, so that no draw is rejected and the alignment is unambiguous.
     let mut statistics = model.statistics().clone();
     for value in statistics.components.iter_mut().flat_map(|c| &mut c.loading).chain(&mut statistics.residual_sd) {
         *value *= 0.05;
@@ -130,7 +130,7 @@ fn draws_reproduce_the_variances_fitted() {
             expected[k] += v * v;
         }
     }
-    // The residual by steps, turned back into descriptors; see `Residual::Steps`.
+    // The residual in steps, transformed to descriptors; see `Residual::Steps`.
     for l in 1..=harmonics {
         let (high, low) = (2 * (harmonics + l - 1), 2 * (harmonics - l));
         let sd = &statistics.residual_sd;
@@ -169,14 +169,15 @@ fn draws_reproduce_the_variances_fitted() {
     }
     for (k, (sum, expected)) in squares.iter().zip(&expected).enumerate() {
         let variance = sum / f64::from(draws);
-        // Four standard errors of a variance, widened for the tails of the scores (excess kurtosis up to 6), and 2 % for curvature.
+        // Four standard errors of a variance, widened for the kurtosis of the scores (up to 6), and 2 % for
+        // nonlinearity.
         let bound = expected * (4.0 * (8.0 / f64::from(draws)).sqrt() + 0.02) + 1e-20;
         assert!((variance - expected).abs() < bound, "coordinate {k}: {variance} for {expected}");
     }
 }
 
 #[test]
-fn roughness_changes_detail_only_by_its_name() {
+fn roughness_varies_detail_and_preserves_its_mean_square() {
     let fine = |d: &Descriptors| -> f64 {
         (9..=40).flat_map(|l| [d.magnitude(l), d.magnitude(-l)]).map(|m| m * m).sum::<f64>()
     };
@@ -202,7 +203,7 @@ fn roughness_changes_detail_only_by_its_name() {
     let (local_mean, local_sd) = spread(&statistics);
     assert!((local_mean / mean - 1.0).abs() < 0.02, "{local_mean} for {mean}");
     assert!(local_sd < 2.0 * sd);
-    // Too few harmonics for patches of roughness: nothing changes.
+    // Local roughness has no effect with too few harmonics.
     let mut few = circles(10);
     few.residual_sd = vec![0.001; 40];
     let without = spread(&few);
@@ -232,12 +233,12 @@ fn rotations_are_uniform() {
         counts[eighth] += 1;
     }
     let chi2: f64 = counts.iter().map(|&c| (f64::from(c) - 1000.0) * (f64::from(c) - 1000.0) / 1000.0).sum();
-    // 7 degrees of freedom: mean 7, standard deviation 3.7; four above.
+    // 7 degrees of freedom: mean 7, standard deviation 3.7; four standard deviations above.
     assert!(chi2 < 22.0, "{chi2}");
 }
 
 #[test]
-fn crossing_draws_are_counted_and_hopeless_models_give_up() {
+fn rejected_draws_are_counted_and_limited() {
     let mut wild = circles(12);
     wild.residual_sd.fill(0.02);
     let model = ShapeModel::from_statistics(wild.clone()).unwrap();
@@ -247,7 +248,7 @@ fn crossing_draws_are_counted_and_hopeless_models_give_up() {
     wild.residual_sd.fill(1.0);
     let model = ShapeModel::from_statistics(wild).unwrap();
     assert_eq!(model.draw(1.0, &mut rng), Err(Error::NoSimpleOutline { tries: 200, harmonics: 12 }));
-    // A mean that runs backwards has no outline of positive area.
+    // A mean with reversed orientation has no outline of positive area.
     let mut backwards = circles(2);
     backwards.mean.swap(4, 2);
     let model = ShapeModel::from_statistics(backwards).unwrap();
@@ -255,23 +256,23 @@ fn crossing_draws_are_counted_and_hopeless_models_give_up() {
 }
 
 #[test]
-fn bad_input_is_refused() {
+fn invalid_input_is_rejected() {
     let outlines = cells();
     for lambda in [-0.1, 1.1, f64::NAN] {
-        let fitted = ShapeModel::fit(&outlines, &params(10, Spread::Shrinkage { lambda }));
+        let fitted = ShapeModel::fit(&outlines, &params(10, CovarianceModel::Shrinkage { lambda }));
         assert!(matches!(fitted, Err(Error::Parameter { field: "lambda", .. })));
     }
     for harmonics in [0, 5000] {
-        let fitted = ShapeModel::fit(&outlines, &params(harmonics, Spread::Independent));
+        let fitted = ShapeModel::fit(&outlines, &params(harmonics, CovarianceModel::Independent));
         assert!(matches!(fitted, Err(Error::Parameter { field: "harmonics", .. })));
     }
     let few = ShapeModel::fit(&outlines[..2], &ShapeModelParams::default());
     assert_eq!(few, Err(Error::TooFewOutlines { count: 2, needed: 3 }));
-    let mut flawed = outlines.clone();
-    flawed[7][3] = [f64::NAN, 0.0];
+    let mut invalid = outlines.clone();
+    invalid[7][3] = [f64::NAN, 0.0];
     let source = Box::new(Error::PointValue { index: 3 });
     assert_eq!(
-        ShapeModel::fit(&flawed, &ShapeModelParams::default()),
+        ShapeModel::fit(&invalid, &ShapeModelParams::default()),
         Err(Error::TrainingOutline { index: 7, source })
     );
     let model = ShapeModel::from_statistics(circles(3)).unwrap();
@@ -281,13 +282,13 @@ fn bad_input_is_refused() {
 }
 
 #[test]
-fn a_few_or_equal_outlines_are_enough() {
+fn few_or_equal_outlines_are_sufficient() {
     let few = support::polygons(5, 20.0, &support::NUCLEUS, &mut rng(9));
-    let model = ShapeModel::fit(&few, &params(8, Spread::Shrinkage { lambda: 0.1 })).unwrap();
+    let model = ShapeModel::fit(&few, &params(8, CovarianceModel::Shrinkage { lambda: 0.1 })).unwrap();
     assert_eq!((model.statistics().roughness_sd, model.statistics().outlines), (0.0, 5));
     assert!(model.draw(10.0, &mut rng(2)).is_ok());
     let equal = vec![few[0].clone(); 40];
-    let model = ShapeModel::fit(&equal, &params(8, Spread::Shrinkage { lambda: 0.1 })).unwrap();
+    let model = ShapeModel::fit(&equal, &params(8, CovarianceModel::Shrinkage { lambda: 0.1 })).unwrap();
     let (a, b) = (model.draw(10.0, &mut rng(2)).unwrap(), model.draw(10.0, &mut rng(3)).unwrap());
     for l in -8..=8 {
         assert!((a.descriptors.magnitude(l) - b.descriptors.magnitude(l)).abs() < 1e-6);
@@ -295,11 +296,11 @@ fn a_few_or_equal_outlines_are_enough() {
 }
 
 #[test]
-fn statistics_that_do_not_fit_together_are_refused() {
-    type Flaw = (&'static str, fn(&mut ShapeStatistics));
+fn inconsistent_statistics_are_rejected() {
+    type Change = (&'static str, fn(&mut ShapeStatistics));
     let component =
         |skewness, excess_kurtosis| PrincipalComponent { loading: vec![0.0; 12], skewness, excess_kurtosis };
-    let flaws: [Flaw; 11] = [
+    let changes: [Change; 11] = [
         ("harmonics", |s| s.harmonics = 0),
         ("mean", |s| s.harmonics = 4),
         ("mean", |s| s.mean[1] = f64::NAN),
@@ -314,9 +315,9 @@ fn statistics_that_do_not_fit_together_are_refused() {
             s.components.push(PrincipalComponent { loading: vec![0.0; 3], skewness: 0.0, excess_kurtosis: 0.0 });
         }),
     ];
-    for (name, flaw) in flaws {
+    for (name, change) in changes {
         let mut statistics = circles(3);
-        flaw(&mut statistics);
+        change(&mut statistics);
         match ShapeModel::from_statistics(statistics) {
             Err(Error::Statistics { field, .. }) => assert_eq!(field, name),
             other => panic!("{name}: {other:?}"),
@@ -337,7 +338,7 @@ fn statistics_that_do_not_fit_together_are_refused() {
 }
 
 #[test]
-fn rounding_is_short_and_harmless() {
+fn rounded_statistics_are_short_and_draw_nearly_the_same() {
     let model = ShapeModel::fit(&cells(), &ShapeModelParams::default()).unwrap();
     let full = model.statistics();
     let rounded = full.rounded(5).unwrap();
@@ -356,12 +357,12 @@ fn rounding_is_short_and_harmless() {
 
 #[cfg(feature = "serde")]
 #[test]
-fn statistics_survive_json_in_little_space() {
+fn statistics_round_trip_through_compact_json() {
     let model = ShapeModel::fit(&cells(), &ShapeModelParams::default()).unwrap();
     let rounded = model.statistics().rounded(5).unwrap();
     let text = serde_json::to_string(&rounded).unwrap();
     assert!(text.len() < 60_000, "{} bytes", text.len());
     assert_eq!(serde_json::from_str::<ShapeStatistics>(&text).unwrap(), rounded);
-    let stranger = text.replacen("\"mean\"", "\"meen\"", 1);
-    assert!(serde_json::from_str::<ShapeStatistics>(&stranger).is_err());
+    let unknown_field = text.replacen("\"mean\"", "\"meen\"", 1);
+    assert!(serde_json::from_str::<ShapeStatistics>(&unknown_field).is_err());
 }

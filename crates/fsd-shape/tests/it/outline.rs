@@ -1,4 +1,4 @@
-//! Laws of outlines: tracing, resampling, crossing.
+//! Tests of outlines: tracing, resampling, self-intersections.
 
 use crate::support;
 use std::f64::consts::{PI, TAU};
@@ -22,7 +22,7 @@ fn regular(corners: usize, radius: f64) -> Vec<Point> {
         .collect()
 }
 
-/// A ramp of four pixels, 0.5 on the disc's edge.
+/// Returns a disc with a ramp of four pixels, 0.5 at the edge.
 fn disc(width: usize, height: usize, centre: Point, radius: f64) -> Vec<f32> {
     (0..width * height)
         .map(|i| {
@@ -50,11 +50,11 @@ fn a_disc_is_traced_to_a_fraction_of_a_pixel() {
 }
 
 #[test]
-fn tracing_knows_the_smallest_masks_and_the_border() {
+fn tracing_handles_the_smallest_masks_and_the_border() {
     let diamond = trace(&[1.0], 1, 0.5).unwrap();
     assert_eq!(diamond, [[-0.5, 0.0], [0.0, -0.5], [0.5, 0.0], [0.0, 0.5]]);
     assert_eq!(signed_area(&trace(&[1.0; 12], 4, 0.5).unwrap()), 11.5);
-    // A value at the level is outside; its crossings fall on its centre once.
+    // A value equal to the level is outside; its crossings coincide at its centre.
     let edge = trace(&[0.5, 1.0, 0.5], 3, 0.5).unwrap();
     assert_eq!(edge, [[0.0, 0.0], [1.0, -0.5], [2.0, 0.0], [1.0, 0.5]]);
     // A higher level gives a smaller outline.
@@ -62,7 +62,7 @@ fn tracing_knows_the_smallest_masks_and_the_border() {
 }
 
 #[test]
-fn holes_are_ignored_and_diagonals_join() {
+fn holes_are_ignored_and_diagonal_pixels_are_connected() {
     let mut ring = vec![1.0; 49];
     ring[24] = 0.0;
     assert_eq!(trace(&ring, 7, 0.5).unwrap(), trace(&[1.0; 49], 7, 0.5).unwrap());
@@ -70,12 +70,12 @@ fn holes_are_ignored_and_diagonals_join() {
     let outline = trace(&diagonal, 2, 0.5).unwrap();
     assert_eq!(outline.len(), 8);
     assert!(!self_intersects(&outline));
-    // A weaker bridge than the level parts them.
+    // The mean at the corner is below the level.
     assert_eq!(trace(&diagonal, 2, 0.6), Err(Error::SeveralComponents { count: 2 }));
 }
 
 #[test]
-fn tracing_refuses_what_has_no_single_outline() {
+fn masks_without_a_single_outline_are_rejected() {
     assert_eq!(trace(&[0.0; 12], 4, 0.5), Err(Error::EmptyMask { level: 0.5 }));
     assert_eq!(trace(&[], 4, 0.5), Err(Error::EmptyMask { level: 0.5 }));
     assert_eq!(trace(&[1.0, 0.0, 1.0, 0.0, 1.0], 5, 0.5), Err(Error::SeveralComponents { count: 3 }));
@@ -95,7 +95,7 @@ fn tracing_refuses_what_has_no_single_outline() {
     }
 }
 
-/// Number of 8-connected components, by flooding.
+/// Returns the number of 8-connected components, by flood fill.
 fn flood_count(mask: &[f32], width: usize) -> usize {
     let height = mask.len() / width;
     let mut seen = vec![false; mask.len()];
@@ -138,13 +138,13 @@ fn components_agree_with_a_flood_fill() {
 }
 
 #[test]
-fn an_image_buffer_is_a_mask() {
+fn an_image_buffer_can_be_traced() {
     let buffer = image::ImageBuffer::<image::Luma<f32>, Vec<f32>>::from_vec(9, 9, disc(9, 9, [4.0, 4.0], 2.0)).unwrap();
     assert!(trace(&buffer, 9, 0.5).is_ok());
 }
 
 #[test]
-fn measures_of_a_square() {
+fn measures_of_a_square_are_exact() {
     let square = [[1.0, 2.0], [4.0, 2.0], [4.0, 5.0], [1.0, 5.0]];
     assert_eq!(signed_area(&square), 9.0);
     assert_eq!(perimeter(&square), 12.0);
@@ -167,7 +167,7 @@ fn spread(points: &[Point]) -> f64 {
 }
 
 #[test]
-fn resampling_makes_equal_steps() {
+fn resampled_points_are_equidistant() {
     let mut rng = rng(0x5E9);
     for count in [64, 420, 512] {
         for _ in 0..40 {
@@ -182,7 +182,7 @@ fn resampling_makes_equal_steps() {
 }
 
 #[test]
-fn points_along_an_outline_lie_as_far_apart_as_it_is_long() {
+fn points_along_an_outline_have_equal_arc_lengths() {
     let mut rng = rng(0x5EA);
     for count in [180, 600] {
         let outline = support::polygon(100.0, &support::CELL, &mut rng);
@@ -193,14 +193,14 @@ fn points_along_an_outline_lie_as_far_apart_as_it_is_long() {
             let (p, q) = (points[i], points[(i + 1) % count]);
             ((q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1])).sqrt()
         };
-        // A chord is the way itself, or shorter where it cuts a corner.
+        // A chord is as long as the arc, or shorter at a corner.
         assert!((0..count).all(|i| chord(i) <= step * (1.0 + 1e-9)));
         assert!((signed_area(&points) / signed_area(&outline) - 1.0).abs() < 0.02);
     }
 }
 
 #[test]
-fn resampling_takes_any_outline() {
+fn resampling_accepts_any_outline() {
     assert!(resample(&[], 5).is_empty());
     assert!(resample_along(&[], 5).is_empty());
     assert_eq!(resample_along(&[[2.0, 3.0]], 3), [[2.0, 3.0]; 3]);
@@ -209,12 +209,12 @@ fn resampling_takes_any_outline() {
     assert_eq!(resample(&[[2.0, 3.0]], 3), [[2.0, 3.0]; 3]);
     let doubled = [[0.0, 0.0], [0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [2.0, 2.0], [0.0, 2.0]];
     assert_eq!(resample(&doubled, 4), [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
-    // A needle narrower than the spacing cannot have equal chords: the best is returned, in order.
+    // A spike narrower than the spacing cannot have equal chords: the best approximation is returned.
     let needle = [[0.0, 0.0], [10.0, 0.0], [10.0, 30.0], [10.1, 0.0], [20.0, 0.0], [20.0, 10.0], [0.0, 10.0]];
     assert_eq!(resample(&needle, 12).len(), 12);
 }
 
-/// Every pair of edges, by orientation alone.
+/// Compares every pair of edges, by orientation.
 fn brute(points: &[Point]) -> bool {
     let n = points.len();
     let side = |a: Point, b: Point, c: Point| {
@@ -229,7 +229,7 @@ fn brute(points: &[Point]) -> bool {
 }
 
 #[test]
-fn crossing_agrees_with_every_pair() {
+fn self_intersections_agree_with_brute_force() {
     let mut rng = rng(0xC2055);
     let mut crossing = 0;
     for round in 0..2000 {
@@ -237,7 +237,7 @@ fn crossing_agrees_with_every_pair() {
         let wild = if round % 3 == 0 { 1.0 } else { 1.6 / n as f64 };
         let points: Vec<Point> = regular(n, 1.0)
             .iter()
-            .map(|p| [p[0] + wild * support::sway(&mut rng), p[1] + wild * support::sway(&mut rng)])
+            .map(|p| [p[0] + wild * support::jitter(&mut rng), p[1] + wild * support::jitter(&mut rng)])
             .collect();
         let expected = brute(&points);
         crossing += usize::from(expected);
@@ -247,22 +247,22 @@ fn crossing_agrees_with_every_pair() {
 }
 
 #[test]
-fn touching_counts_as_crossing() {
-    // A vertex on another edge, an edge run twice, a spike, too few points, a stray NaN.
+fn touching_counts_as_intersecting() {
+    // A vertex on another edge, a repeated edge, a spike, too few points, a NaN.
     assert!(self_intersects(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [2.0, 0.0], [0.0, 4.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [2.0, 0.0], [4.0, 0.0], [4.0, 1.0], [3.0, 0.0], [1.0, 0.0], [0.0, 3.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 2.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [1.0, 0.0]]));
     assert!(self_intersects(&[[0.0, 0.0], [1.0, f64::NAN], [1.0, 1.0]]));
-    // Repeated points and straight runs are harmless.
+    // Repeated and collinear points do not count.
     assert!(!self_intersects(&[[0.0, 0.0], [1.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 0.0]]));
 }
 
 #[test]
-fn crossing_takes_flat_and_lopsided_outlines() {
+fn self_intersections_of_flat_and_irregular_outlines() {
     let sliver: Vec<Point> = (0..1000).map(|k| [f64::from(k), 0.0]).chain([[500.0, 1e-9]]).collect();
     assert!(!self_intersects(&sliver));
-    // Two long edges among a thousand short ones.
+    // Two long edges and a thousand short ones.
     let mut comet = regular(1000, 1e-3);
     comet[0] = [1e3, 0.0];
     assert!(!self_intersects(&comet));

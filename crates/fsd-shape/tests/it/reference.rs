@@ -1,9 +1,12 @@
-//! The default model against real outlines, which are found through the environment variable `PAPSYNTH_REFERENCE` and are not part of the project.
+//! Compares the default model with real outlines, in the folder of the environment variable `PAPSYNTH_REFERENCE`. They
+//! are not part of the project.
 
 use crate::support;
 use std::path::PathBuf;
 
-use fsd_shape::{Descriptors, Point, ShapeModel, ShapeModelParams, Spread, circularity, resample, self_intersects};
+use fsd_shape::{
+    CovarianceModel, Descriptors, Point, ShapeModel, ShapeModelParams, circularity, resample, self_intersects,
+};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
@@ -11,7 +14,7 @@ const HARMONICS: usize = 40;
 const DRAWS: u32 = 10_000;
 const NAMES: [&str; 4] = ["circularity", "|u-1|", "|u2|", "|u3|"];
 
-/// None, with a message, where there is no reference material; on a build server there must be.
+/// Returns none, with a message, without reference material; in CI its absence is a failure.
 fn outlines() -> Option<Vec<Vec<Point>>> {
     let Some(folder) = std::env::var_os("PAPSYNTH_REFERENCE") else {
         assert!(std::env::var("CI").as_deref() != Ok("true"), "PAPSYNTH_REFERENCE is not set");
@@ -37,7 +40,7 @@ fn real(outlines: &[Vec<Point>]) -> [(f64, f64); 4] {
     columns(&outlines.iter().map(|outline| measure(&describe(outline))).collect::<Vec<_>>())
 }
 
-/// Statistics of the draws, and the share of tries rejected.
+/// Returns the statistics of the draws, and the fraction of rejected attempts.
 fn drawn(outlines: &[Vec<Point>], params: &ShapeModelParams, draws: u32) -> ([(f64, f64); 4], f64) {
     let model = ShapeModel::fit(outlines, params).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xC0);
@@ -46,7 +49,7 @@ fn drawn(outlines: &[Vec<Point>], params: &ShapeModelParams, draws: u32) -> ([(f
     for _ in 0..draws {
         let draw = model.draw(100.0, &mut rng).unwrap();
         rejected += draw.rejected;
-        // Coarser polygons cut corners: the paper's 209 harmonics need more points than its 420.
+        // A coarser polygon may intersect itself: the paper's 209 harmonics need more than its 420 points.
         let points = (16 * params.harmonics).max(1024);
         assert!(!self_intersects(&draw.descriptors.outline(points)));
         rows.push(measure(&draw.descriptors));
@@ -62,13 +65,13 @@ fn the_default_reproduces_real_cytoplasm() {
     for (name, ((mean, sd), (real_mean, real_sd))) in NAMES.iter().zip(drawn.iter().zip(&real)) {
         let error = real_sd / (outlines.len() as f64).sqrt();
         assert!((mean - real_mean).abs() < 2.5 * error, "{name}: mean {mean} for {real_mean} ± {error}");
-        assert!((sd / real_sd - 1.0).abs() < 0.15, "{name}: spread {sd} for {real_sd}");
+        assert!((sd / real_sd - 1.0).abs() < 0.15, "{name}: standard deviation {sd} for {real_sd}");
     }
     assert!(rejected < 0.01, "{rejected}");
 }
 
 #[test]
-fn the_papers_model_is_too_round_and_crosses_itself() {
+fn the_papers_model_is_too_round_and_intersects_itself() {
     let Some(outlines) = outlines() else { return };
     let real = real(&outlines);
     let (drawn, rejected) = drawn(&outlines, &ShapeModelParams::paper_cytoplasm(), 300);
@@ -81,10 +84,10 @@ fn the_papers_model_is_too_round_and_crosses_itself() {
 #[test]
 fn stored_statistics_are_small() {
     let Some(outlines) = outlines() else { return };
-    for spread in [Spread::Independent, ShapeModelParams::default().spread] {
-        let params = ShapeModelParams { harmonics: HARMONICS, spread };
+    for covariance in [CovarianceModel::Independent, ShapeModelParams::default().covariance] {
+        let params = ShapeModelParams { harmonics: HARMONICS, covariance };
         let statistics = ShapeModel::fit(&outlines, &params).unwrap().statistics().rounded(5).unwrap();
-        // A number of five digits prints in about as many characters as in JSON.
+        // The debug format of a number is about as long as in JSON.
         let length: usize = statistics
             .components
             .iter()

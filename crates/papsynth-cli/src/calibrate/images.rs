@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ccd_noise::Error::{NoDark, Saturated};
-use optics_psf::Error::NoFocusInside;
-use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, Light, NucleiAt};
+use optics_psf::Error::FocusAtStackEnd;
+use papsynth_calibrate::{Camera, Edge, EdgeAt, Error, Flats, Focus, FocusParams, Frame, Instrument, LightLevel, NucleiAt};
 use papsynth_dataset::read::{GreyImage, Limits, Stack, image_files, natural_order};
 
 use crate::args::Calibrate;
@@ -30,7 +30,7 @@ pub(super) fn focus(args: &Calibrate, instrument: Option<&Instrument>) -> Result
             Error::NoNucleus => {
                 "give planes only, no masks, or give the window of a nucleus in pixels with --window X,Y,W,H"
             }
-            Error::Window { source: NoFocusInside { .. }, .. } => {
+            Error::Window { source: FocusAtStackEnd { .. }, .. } => {
                 "give only planes, numbered from below focus to above focus, without masks or images with extended depth \
                  of field"
             }
@@ -105,7 +105,7 @@ pub(super) fn camera(args: &Calibrate, folder: &Path) -> Result<Camera, ExitErro
 struct Exposure {
     name: String,
     files: Vec<PathBuf>,
-    light: Light,
+    light: LightLevel,
 }
 
 /// The levels of light in a folder, dark first, each of 2 or more files.
@@ -134,9 +134,9 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, ExitEr
             ));
         }
     };
-    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: Light::Dark }];
+    let mut exposures = vec![Exposure { name: dark.display().to_string(), files: files(&dark)?, light: LightLevel::Dark }];
     for path in &folders {
-        exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: Light::Unknown });
+        exposures.push(Exposure { name: path.display().to_string(), files: files(path)?, light: LightLevel::Unknown });
     }
     if folders.is_empty() {
         let all = files(folder)?;
@@ -149,7 +149,7 @@ fn exposures(folder: &Path, dark: Option<&Path>) -> Result<Vec<Exposure>, ExitEr
         }
         for pair in all.chunks(PAIR) {
             let name = format!("{} and {}", pair[0].display(), name(&pair[1]));
-            exposures.push(Exposure { name, files: pair.to_vec(), light: Light::Unknown });
+            exposures.push(Exposure { name, files: pair.to_vec(), light: LightLevel::Unknown });
         }
     }
     match exposures.iter().find(|exposure| exposure.files.len() < PAIR) {

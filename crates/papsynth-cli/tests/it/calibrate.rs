@@ -16,7 +16,7 @@ use tiff::encoder::{TiffEncoder, colortype};
 use toml::Table;
 
 /// Side of the images, pixels of 0.25 µm.
-const SIDE: usize = 128;
+pub(crate) const SIDE: usize = 128;
 
 fn uniform(rng: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
     low + (high - low) * f64::from(rng.next_u32()) / 4_294_967_296.0
@@ -28,7 +28,7 @@ fn image(side: usize, at: impl Fn(f64, f64) -> f64) -> Vec<f32> {
 }
 
 /// Absorbance of a nucleus, an ellipse with a soft border and clumps of chromatin; lengths in µm.
-fn nucleus(seed: u64) -> impl Fn(f64, f64) -> f64 {
+pub(crate) fn nucleus(seed: u64) -> impl Fn(f64, f64) -> f64 {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let clumps: Vec<[f64; 3]> = (0..40)
         .map(|_| {
@@ -46,7 +46,7 @@ fn nucleus(seed: u64) -> impl Fn(f64, f64) -> f64 {
 }
 
 /// A focus stack of an object. `object` takes µm from the centre.
-fn bright_field(condenser_na: f64, stages_um: &[f64], object: impl Fn(f64, f64) -> f64) -> Vec<Vec<f32>> {
+pub(crate) fn bright_field(condenser_na: f64, stages_um: &[f64], object: impl Fn(f64, f64) -> f64) -> Vec<Vec<f32>> {
     let microscope = Microscope::new(&MicroscopeParams { condenser_na, ..MicroscopeParams::default() }).unwrap();
     let samples = 2 * SIDE;
     let params = BrightFieldParams {

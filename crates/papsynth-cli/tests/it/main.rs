@@ -17,6 +17,8 @@ mod left_out;
 #[cfg(feature = "judge")]
 mod match_fields;
 mod memory;
+#[cfg(all(unix, feature = "calibrate", feature = "judge", feature = "learn", feature = "web"))]
+mod readme;
 mod scenes;
 mod sets;
 mod slide;

@@ -360,6 +360,22 @@ fn submit_reports_errors_of_the_tasks() {
 }
 
 #[test]
+fn changed_inputs_of_a_data_set_are_refused() {
+    let bench = Bench::new("changed-inputs");
+    bench.good(&format!("generate --out out --frames 1 {TINY}"));
+    for name in ["out/recipe.toml", "out/model.json"] {
+        let good = fs::read(bench.path(name)).unwrap();
+        fs::write(bench.path(name), [&good[..], b"\n"].concat()).unwrap();
+        for words in ["rerender out --out again", "convert out --out other --format cellpose"] {
+            let run = bench.run(words);
+            assert!(run.code == 2 && run.err.contains("was changed after generation"), "{words}: {}", run.err);
+        }
+        fs::write(bench.path(name), good).unwrap();
+    }
+    bench.good("rerender out --out again");
+}
+
+#[test]
 fn submit_prints_scripts_and_rejects_invalid_arguments() {
     let bench = Bench::new("submit");
     let run = bench.good("submit slurm --tasks 4 --threads 2 -- --out many --frames 2000 --format webdataset");

@@ -27,9 +27,9 @@ fn a_region_of_a_slide_is_written() {
     rejected(&bench, "slide tile --at 0,0 --size 99999,99999 --out no.png", "more than 268435456 pixels");
     rejected(&bench, "slide tile --at 0 --out no.png", "two integers");
     rejected(&bench, "slide tile --at 0,0 --out no.png --set scan.frame_px=9", "scan.frame_px");
-    rejected(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=swath", "layout.kind");
+    rejected(&bench, "slide tile --at 0,0 --out no.png --set layout.kind=band", "layout.kind");
     rejected(&bench, "slide tile --at 0,0 --out no.png --set optics.imaging=abbe", "optics.imaging");
-    rejected(&bench, "slide tile --at 27000,27000 --out no.png --set scan.reach_um=20", "scan.reach_um");
+    rejected(&bench, "slide tile --at 27000,27000 --out no.png --set scan.max_object_radius_um=20", "scan.max_object_radius_um");
     rejected(&bench, "slide tile --at 0,0 --size 20,20 --out no.jpg", "ends in .png");
     let planes = bench.good(&format!("slide tile {SMALL} --at 0,0 --size 20,20 --out planes.png --set focus.planes=3"));
     assert!(planes.err.contains("the centre plane of 3"), "{}", planes.err);
@@ -52,7 +52,7 @@ fn a_slide_of_several_tasks_is_finalized_and_verified() {
     let bench = Bench::new("slide-make");
     let make = format!("slide make {SMALL} --out slide --size 900,600 --shard-px 512");
     rejected(&bench, &format!("{make} --max-memory 20MB"), "may be used");
-    rejected(&bench, &format!("{make} --set scan.reach_um=20"), "scan.reach_um");
+    rejected(&bench, &format!("{make} --set scan.max_object_radius_um=20"), "scan.max_object_radius_um");
     assert!(!bench.path("slide").exists());
     // The number of threads and the memory limit do not change the files.
     bench.good(&format!("{make} --threads 8 --max-memory 300MiB"));

@@ -46,7 +46,8 @@ impl Dataset {
         Self::begin(location, identity, info.layout.clone(), categories(info.recipe), map, &given)
     }
 
-    /// As [`create_or_resume`](Self::create_or_resume), with the identity and the input files `given`, the recipe first.
+    /// As [`create_or_resume`](Self::create_or_resume), with the identity and the input files `given`, the recipe
+    /// first.
     pub(crate) fn begin(
         location: impl Into<Location>,
         identity: Identity,
@@ -131,20 +132,23 @@ impl Dataset {
     /// Checks that the folder contains this data set.
     fn compare(&self, recipe: &str) -> Result<(), Error> {
         let manifest = Manifest::read(&self.folder)?;
-        let (there, here) = (manifest.identity, &self.identity);
-        let difference = if there.stream_version != here.stream_version {
-            let (there, here) = (there.stream_version, here.stream_version);
-            Some((format!("has stream version {there}; this program writes {here}"), "use the release that wrote it"))
-        } else if there.recipe_sha256 != here.recipe_sha256 {
-            let difference = recipe_difference(&self.folder, &there.recipe_sha256, recipe);
+        let (existing, given) = (manifest.identity, &self.identity);
+        let difference = if existing.stream_version != given.stream_version {
+            let (existing, given) = (existing.stream_version, given.stream_version);
+            Some((
+                format!("has stream version {existing}; this program writes {given}"),
+                "use the release that wrote it",
+            ))
+        } else if existing.recipe_sha256 != given.recipe_sha256 {
+            let difference = recipe_difference(&self.folder, &existing.recipe_sha256, recipe);
             Some((format!("has another recipe{difference}"), "use its recipe.toml"))
-        } else if there.model_sha256 != here.model_sha256 {
+        } else if existing.model_sha256 != given.model_sha256 {
             Some(("has another model".to_owned(), "use its model.json"))
-        } else if there.seed != here.seed {
-            Some((format!("has seed {}, not {}", there.seed, here.seed), "use its seed"))
+        } else if existing.seed != given.seed {
+            Some((format!("has seed {}, not {}", existing.seed, given.seed), "use its seed"))
         } else if manifest.layout != self.layout {
-            let (there, here) = (manifest.layout, &self.layout);
-            Some((format!("was written with another layout ({there}), not {here}"), "use its layout"))
+            let (existing, given) = (manifest.layout, &self.layout);
+            Some((format!("was written with another layout ({existing}), not {given}"), "use its layout"))
         } else {
             None
         };

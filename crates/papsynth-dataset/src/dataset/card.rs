@@ -38,7 +38,7 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
         let _ = writeln!(text, "| `{what}` | {about} |");
     };
     for format in formats {
-        let place = if *format == Format::Folder { "images/, labels/, noise-free/" } else { format.name() };
+        let place = if *format == Format::Folder { "images/, preview/, labels/, noise-free/" } else { format.name() };
         row(place, format.about());
     }
     row("shards/*.coco.json", "COCO with amodal and visible masks and all properties of every object");
@@ -55,13 +55,21 @@ pub(super) fn card(dataset: &Dataset, writer: &str, summary: &Summary) -> String
     );
     row("manifest.json, shards/*.json", "size and SHA-256 of every file; `papsynth verify` checks them");
     if formats.iter().any(|format| format.is_flat()) {
-        let lost: u64 = summary.lost_px.values().sum();
+        let lost: u64 = summary.occluded_px.values().sum();
         let policy = dataset.layout.flatten.name();
         let _ = writeln!(
             text,
             "\nFormats with one label a pixel use the policy `{policy}` where objects overlap; they omit {lost} occluded mask \
              pixels ({}).",
-            summary.lost_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
+            summary.occluded_px.iter().map(|(group, px)| format!("{group} {px}")).collect::<Vec<_>>().join(", ")
+        );
+    }
+    if !summary.empty_splits.is_empty() {
+        let empty = summary.empty_splits.join(" and ");
+        let _ = writeln!(
+            text,
+            "\nNo slide is in the split {empty}: the data set has too few slides for splits by slide. Generate more frames, set fewer \
+             fields per slide in the recipe, or use the splits by field in `splits.csv`."
         );
     }
     text.push_str("\n## Objects\n\n| category | objects |\n|---|---|\n");

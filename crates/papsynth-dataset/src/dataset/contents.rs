@@ -1,15 +1,15 @@
 //! Checks of a shard: its files match its record, and the files are consistent. The second check finds files that were
 //! written wrongly, or changed together with their hashes.
 //!
-//! Everything is derived from the complete masks in the COCO document: visible masks, boxes, areas, the table, the summary in
-//! the record, and every label image, layer and outline of every format. Images must be equal in all formats, and have the
-//! size and the bit depth in the record.
+//! Everything is derived from the complete masks in the COCO document: visible masks, boxes, areas, the table, the
+//! summary in the record, and every label image, layer and outline of every format. Images must be equal in all
+//! formats, and have the size and the bit depth in the record.
 
 use std::fmt::{self, Formatter};
 use std::path::Path;
 
 use papsynth::scene::Scene;
-use papsynth::truth::{Group, Mask, ObjectTruth, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Truth, visible_masks};
 use serde::Serialize;
 
 use super::manifest::Manifest;
@@ -58,7 +58,8 @@ impl fmt::Display for Finding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fix {
-    /// `papsynth generate --verify` with the same recipe generates the file again; for a slide `papsynth slide make --verify`.
+    /// `papsynth generate --verify` with the same recipe generates the file again; for a slide `papsynth slide make
+    /// --verify`.
     Generate,
     /// `papsynth clean --untracked` removes the file.
     Clean,
@@ -67,7 +68,8 @@ pub enum Fix {
 }
 
 impl Dataset {
-    /// Returns the record of a shard if the shard is complete: the record belongs to this data set, and all its files match it.
+    /// Returns the record of a shard if the shard is complete: the record belongs to this data set, and all its files
+    /// match it.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -87,7 +89,7 @@ impl Dataset {
         if record.identity != self.identity || record.layout != self.layout {
             return damaged("belongs to another data set".to_owned());
         }
-        if let Some((path, message)) = self.folder.first_flaw(&record.files, check)? {
+        if let Some((path, message)) = self.folder.first_defect(&record.files, check)? {
             return Ok(Err(Finding::damaged(path, message)));
         }
         if check == Check::Hashes
@@ -107,7 +109,7 @@ impl Dataset {
         if manifest.frames == 0 || manifest.shards != recorded_shards(&self.folder)?.len() as u64 {
             return Ok(false);
         }
-        Ok(self.folder.first_flaw(&manifest.files, Check::Sizes)?.is_none())
+        Ok(self.folder.first_defect(&manifest.files, Check::Sizes)?.is_none())
     }
 }
 
@@ -204,16 +206,16 @@ fn own_document(
     for group in Group::ALL {
         let objects: Vec<&ObjectTruth> = truth.objects.iter().filter(|object| object.group() == group).collect();
         let stack: Vec<_> = objects.iter().map(|o| (o.id, o.depth_um, &o.amodal)).collect();
-        for (object, front) in objects.iter().zip(front_masks(&stack, truth.width, truth.height)) {
+        for (object, visible) in objects.iter().zip(visible_masks(&stack, truth.width, truth.height)) {
             let what = format!("image {index}: the visible mask of object {} is wrong", object.id);
-            check(object.front == front, what)?;
+            check(object.visible == visible, what)?;
         }
     }
     let mut saturated = document.saturated(index).map_err(Error::input(coco))?;
     if saturated.is_empty() {
         saturated.resize(frame.planes_um.len(), Mask::default());
     }
-    let counted = frame.clone().counted(truth, &saturated, frame.floored.clone(), layout.flatten);
+    let counted = frame.clone().counted(truth, &saturated, frame.clipped_px.clone(), layout.flatten);
     check(counted == *frame, format!("image {index}: the summary in the record differs"))?;
     let files = layout.images_of(identity.seed, *shard, frame);
     let own = Document::of_frame(truth, frame, &saturated, &document.categories, files)

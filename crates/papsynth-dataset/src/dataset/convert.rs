@@ -11,12 +11,12 @@ use super::record::ShardRecord;
 use super::set::{Dataset, INPUT_BYTES};
 use crate::error::{Error, Problem};
 use crate::files::Check;
-use crate::formats::{Format, LIMITS, Layout, levels, names};
+use crate::formats::{Depth, Format, LIMITS, Layout, TRAINING_BITS, levels, names, to_camera};
 use crate::read::{self, LevelImage};
 use crate::truth::{Document, FrameSummary};
 
-/// Writes a data set in other formats into another folder, or resumes an earlier conversion. Grey levels, masks, recipe,
-/// model and seed are copied unchanged. Calls `report` after each frame, in order.
+/// Writes a data set in other formats into another folder, or resumes an earlier conversion. Grey levels, masks,
+/// recipe, model and seed are copied unchanged. Calls `report` after each frame, in order.
 ///
 /// # Errors
 /// If `from` is not a complete data set, its recipe or model was changed, its formats lack images that `layout` needs
@@ -55,7 +55,7 @@ pub fn convert(
         let mut writer = target.shard_writer(shard)?;
         for &(index, there) in frames {
             if open.as_ref().is_none_or(|open: &OpenShard| open.record.shard != there) {
-                open = Some(OpenShard::open(&source, there)?);
+                open = Some(OpenShard::open(&source, layout, there)?);
             }
             let Some(open) = &open else { continue };
             let frame = open.record.frames.iter().find(|frame| frame.index == index);
@@ -111,26 +111,27 @@ fn record(source: &Dataset, shard: u64) -> Result<ShardRecord, Error> {
 /// A shard with its COCO document in memory.
 struct OpenShard<'a> {
     source: &'a Dataset,
+    target: &'a Layout,
     record: ShardRecord,
     document: Document,
 }
 
 impl<'a> OpenShard<'a> {
-    fn open(source: &'a Dataset, shard: u64) -> Result<Self, Error> {
+    fn open(source: &'a Dataset, target: &'a Layout, shard: u64) -> Result<Self, Error> {
         let record = record(source, shard)?;
-        if let Some((path, message)) = source.folder.first_flaw(&record.files, Check::Hashes)? {
+        if let Some((path, message)) = source.folder.first_defect(&record.files, Check::Hashes)? {
             return refuse(source, format!("{path}: {message}; `papsynth verify` lists all findings"));
         }
-        Ok(Self { source, record, document: source.document(shard)? })
+        Ok(Self { source, target, record, document: source.document(shard)? })
     }
 
     fn planes(&self, frame: &FrameSummary, mut take: impl FnMut(Plane) -> Result<(), Error>) -> Result<(), Error> {
-        let Self { source, record, document } = self;
+        let Self { source, record, document, .. } = self;
         let Dataset { folder, layout, .. } = source;
-        let format = layout.formats.iter().find(|format| !frame.is_stack() || format.has_planes());
-        let Some(format) = format else {
+        let Some(format) = layout.best_format(frame.is_stack()) else {
             return refuse(source, format!("{layout} does not contain the planes of stacks"));
         };
+        self.check_depth(format, frame, |_| true)?;
         let name = format.image(source.identity.seed, record.shard, frame);
         let mut noise_free = match layout.has(Format::Folder) {
             true => {
@@ -160,7 +161,7 @@ impl<'a> OpenShard<'a> {
                 grey,
                 noise_free,
                 saturated: saturated.get(index).cloned().unwrap_or_default(),
-                floored: frame.floored.get(index).copied().unwrap_or_default(),
+                clipped_px: frame.clipped_px.get(index).copied().unwrap_or_default(),
             })?;
             index += 1;
             Ok(())
@@ -180,13 +181,33 @@ impl<'a> OpenShard<'a> {
             return Ok(Vec::new());
         }
         let Self { source, record, .. } = self;
-        let (_, Some(name)) = source.image_paths(frame, record.shard) else {
+        let Some((name, format)) = source.layout.edf_image(source.identity.seed, record.shard, frame) else {
             let layout = &source.layout;
             return refuse(source, format!("{layout} does not contain the extended-depth-of-field image of a stack"));
         };
+        self.check_depth(format, frame, |target| matches!(target, Format::Folder | Format::Qupath))?;
         let files = images(source, &name, record.shard)?;
         let file = files.first().map(Vec::as_slice).unwrap_or_default();
         let image = LevelImage::decode(file, &LIMITS).map_err(Error::input(&source.folder.path(&name)))?;
-        Ok(levels(image, frame.channels))
+        Ok(levels(to_camera(image, frame.bits), frame.channels))
+    }
+
+    /// Checks that a source of 8-bit images is not converted to a format with the bit depth of the camera. `uses` tells
+    /// whether a target format has these images.
+    fn check_depth(&self, from: Format, frame: &FrameSummary, uses: impl Fn(Format) -> bool) -> Result<(), Error> {
+        let deep = self.target.formats.iter().find(|format| format.depth() == Depth::Camera && uses(**format));
+        match deep {
+            Some(deep) if frame.bits > TRAINING_BITS && from.depth() == Depth::Training => refuse(
+                self.source,
+                format!(
+                    "the format `{}` needs {} bits, but `{}` has {TRAINING_BITS}; convert a data set with `folder`, `ome-tiff`, \
+                     `ome-zarr` or `qupath`, or run `papsynth generate` with the recipe",
+                    deep.name(),
+                    frame.bits,
+                    from.name(),
+                ),
+            ),
+            _ => Ok(()),
+        }
     }
 }

@@ -83,8 +83,8 @@ impl Dataset {
     /// The merged files are not changed: see [`finish`](Self::finish).
     ///
     /// # Errors
-    /// If the range begins inside a shard, the engine has another recipe, the engine fails, or a file cannot be written. After
-    /// an error, frames in work are completed and no other frame is started.
+    /// If the range begins inside a shard, the engine has another recipe, the engine fails, or a file cannot be
+    /// written. After an error, frames in work are completed and no other frame is started.
     pub fn generate(&self, engine: &Engine, run: &Run, report: &(dyn Fn(Progress) + Sync)) -> Result<Outcome, Error> {
         if sha256(engine.recipe().to_toml().as_bytes()) != self.identity.recipe_sha256 {
             return Err(Error::folder(self.path(), "the recipe of the engine is not that of the data set"));

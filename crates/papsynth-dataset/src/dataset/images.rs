@@ -13,7 +13,7 @@ use crate::error::{Error, Problem};
 use crate::files::Check;
 #[cfg(feature = "zarr")]
 use crate::formats::read_planes;
-use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet};
+use crate::formats::{Format, LIMITS, Take, TarFile, levels, names, parquet, to_camera};
 use crate::read::{self, FieldFile, LevelImage, NucleiFile, files_in};
 use crate::truth::FrameSummary;
 
@@ -64,13 +64,12 @@ impl Dataset {
     }
 
     fn with_planes(&self) -> Option<Format> {
-        let mut formats = self.layout.formats.iter().copied();
-        formats.find(|format| format.has_planes() && format.needs().is_none())
+        self.layout.best_format(true).filter(|format| format.needs().is_none())
     }
 
-    /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved, from 0 to
-    /// [`FrameSummary::white`]. For a stack without planes ([`has_planes`](Self::has_planes)), the only plane is the
-    /// extended-depth-of-field image.
+    /// Calls `take` with the number and the grey levels of each plane of a frame: row by row, channels interleaved,
+    /// from 0 to [`FrameSummary::white`]. For a stack without planes ([`has_planes`](Self::has_planes)), the only plane
+    /// is the extended-depth-of-field image.
     ///
     /// # Errors
     /// If the image cannot be read or differs from the record.
@@ -104,11 +103,13 @@ impl Dataset {
     }
 }
 
-/// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing, the
-/// central plane.
+/// Reads the image that shows a frame in one plane: for a stack the extended-depth-of-field image or, if it is missing,
+/// the central plane.
 pub(super) fn display_image(dataset: &Dataset, frame: &FrameSummary, shard: u64) -> Result<LevelImage, Error> {
-    let (image, edf) = dataset.image_paths(frame, shard);
-    let name = edf.unwrap_or(image);
+    let seed = dataset.identity.seed;
+    let edf = frame.is_stack().then(|| dataset.layout.edf_image(seed, shard, frame)).flatten();
+    let best = || dataset.layout.best_format(false).map(|format| format.image(seed, shard, frame));
+    let name = edf.map(|(name, _)| name).or_else(best).unwrap_or_default();
     let path = dataset.folder.path(&name);
     let (mut number, mut central) = (0, None);
     pages(dataset, &name, frame, shard, &mut |page| {
@@ -131,6 +132,7 @@ pub(super) fn pages(
 ) -> Result<(), Error> {
     if !name.ends_with(names::ZARR_GROUP) {
         let mut files = images(dataset, name, shard)?.into_iter();
+        let take = &mut |page| take(to_camera(page, frame.bits));
         let read = files.try_for_each(|file| LevelImage::pages(&file, &LIMITS, take));
         return read.map_err(Error::input(&dataset.folder.path(name)));
     }
@@ -164,12 +166,12 @@ fn check_hash(dataset: &Dataset, file: &str, shard: u64) -> Result<(), Error> {
         return Ok(());
     }
     let record = read_record(&dataset.folder, shard)?;
-    let flaw = match record.files.iter().find(|found| found.path == file) {
-        Some(found) => dataset.folder.flaw(found, Check::Hashes)?,
+    let defect = match record.files.iter().find(|found| found.path == file) {
+        Some(found) => dataset.folder.defect(found, Check::Hashes)?,
         None => Some("no record lists this file".to_owned()),
     };
-    match flaw {
-        Some(flaw) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(flaw))),
+    match defect {
+        Some(defect) => Err(Error::input(&dataset.folder.path(file))(Problem::unfit(defect))),
         None => {
             trusted.insert(file.to_owned());
             Ok(())
@@ -205,8 +207,8 @@ pub fn image_paths(dataset: &Dataset) -> Result<BTreeMap<u64, (u64, String)>, Er
     Ok(images)
 }
 
-/// Returns the first difference between the ground truth of two data sets: objects, classes, positions, complete and visible
-/// masks. Absorbance, defocus and detectability may differ.
+/// Returns the first difference between the ground truth of two data sets: objects, classes, positions, complete and
+/// visible masks. Absorbance, defocus and detectability may differ.
 ///
 /// # Errors
 /// If one is not a data set, or its ground truth cannot be read.
@@ -243,16 +245,16 @@ fn difference(one: &Truth, other: &Truth) -> Option<String> {
             ("class", a.class == b.class),
             ("position", a.centre_um == b.centre_um && a.depth_um == b.depth_um && a.rotation_deg == b.rotation_deg),
             ("complete mask", a.amodal == b.amodal),
-            ("visible mask", a.front == b.front),
+            ("visible mask", a.visible == b.visible),
         ];
         properties.into_iter().find(|(_, same)| !same).map(|(what, _)| format!("the {what} of object {} differs", a.id))
     };
     one.objects.iter().zip(&other.objects).find_map(|(a, b)| what(a, b))
 }
 
-/// Returns the fields in a folder, sorted by name. The folder is a data set with masks of nuclei, or contains images (in it or
-/// in `images`). Nuclei of images are masks of the same name in `masks` (labels, or values above 0), or a table `NAME.csv`
-/// of `y,x` points next to the image. `frames.csv` lists the group of each image.
+/// Returns the fields in a folder, sorted by name. The folder is a data set with masks of nuclei, or contains images
+/// (in it or in `images`). Nuclei of images are masks of the same name in `masks` (labels, or values above 0), or a
+/// table `NAME.csv` of `y,x` points next to the image. `frames.csv` lists the group of each image.
 ///
 /// # Errors
 /// If there is no image, the folder cannot be read, or its tables are invalid.

@@ -66,8 +66,8 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
         bytes: 0,
     };
     for file in &overview.manifest.files {
-        let flaw = folder.flaw(file, check)?;
-        overview.damaged_files.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+        let defect = folder.defect(file, check)?;
+        overview.damaged_files.extend(defect.map(|message| Finding::damaged(&file.path, message)));
     }
     let (mut next, mut last_damaged) = (0, None);
     for shard in recorded_shards(&folder)? {
@@ -106,8 +106,8 @@ pub fn inspect(path: &Path, check: Check) -> Result<Overview, Error> {
     Ok(overview)
 }
 
-/// Returns the shards that are incomplete or lack a frame of a range. It reads only records and files of shards, so that it
-/// can run while other processes write.
+/// Returns the shards that are incomplete or lack a frame of a range. It reads only records and files of shards, so
+/// that it can run while other processes write.
 ///
 /// # Errors
 /// If a file cannot be read.

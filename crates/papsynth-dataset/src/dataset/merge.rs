@@ -27,12 +27,15 @@ pub(crate) type Sink<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + Send + 'a;
 type Process<'a> = dyn FnMut(&str, &dyn Fn(&mut Sink) -> Result<(), Error>) -> Result<FileRecord, Error> + 'a;
 
 impl Dataset {
-    /// Merges all complete shards into `manifest.json`, the data card, `croissant.json`, `splits.csv` and `contact-sheet.png`
-    /// and, if each shard has one frame, `objects.csv` and `coco.json`. Files with the same content are not rewritten.
+    /// Merges all complete shards into `manifest.json`, the data card, `croissant.json`, `splits.csv` and
+    /// `contact-sheet.png` and, if each shard has one frame, `objects.csv` and `coco.json`. Files with the same content
+    /// are not rewritten.
     ///
     /// # Errors
-    /// If a file cannot be read or written.
+    /// If an input was changed after generation ([`check_inputs`](Self::check_inputs)), or a file cannot be read or
+    /// written.
     pub fn finish(&self) -> Result<Summary, Error> {
+        self.check_inputs()?;
         let listed = Self { folder: self.folder.listed()?, ..self.clone() };
         merge(&listed).map_err(|error| self.folder.named(error))
     }
@@ -89,12 +92,15 @@ impl CompleteShards {
             complete.summary.frames += record.frames.len() as u64;
             for frame in record.frames {
                 add(&mut complete.summary.objects, frame.objects);
-                add(&mut complete.summary.lost_px, frame.lost_px);
+                add(&mut complete.summary.occluded_px, frame.occluded_px);
                 splits.insert(Split::of_slide(dataset.identity.seed, frame.slide));
             }
             complete.sharded.extend(record.files.into_iter().filter(|file| is_sharded(&file.path)));
         }
         complete.splits.extend(splits);
+        let is_empty = |split: &Split| !complete.splits.contains(split);
+        let empty = Split::ALL.into_iter().filter(is_empty).map(|split| split.name().to_owned());
+        complete.summary.empty_splits = empty.collect();
         Ok(complete)
     }
 }

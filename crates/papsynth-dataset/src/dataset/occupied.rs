@@ -57,8 +57,8 @@ pub(crate) fn nested_below<'n>(folder: &Folder, names: impl IntoIterator<Item = 
     })
 }
 
-/// Returns the name of any file or folder in a folder, or `None` if it is empty or missing. Temporary files and files of the
-/// desktop do not count.
+/// Returns the name of any file or folder in a folder, or `None` if it is empty or missing. Temporary files and files
+/// of the desktop do not count.
 pub(crate) fn any_content(folder: &Folder) -> Result<Option<String>, Error> {
     if folder.is_remote() {
         return Ok(folder.names()?.into_iter().next());
@@ -89,27 +89,33 @@ pub(crate) fn any_content(folder: &Folder) -> Result<Option<String>, Error> {
 /// Returns the first difference between the recipe in the folder and `recipe`, in parentheses; an empty string if it is
 /// unknown. `expected` is the SHA-256 of the recipe at the time of generation.
 pub(crate) fn recipe_difference(folder: &Folder, expected: &str, recipe: &str) -> String {
-    let there = folder.inside(names::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
-    if there.as_ref().is_some_and(|there| sha256(there.as_bytes()) != expected) {
+    let existing = folder.inside(names::RECIPE).ok().and_then(|path| fs::read_to_string(path).ok());
+    if existing.as_ref().is_some_and(|existing| sha256(existing.as_bytes()) != expected) {
         return format!(" ({} was changed after generation)", names::RECIPE);
     }
     let read = |text: &str| toml::from_str::<toml::Table>(text).ok();
-    let both = there.and_then(|there| read(&there)).zip(read(recipe));
-    let difference = both.and_then(|(there, here)| difference("", &there, &here));
+    let both = existing.and_then(|existing| read(&existing)).zip(read(recipe));
+    let difference = both.and_then(|(existing, given)| difference("", &existing, &given));
     difference.map_or_else(String::new, |difference| format!(" ({difference})"))
 }
 
 /// Returns the first field in which two recipes differ, with its values.
-fn difference(section: &str, there: &toml::Table, here: &toml::Table) -> Option<String> {
-    let names: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
+fn difference(section: &str, existing: &toml::Table, given: &toml::Table) -> Option<String> {
+    let names: BTreeSet<&String> = existing.keys().chain(given.keys()).collect();
     names.into_iter().find_map(|name| {
         let field = if section.is_empty() { name.clone() } else { format!("{section}.{name}") };
-        match (there.get(name), here.get(name)) {
-            (Some(toml::Value::Table(there)), Some(toml::Value::Table(here))) => difference(&field, there, here),
-            (there, here) if there == here => None,
-            (there, here) => {
+        match (existing.get(name), given.get(name)) {
+            (Some(toml::Value::Table(existing)), Some(toml::Value::Table(given))) => {
+                difference(&field, existing, given)
+            }
+            (existing, given) if existing == given => None,
+            (existing, given) => {
                 let shown = |value: Option<&toml::Value>| value.map_or("unset".to_owned(), toml::Value::to_string);
-                Some(format!("`{field}` is {} there and {} here", shown(there), shown(here)))
+                Some(format!(
+                    "`{field}` is {} in the existing recipe and {} in the given one",
+                    shown(existing),
+                    shown(given)
+                ))
             }
         }
     })

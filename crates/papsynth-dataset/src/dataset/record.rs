@@ -20,8 +20,8 @@ pub(crate) const FORMAT_VERSION: u32 = 2;
 /// Name of the format in `manifest.json`.
 pub(crate) const FORMAT: &str = "papsynth-dataset";
 
-/// Program and version that write files. Releases with the same `stream_version` write the same pixels, but not always the
-/// same compressed bytes.
+/// Program and version that write files. Releases with the same `stream_version` write the same pixels, but not always
+/// the same compressed bytes.
 pub(crate) const WRITER: &str = concat!("papsynth-dataset ", env!("CARGO_PKG_VERSION"));
 
 /// Largest record, bytes.
@@ -114,7 +114,8 @@ impl ShardRecord {
         bytes::json_lines(self)
     }
 
-    /// Checks that the frames belong to the shard, are sorted, and have valid sizes, because readers allocate by these numbers.
+    /// Checks that the frames belong to the shard, are sorted, and have valid sizes, because readers allocate by these
+    /// numbers.
     fn check_frames(&self) -> Result<(), Problem> {
         let each = self.layout.frames_per_shard;
         let range = self.shard.saturating_mul(each)..self.shard.saturating_add(1).saturating_mul(each);

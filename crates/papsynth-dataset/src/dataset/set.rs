@@ -48,7 +48,9 @@ pub struct Summary {
     /// Shards with a missing file or a file of wrong size. The merged files do not include them.
     pub damaged: Vec<u64>,
     /// Pixels of masks, by group, that are occluded in formats with one label a pixel.
-    pub lost_px: BTreeMap<String, u64>,
+    pub occluded_px: BTreeMap<String, u64>,
+    /// Names of the splits by slide without frames ("train", "val", "test"). Small data sets have few slides.
+    pub empty_splits: Vec<String>,
     /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal.
     pub root: String,
 }

@@ -33,8 +33,8 @@ impl Dataset {
     }
 }
 
-/// Writes the files of one shard. Frames and planes are written one after the other and not kept in memory. Dropping it before
-/// [`commit`](Self::commit) leaves an incomplete shard without a record.
+/// Writes the files of one shard. Frames and planes are written one after the other and not kept in memory. Dropping it
+/// before [`commit`](Self::commit) leaves an incomplete shard without a record.
 pub struct ShardWriter<'a> {
     dataset: &'a Dataset,
     shard: u64,
@@ -48,7 +48,7 @@ pub struct ShardWriter<'a> {
 struct OpenFrame {
     frame: FrameSummary,
     saturated: Vec<Mask>,
-    floored: Vec<usize>,
+    clipped_px: Vec<usize>,
     /// Grey levels of a single plane.
     levels: Vec<u16>,
 }
@@ -69,8 +69,8 @@ impl ShardWriter<'_> {
     /// If the frame is not in this shard, is out of order, or a file cannot be written.
     pub fn begin(&mut self, scene: &Scene) -> Result<(), Error> {
         let frame = FrameSummary::of_scene(scene);
-        let (there, here) = (scene.key.seed, self.dataset.identity.seed);
-        frame.due(there == here, format!("the seed of the scene is {there}, that of the data set {here}"))?;
+        let (found, expected) = (scene.key.seed, self.dataset.identity.seed);
+        frame.due(found == expected, format!("the seed of the scene is {found}, that of the data set {expected}"))?;
         self.begin_with(frame)
     }
 
@@ -89,7 +89,7 @@ impl ShardWriter<'_> {
         for sink in &mut self.sinks {
             sink.begin(&frame, &self.files)?;
         }
-        self.frame = Some(OpenFrame { frame, saturated: Vec::new(), floored: Vec::new(), levels: Vec::new() });
+        self.frame = Some(OpenFrame { frame, saturated: Vec::new(), clipped_px: Vec::new(), levels: Vec::new() });
         Ok(())
     }
 
@@ -107,7 +107,7 @@ impl ShardWriter<'_> {
             begun.levels.clone_from(&plane.grey);
         }
         begun.saturated.push(plane.saturated.clone());
-        begun.floored.push(plane.floored);
+        begun.clipped_px.push(plane.clipped_px);
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl ShardWriter<'_> {
         let key = finished.scene.key;
         let same = key.seed == self.dataset.identity.seed && frame.is_of(&finished.scene);
         frame.due(same, format!("the ground truth belongs to another scene, of frame {}", key.index))?;
-        let edf = if frame.is_stack() { finished.sharp() } else { Vec::new() };
+        let edf = if frame.is_stack() { finished.all_in_focus_levels() } else { Vec::new() };
         if self.dataset.layout.scenes {
             self.files.write(&names::scene(key.index), finished.scene.to_json().as_bytes())?;
         }
@@ -131,10 +131,10 @@ impl ShardWriter<'_> {
     pub(crate) fn end_with(&mut self, truth: &Truth, edf: Vec<u16>) -> Result<&FrameSummary, Error> {
         let begun = self.frame.take().ok_or_else(|| not_begun(self.dataset, self.shard))?;
         begun.check(truth, &edf)?;
-        let OpenFrame { frame, saturated, floored, levels } = begun;
+        let OpenFrame { frame, saturated, clipped_px, levels } = begun;
         let levels = if edf.is_empty() { levels } else { edf };
         let Dataset { identity, layout, categories, .. } = self.dataset;
-        let frame = frame.counted(truth, &saturated, floored, layout.flatten);
+        let frame = frame.counted(truth, &saturated, clipped_px, layout.flatten);
         let files = self.dataset.image_paths(&frame, self.shard);
         let document = Document::of_frame(truth, &frame, &saturated, categories, files)
             .map_err(|category| frame.wrong(format!("the recipe has no category `{category}`")))?;

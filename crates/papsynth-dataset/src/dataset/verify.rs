@@ -24,8 +24,8 @@ use crate::truth::categories;
 /// The result of [`verify`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifyReport {
-    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal. `None` if there
-    /// are findings.
+    /// SHA-256 of the manifest, which lists the SHA-256 of every file: data sets with equal roots are equal. `None` if
+    /// there are findings.
     pub root: Option<String>,
     /// Number of complete frames.
     pub frames: u64,
@@ -44,9 +44,9 @@ pub struct VerifyProgress {
     pub total: u64,
 }
 
-/// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged files.
-/// With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the desktop, such as
-/// `.DS_Store`, are ignored.
+/// Verifies a data set: reads every file, checks that the files of each shard are consistent, and recomputes the merged
+/// files. With `expected`, every frame of that range must exist; otherwise every frame up to the last. Files of the
+/// desktop, such as `.DS_Store`, are ignored.
 ///
 /// # Errors
 /// If there is no data set, or a file cannot be read.
@@ -130,8 +130,8 @@ fn verify_in(
     }
     for file in &merged {
         listed.insert(file.path.clone());
-        let flaw = folder.flaw(file, Check::Hashes)?;
-        findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+        let defect = folder.defect(file, Check::Hashes)?;
+        findings.extend(defect.map(|message| Finding::damaged(&file.path, message)));
     }
     if merged.is_empty() {
         listed.extend(dataset.given().map(str::to_owned).chain(named_map(folder)));
@@ -171,7 +171,7 @@ fn verify_in(
 
 /// Returns the shard that a file belongs to by its name: `images/000003.png` belongs to the shard of frame 3.
 fn shard_of(path: &str, dataset: &Dataset) -> Option<u64> {
-    const OF_FRAMES: [&str; 5] = ["images", "labels", "noise-free", "all-in-focus", "scenes"];
+    const OF_FRAMES: [&str; 6] = ["images", "preview", "labels", "noise-free", "all-in-focus", "scenes"];
     let (top, name) = path.split_once('/')?;
     let format = dataset.layout.formats.iter().find(|format| format.name() == top);
     let is_of_shard = [names::SHARDS, names::TABLES].contains(&top) || format.is_some_and(|format| format.is_sharded());
@@ -257,7 +257,7 @@ fn input_findings(dataset: &Dataset, merged: &[FileRecord]) -> Result<Vec<Findin
 /// Returns the map that a recipe names.
 fn map_of(recipe: &Recipe) -> Option<&String> {
     match &recipe.layout {
-        recipe::Layout::Map { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
+        recipe::Layout::DensityMap { path } | recipe::Layout::Labels(recipe::Labels { path, .. }) => Some(path),
         _ => None,
     }
 }

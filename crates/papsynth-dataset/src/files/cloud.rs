@@ -34,7 +34,8 @@ pub struct Bucket {
 }
 
 impl Bucket {
-    /// Opens an address such as `s3://bucket/prefix`, with credentials and endpoint from the environment. Sends no request.
+    /// Opens an address such as `s3://bucket/prefix`, with credentials and endpoint from the environment. Sends no
+    /// request.
     ///
     /// # Errors
     /// If the address is invalid, the environment lacks settings of the store, or the system clock is before 1970.

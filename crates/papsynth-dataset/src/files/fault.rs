@@ -37,9 +37,9 @@ pub(crate) fn point() -> std::io::Result<()> {
     })
 }
 
-/// Runs `make` repeatedly; in each run the disk fails at another call: at each of the `first` calls, then at every seventh.
-/// Checks that no file is partial except `may_change`, that the error names the folder, and that the next run completes
-/// the output. Returns the number of failures.
+/// Runs `make` repeatedly; in each run the disk fails at another call: at each of the `first` calls, then at every
+/// seventh. Checks that no file is partial except `may_change`, that the error names the folder, and that the next run
+/// completes the output. Returns the number of failures.
 #[cfg(test)]
 pub(crate) fn everywhere<T: std::fmt::Debug>(
     name: &str,

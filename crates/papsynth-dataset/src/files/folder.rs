@@ -52,8 +52,8 @@ fn is_absent(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
 
-/// A folder whose files have relative names with `/` between folders. For a data set in an object store this is the local
-/// folder of copies: committed files are uploaded, and files are downloaded before they are read.
+/// A folder whose files have relative names with `/` between folders. For a data set in an object store this is the
+/// local folder of copies: committed files are uploaded, and files are downloaded before they are read.
 #[derive(Debug, Clone)]
 pub(crate) struct Folder {
     root: PathBuf,
@@ -171,7 +171,7 @@ impl Folder {
     /// Writes a file unless it exists with the same content.
     pub(crate) fn keep(&self, name: &str, bytes: &[u8]) -> Result<FileRecord, Error> {
         let record = FileRecord::of(name, bytes);
-        if self.flaw(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
+        if self.defect(&record, Check::Hashes)?.is_none() { Ok(record) } else { self.write(name, bytes) }
     }
 
     /// Writes a file in pieces unless it exists with the same content.
@@ -182,14 +182,14 @@ impl Folder {
     ) -> Result<FileRecord, Error> {
         let mut pending = self.filled(name, fill)?;
         let record = pending.seal()?;
-        if self.flaw(&record, Check::Hashes)?.is_some() {
+        if self.defect(&record, Check::Hashes)?.is_some() {
             pending.rename()?;
         }
         Ok(record)
     }
 
-    /// Writes a file unless one of that name exists, and returns whether it was written. If two processes try at once, one
-    /// of them writes, except in an object store.
+    /// Writes a file unless one of that name exists, and returns whether it was written. If two processes try at once,
+    /// one of them writes, except in an object store.
     pub(crate) fn write_new(
         &self,
         name: &str,
@@ -214,7 +214,7 @@ impl Folder {
     }
 
     /// Compares a file with its record and returns the difference.
-    pub(crate) fn flaw(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
+    pub(crate) fn defect(&self, record: &FileRecord, check: Check) -> Result<Option<String>, Error> {
         let missing = || Ok(Some("missing".to_owned()));
         if self.remote.is_some() {
             match self.size(&record.path)? {
@@ -243,13 +243,13 @@ impl Folder {
     }
 
     /// Returns the path of the first file that differs from its record, and the difference.
-    pub(crate) fn first_flaw<'f>(
+    pub(crate) fn first_defect<'f>(
         &self,
         files: &'f [FileRecord],
         check: Check,
     ) -> Result<Option<(&'f str, String)>, Error> {
         for file in files {
-            if let Some(message) = self.flaw(file, check)? {
+            if let Some(message) = self.defect(file, check)? {
                 return Ok(Some((&file.path, message)));
             }
         }
@@ -285,7 +285,8 @@ impl Folder {
         Ok(())
     }
 
-    /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count as files.
+    /// Returns the names of all files, sorted, without those of the desktop ([`is_desktop_file`]). Symbolic links count
+    /// as files.
     pub(crate) fn names(&self) -> Result<Vec<String>, Error> {
         if let Some(remote) = &self.remote {
             let names = remote.list("")?.into_keys();
@@ -335,8 +336,8 @@ impl Folder {
         entries.map(name).collect::<Result<_, _>>().map_err(Error::io("read", &path))
     }
 
-    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are files
-    /// that another process has locked or that may not be opened.
+    /// Removes temporary files of killed processes. Returns the number of removed and of skipped files. Skipped are
+    /// files that another process has locked or that may not be opened.
     pub(crate) fn sweep(&self) -> Result<[u64; 2], Error> {
         let [mut removed, mut skipped] = [0; 2];
         for path in self.folders()? {

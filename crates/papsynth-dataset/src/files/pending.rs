@@ -79,8 +79,8 @@ impl Pending {
                 _ => Err(e),
             });
             let file = file.map_err(Error::io("write", &path))?;
-            // The lock protects the file from `Folder::sweep` of another process. If that process was faster, another file is
-            // created. File systems without locks skip this protection.
+            // The lock protects the file from `Folder::sweep` of another process. If that process was faster, another
+            // file is created. File systems without locks skip this protection.
             let is_locked_by_other = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
             let is_gone = || temporary.symlink_metadata().is_err_and(|e| e.kind() == io::ErrorKind::NotFound);
             if attempts == MAX_ATTEMPTS || (!is_locked_by_other && !is_gone()) {

@@ -66,8 +66,9 @@ impl Location {
             .is_some_and(|scheme| !scheme.is_empty() && scheme.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'+'))
     }
 
-    /// A data set in an object store. Files are written and read in a new subfolder of the system's folder for temporary
-    /// files (`TMPDIR`). It holds at most the shards in work and is removed when the last copy of this value is dropped.
+    /// A data set in an object store. Files are written and read in a new subfolder of the system's folder for
+    /// temporary files (`TMPDIR`). It holds at most the shards in work and is removed when the last copy of this value
+    /// is dropped.
     ///
     /// # Errors
     /// If that folder cannot be created.

@@ -32,8 +32,8 @@ pub struct SlideSummary {
 }
 
 impl SlideSet {
-    /// Writes the files that are computed from all shards: the upper levels, `thumbnail.png` and `README.md`. `check` is the
-    /// check of the shards before. Files with the same content are not rewritten.
+    /// Writes the files that are computed from all shards: the upper levels, `thumbnail.png` and `README.md`. `check`
+    /// is the check of the shards before. Files with the same content are not rewritten.
     ///
     /// # Errors
     /// If a shard is missing or damaged, or a file cannot be read or written.

@@ -27,12 +27,13 @@ pub struct SlideSet {
 }
 
 impl SlideSet {
-    /// Creates a slide in a new or empty folder, or resumes the one in the folder. If `slide.json` is missing or damaged, the
-    /// records of shards identify the slide.
+    /// Creates a slide in a new or empty folder, or resumes the one in the folder. If `slide.json` is missing or
+    /// damaged, the records of shards identify the slide.
     ///
     /// # Errors
-    /// If the folder contains other files or a slide with another recipe, model, seed, number, stream version or shard size,
-    /// objects at the centre of the deposit are larger than `scan.reach_um`, or a file cannot be read or written.
+    /// If the folder contains other files or a slide with another recipe, model, seed, number, stream version or shard
+    /// size, objects at the centre of the deposit are larger than `scan.max_object_radius_um`, or a file cannot be read
+    /// or written.
     pub fn create_or_resume(path: &Path, slide: &Slide, info: &SlideInfo) -> Result<Self, Error> {
         let (identity, recipe, model) = Identity::of(info.recipe, info.model, info.seed);
         let head = SlideHead::new(identity, slide, info);
@@ -152,7 +153,8 @@ impl SlideSet {
         (0..rows).flat_map(move |row| (0..columns).map(move |column| [column, row]))
     }
 
-    /// Returns the record of a shard if the shard is complete: the record belongs to this slide, and all its files match it.
+    /// Returns the record of a shard if the shard is complete: the record belongs to this slide, and all its files
+    /// match it.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -162,7 +164,7 @@ impl SlideSet {
 
     pub(super) fn recorded(&self, name: &str, check: Check) -> Result<Option<SlideRecord>, Error> {
         let Some(record) = self.record(name)? else { return Ok(None) };
-        Ok(self.folder.first_flaw(&record.files, check)?.is_none().then_some(record))
+        Ok(self.folder.first_defect(&record.files, check)?.is_none().then_some(record))
     }
 
     /// Returns a record if it exists and belongs to this slide.
@@ -204,7 +206,8 @@ impl SlideSet {
     }
 }
 
-/// Checks the objects at the centre of the deposit, or at the nearest point of the slide: the largest objects are there.
+/// Checks the objects at the centre of the deposit, or at the nearest point of the slide: the largest objects are
+/// there.
 fn check_centre(slide: &Slide) -> Result<(), Error> {
     let (side, size, deposit_um) = (slide.side_px(), slide.size_px(), slide.deposit_um());
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a position on the slide")]

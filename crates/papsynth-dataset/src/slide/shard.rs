@@ -119,7 +119,7 @@ impl SlideSet {
     fn outlines(&self, objects: &[ObjectTruth]) -> Value {
         let (seed, slide) = (self.head.identity.seed, self.head.slide);
         let name = |o: &ObjectTruth| format!("papsynth slide {seed} {slide} {} {:?}", o.id, o.part);
-        let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Stain": o.stain });
+        let measure = |o: &ObjectTruth, _: Option<&ObjectTruth>| json!({ "Area µm^2": o.area_um2, "Depth µm": o.depth_um, "Mean absorbance": o.mean_absorbance });
         collection(&objects.iter().collect::<Vec<_>>(), name, measure)
     }
 

@@ -13,8 +13,8 @@ use crate::files::{Check, FileRecord};
 use crate::formats::names;
 
 impl SlideSet {
-    /// Verifies a slide: reads every file, and returns missing, truncated, changed and untracked files, sorted by path. Files of
-    /// the desktop, such as `.DS_Store`, are ignored.
+    /// Verifies a slide: reads every file, and returns missing, truncated, changed and untracked files, sorted by path.
+    /// Files of the desktop, such as `.DS_Store`, are ignored.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -35,8 +35,8 @@ impl SlideSet {
             findings.push(Finding::damaged(name, message));
         }
         for (done, file) in (1..).zip(&files) {
-            let flaw = self.folder.flaw(file, Check::Hashes)?;
-            findings.extend(flaw.map(|message| Finding::damaged(&file.path, message)));
+            let defect = self.folder.defect(file, Check::Hashes)?;
+            findings.extend(defect.map(|message| Finding::damaged(&file.path, message)));
             report(VerifyProgress { done, total: files.len() as u64 });
         }
         let mut known = self.names_of(&files);

@@ -1,4 +1,4 @@
-//! A data set goes on where it was left, and nothing else is touched.
+//! Resumption of data sets.
 
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 
@@ -36,7 +36,7 @@ fn refused(result: Result<Dataset, Error>, what: &str) {
 }
 
 #[test]
-fn another_data_set_in_the_folder_is_refused_by_what_differs() {
+fn another_data_set_in_the_folder_is_refused_with_the_difference() {
     let scratch = Scratch::new("identity");
     let (recipe, model) = (recipe(), Model::builtin());
     open(scratch.path()).unwrap();
@@ -51,7 +51,7 @@ fn another_data_set_in_the_folder_is_refused_by_what_differs() {
 }
 
 #[test]
-fn of_several_that_begin_at_once_one_is_the_first() {
+fn of_several_processes_that_start_at_once_one_creates_the_data_set() {
     for round in 0..30 {
         let scratch = Scratch::new(&format!("at-once-{round}"));
         let (recipe, model) = (recipe(), Model::builtin());
@@ -69,7 +69,7 @@ fn of_several_that_begin_at_once_one_is_the_first() {
 }
 
 #[test]
-fn a_folder_with_something_else_is_refused_and_left_alone() {
+fn a_folder_with_other_files_is_refused_and_unchanged() {
     let scratch = Scratch::new("stranger");
     fs::write(scratch.join("thesis.tex"), "years of work").unwrap();
     refused(open(scratch.path()), "thesis.tex");
@@ -81,7 +81,7 @@ fn a_folder_with_something_else_is_refused_and_left_alone() {
 }
 
 #[test]
-fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
+fn frames_with_a_missing_truncated_or_changed_file_are_incomplete() {
     let scratch = Scratch::new("damage");
     let dataset = open(scratch.path()).unwrap();
     write(&dataset, 0);
@@ -111,7 +111,7 @@ fn frames_with_a_lost_or_cut_or_changed_file_are_not_whole() {
 }
 
 #[test]
-fn inspection_says_what_is_there_and_what_is_not() {
+fn inspection_reports_present_and_missing_frames() {
     let scratch = Scratch::new("inspect");
     assert!(inspect(scratch.path(), Check::Sizes).unwrap_err().to_string().contains("contains no data set"));
     let dataset = open(scratch.path()).unwrap();
@@ -131,7 +131,7 @@ fn inspection_says_what_is_there_and_what_is_not() {
 }
 
 #[test]
-fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
+fn temporary_files_of_killed_processes_are_removed_and_locked_ones_are_not() {
     let scratch = Scratch::new("sweep");
     let dataset = open(scratch.path()).unwrap();
     write(&dataset, 0);
@@ -141,7 +141,7 @@ fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
     held.lock().unwrap();
     open(scratch.path()).unwrap();
     assert!(!dead.exists() && alive.exists());
-    // Nor do they make a folder one that holds something else.
+    // A folder with only temporary files counts as empty.
     let other = Scratch::new("sweep-fresh");
     fs::write(other.join(".manifest.json.89ab.tmp"), "half").unwrap();
     open(other.path()).unwrap();
@@ -149,7 +149,7 @@ fn what_killed_processes_left_is_swept_and_what_others_write_is_not() {
 }
 
 #[test]
-fn a_lost_recipe_is_written_again() {
+fn a_missing_recipe_is_written_again() {
     let scratch = Scratch::new("recipe");
     open(scratch.path()).unwrap();
     let before = contents(scratch.path());
@@ -160,10 +160,10 @@ fn a_lost_recipe_is_written_again() {
 }
 
 #[test]
-fn a_file_in_the_way_is_an_error_that_trying_again_does_not_mend() {
+fn a_file_with_the_name_of_a_folder_is_not_an_io_error() {
     let scratch = Scratch::new("refusing");
     let dataset = open(scratch.path()).unwrap();
-    // A file where a folder is needed refuses everybody, also those who may do everything.
+    // This error does not depend on permissions.
     fs::write(scratch.join("labels"), "in the way").unwrap();
     let frame = frame(0, 1, 8, 1);
     let mut writer = dataset.shard_writer(0).unwrap();
@@ -176,7 +176,7 @@ fn a_file_in_the_way_is_an_error_that_trying_again_does_not_mend() {
     assert!(contents(scratch.path()).iter().all(|(name, _)| !name.ends_with(".tmp")));
 }
 
-/// A small field of the engine.
+/// A recipe of small fields, and its engine.
 fn small() -> (Recipe, Engine) {
     let mut recipe = Preset::Sparse.recipe();
     recipe.field.width_px = 96.0.into();
@@ -189,7 +189,7 @@ fn small() -> (Recipe, Engine) {
 }
 
 #[test]
-fn runs_give_the_same_bytes_however_they_are_split() {
+fn the_bytes_do_not_depend_on_the_split_into_runs() {
     let (recipe, engine) = small();
     let model = Model::builtin();
     let (one, two) = (Scratch::new("split-1"), Scratch::new("split-2"));
@@ -246,7 +246,7 @@ fn runs_give_the_same_bytes_however_they_are_split() {
 }
 
 #[test]
-fn damage_that_keeps_the_size_is_found_and_mended() {
+fn damage_that_keeps_the_size_is_found_and_repaired() {
     let scratch = Scratch::new("mend");
     let (recipe, engine) = small();
     let dataset = open_with(scratch.path(), &recipe, &Model::builtin(), SEED).unwrap();
@@ -272,7 +272,7 @@ fn damage_that_keeps_the_size_is_found_and_mended() {
         let middle = bytes.len() / 2;
         bytes[middle] ^= 1;
         fs::write(&path, bytes).unwrap();
-        // Of a file that the manifest names otherwise than it lies there, that file is missing.
+        // A file that the manifest lists under another name is missing.
         let findings = verify(scratch.path(), None).unwrap().findings;
         match name.as_str() {
             "manifest.json" => assert!(!findings.is_empty(), "{name}"),

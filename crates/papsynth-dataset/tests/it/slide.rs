@@ -1,4 +1,4 @@
-//! Slides on the disk: whoever makes them makes the same, nothing wrong goes unnoticed, and what is wrong is made again.
+//! Slides on the disk: reproducibility, verification and repair.
 
 #![cfg(feature = "zarr")]
 
@@ -69,7 +69,7 @@ fn tasks_generate_the_same_slide_and_missing_shards_are_refused() {
     assert!(gap.contains("missing or damaged shards: 3 of 6") && gap.contains("0000-0000"), "{gap}");
     make(&two.0, &engine, Task { index: 0, total: 2 }, Check::Sizes);
     assert_eq!(half.finish(Check::Sizes).unwrap(), root);
-    // What is read back is what the engine makes, in every level.
+    // The pixels of every level are those of the engine.
     let part = engine.slide(SEED, 0).unwrap().picture([100, 200], [900, 480], Threads::All).unwrap();
     assert_eq!(whole.image(0, 0, 200..680, 100..1000).unwrap(), part.planes[0].grey);
     for (group, labels) in Group::ALL.into_iter().zip(&part.labels) {
@@ -90,18 +90,21 @@ fn tasks_generate_the_same_slide_and_missing_shards_are_refused() {
             assert_eq!(u32::from(*value), mean, "{level}: {x} {y}");
         }
     }
-    // Another recipe does not go on here.
+    // Another recipe is refused.
     let mut other = recipe();
     other.scan.frame_px = 256;
     let model = Model::builtin();
     let info = info(&other, &model);
     let refused = SlideSet::create_or_resume(&one.0, &engine.slide(SEED, 0).unwrap(), &info).unwrap_err();
     let refused = refused.to_string();
-    assert!(refused.contains("another recipe (`scan.frame_px` is 512 there and 256 here)"), "{refused}");
+    assert!(
+        refused.contains("another recipe (`scan.frame_px` is 512 in the existing recipe and 256 in the given one)"),
+        "{refused}"
+    );
 }
 
 #[test]
-fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
+fn of_two_processes_with_different_seeds_in_a_folder_one_succeeds() {
     let engine = engine();
     for round in 0..20 {
         let folder = Folder::new(&format!("begin-{round}"));
@@ -119,19 +122,19 @@ fn of_two_that_begin_one_folder_at_once_with_different_seeds_one_goes_on() {
 }
 
 #[test]
-fn what_asks_too_much_of_the_reach_begins_nothing() {
+fn too_large_objects_are_refused_before_a_file_is_written() {
     let folder = Folder::new("reach");
     let mut short = recipe();
-    short.scan.reach_um = 20.0;
+    short.scan.max_object_radius_um = 20.0;
     let model = Model::builtin();
     let engine = Engine::new(&short, &model, &Inputs::default()).unwrap();
     let refused = SlideSet::create_or_resume(&folder.0, &engine.slide(SEED, 0).unwrap(), &info(&short, &model));
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("scan.reach_um") && !folder.0.exists(), "{refused}");
+    assert!(refused.contains("scan.max_object_radius_um") && !folder.0.exists(), "{refused}");
 }
 
 #[test]
-fn whatever_is_wrong_is_found_and_mended() {
+fn every_damage_is_found_and_repaired() {
     let folder = Folder::new("wrong");
     let engine = engine();
     let set = make(&folder.0, &engine, Task::ALL, Check::Sizes);
@@ -151,7 +154,7 @@ fn whatever_is_wrong_is_found_and_mended() {
         let name = file.file_name().unwrap().to_string_lossy().into_owned();
         let bytes = fs::read(file).unwrap();
         let broken = |what: &str| {
-            // What a slide is cannot be found out without its head.
+            // A slide without its head cannot be opened.
             let found = match SlideSet::open(&folder.0) {
                 Ok(set) => set.verify().unwrap().len(),
                 Err(_) => usize::from(name == "slide.json"),
@@ -177,20 +180,20 @@ fn whatever_is_wrong_is_found_and_mended() {
     assert_eq!(clean(&folder.0, false).unwrap(), Cleaned { temporary: 1, untracked: 0, skipped: 0 });
     assert_eq!(clean(&folder.0, true).unwrap(), Cleaned { temporary: 0, untracked: 1, skipped: 0 });
     assert_eq!(set.verify().unwrap(), []);
-    // What says the same in other bytes is not what was written.
+    // A reformatted record counts as changed.
     for name in ["shards/0000-0000.json", "upper.json"] {
         let mut bytes = fs::read(folder.0.join(name)).unwrap();
         bytes.push(b'\n');
         fs::write(folder.0.join(name), bytes).unwrap();
         let found = set.verify().unwrap();
-        assert!(found.len() == 1 && found[0].path == name && found[0].mend == Fix::Generate, "{found:?}");
+        assert!(found.len() == 1 && found[0].path == name && found[0].fix == Fix::Generate, "{found:?}");
         make(&folder.0, &engine, Task::ALL, Check::Sizes).finish(Check::Sizes).unwrap();
         assert_eq!(set.verify().unwrap(), []);
     }
     let (slide, recipe_here, model) = (engine.slide(SEED, 0).unwrap(), recipe(), Model::builtin());
     let within = SlideSet::create_or_resume(&folder.0.join("objects/inner"), &slide, &info(&recipe_here, &model));
     assert!(within.unwrap_err().to_string().contains("is inside the data set or slide"));
-    // What the slide is made from is made anew from the records, if they are of this slide.
+    // Inputs are restored if the records belong to this slide.
     let head = fs::read(folder.0.join("slide.json")).unwrap();
     for lost in [None, Some(&head[..head.len() / 2])] {
         match lost {
@@ -205,7 +208,7 @@ fn whatever_is_wrong_is_found_and_mended() {
         make(&folder.0, &engine, Task::ALL, Check::Sizes);
         assert_eq!(set.verify().unwrap(), []);
     }
-    // Before it is closed, what is a stray cannot be told.
+    // Untracked files cannot be removed before the slide is finished.
     fs::remove_file(folder.0.join("upper.json")).unwrap();
     let refused = clean(&folder.0, true).unwrap_err().to_string();
     assert!(refused.contains("papsynth slide finalize"), "{refused}");

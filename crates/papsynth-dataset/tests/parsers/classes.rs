@@ -1,10 +1,10 @@
-//! Any bytes as a class file, beside the classes that ship.
+//! Arbitrary bytes as a class file, added to the built-in classes.
 
 use std::sync::LazyLock;
 
 use papsynth::model::Model;
 
-/// A model with classes that were read is sound, has those that ship, and reads back as written.
+/// A model with added classes is valid, contains the built-in classes, and has a lossless round trip.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
     let Ok(text) = std::str::from_utf8(bytes) else {

@@ -1,4 +1,4 @@
-//! Any bytes as a recipe to make an engine of.
+//! Arbitrary bytes as the recipe of an engine.
 
 use std::sync::LazyLock;
 
@@ -7,7 +7,7 @@ use papsynth::{Engine, Inputs};
 
 use super::sound;
 
-/// A sound recipe makes an engine or says why not. It takes milliseconds, a hundred times as long as to read it.
+/// A valid recipe gives an engine or an error. This takes milliseconds, 100 times as long as parsing.
 pub(crate) fn check(bytes: &[u8]) {
     static MODEL: LazyLock<Model> = LazyLock::new(Model::builtin);
     let Some(recipe) = sound::recipe(bytes) else { return };

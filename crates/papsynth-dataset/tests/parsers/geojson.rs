@@ -1,4 +1,4 @@
-//! Any bytes as the GeoJSON of a frame.
+//! Arbitrary bytes as the GeoJSON of a frame.
 
 use std::sync::LazyLock;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::shard::{Shard, begin};
 
-/// What is taken for the features of a frame says what was written, in whatever order and with whatever spaces.
+/// Accepted features of a frame equal the written ones, except for order and white space.
 pub(crate) fn check(bytes: &[u8]) {
     static SHARD: LazyLock<(Shard, usize)> = LazyLock::new(|| {
         let shard = begin("fuzz-geojson", [Format::Qupath], &[1]);

@@ -1,8 +1,8 @@
-//! Any bytes as an image in grey levels.
+//! Arbitrary bytes as an image.
 
 use papsynth_dataset::read::{GreyImage, Limits};
 
-/// An image that is read is whole, within the limits, and in its range.
+/// A decoded image is complete, within the limits, and in its range.
 pub(crate) fn check(bytes: &[u8]) {
     let limits = Limits { max_side_px: 2048, max_pixels: 1 << 18, ..Limits::default() };
     let Ok(image) = GreyImage::decode(bytes, &limits) else {

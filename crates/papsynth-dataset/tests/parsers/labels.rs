@@ -1,8 +1,8 @@
-//! Any bytes as a label image.
+//! Arbitrary bytes as a label image.
 
 use papsynth_dataset::read::{Limits, components, label_map};
 
-/// A label image that is read is whole, and its components share out its labelled pixels.
+/// A decoded label image is complete, and each labelled pixel is in one component.
 pub(crate) fn check(bytes: &[u8]) {
     let limits = Limits { max_side_px: 2048, max_pixels: 1 << 18, max_regions: 10_000, ..Limits::default() };
     let Ok(labels) = label_map(bytes, &limits) else {

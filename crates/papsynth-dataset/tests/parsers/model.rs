@@ -1,8 +1,8 @@
-//! Any bytes as a model.
+//! Arbitrary bytes as a model.
 
 use papsynth::model::Model;
 
-/// A model that is read is sound and reads back as written.
+/// A parsed model is valid and has a lossless round trip.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;

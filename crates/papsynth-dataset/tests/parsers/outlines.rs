@@ -1,8 +1,8 @@
-//! Any bytes as a table of outlines.
+//! Arbitrary bytes as a table of outlines.
 
 use papsynth_dataset::read::outlines;
 
-/// Outlines that are read have an inside, and finite points.
+/// Parsed outlines have a positive area and finite points.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(outlines) = outlines(bytes) else {
         return;

@@ -1,10 +1,10 @@
-//! Any bytes as a recipe.
+//! Arbitrary bytes as a recipe.
 
 use papsynth::recipe::Recipe;
 
 use super::sound;
 
-/// A recipe that is read and found sound reads back as written.
+/// A valid recipe has a lossless round trip.
 pub(crate) fn check(bytes: &[u8]) {
     let Some(recipe) = sound::recipe(bytes) else { return };
     for text in [recipe.to_toml(), recipe.to_commented_toml()] {

@@ -1,8 +1,8 @@
-//! Any bytes as the counts of a mask, behind two bytes for the sides of its image.
+//! Arbitrary bytes as the counts of a mask, after two bytes for the size of its image.
 
 use papsynth_dataset::rle;
 
-/// A mask that is read lies in its image and reads back as written.
+/// A parsed mask is inside its image and has a lossless round trip.
 pub(crate) fn check(bytes: &[u8]) {
     let [width, height, counts @ ..] = bytes else { return };
     let (width, height) = (usize::from(*width), usize::from(*height));

@@ -1,8 +1,8 @@
-//! Any bytes as a scene.
+//! Arbitrary bytes as a scene.
 
 use papsynth::scene::Scene;
 
-/// A scene that is read reads back as written.
+/// A parsed scene has a lossless round trip.
 pub(crate) fn check(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Ok(scene) = Scene::from_json(text) else { return };

@@ -1,5 +1,5 @@
-//! Any bytes as one of the files of a shard: of tables, COCO, GeoJSON, outlines, images, label images, tar files. The first byte says which. From
-//! 128 on the rest is the file; below, the rest is a list of changes to the file as it was written, of four bytes each.
+//! Arbitrary bytes as a file of a shard: table, COCO, GeoJSON, outlines, image, label image, tar file. The first byte
+//! selects the file. From 128 on, the rest is its content; below, the rest is a list of changes of four bytes each.
 
 use std::fs;
 use std::sync::LazyLock;
@@ -13,16 +13,16 @@ use crate::support::{SEED, Scratch, frame, recipe};
 const RECORD: &str = "shards/000000.json";
 const COCO: &str = "shards/000000.coco.json";
 
-/// A shard whose files are put in others' places.
+/// A shard whose files are replaced.
 pub(super) struct Shard {
     scratch: Scratch,
     dataset: Dataset,
     record: ShardRecord,
-    /// Its files, by path.
+    /// Its files, sorted by path.
     pub(super) files: Vec<(String, Vec<u8>)>,
 }
 
-/// A shard of frames that have so many planes.
+/// A shard of frames with this number of planes.
 pub(super) fn begin(name: &str, formats: impl IntoIterator<Item = Format>, planes: &[usize]) -> Shard {
     let scratch = Scratch::new(name);
     let layout = Layout { frames_per_shard: planes.len() as u64, ..Layout::new(formats) };
@@ -46,7 +46,7 @@ fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Where (of 65536 parts of the file), what is done there, with which value.
+/// Position (in 1/65536 of the file), operation, and value of a change.
 fn changes(mut bytes: Vec<u8>, list: &[u8]) -> Vec<u8> {
     for change in list.chunks_exact(4) {
         let at = usize::from(u16::from_le_bytes([change[0], change[1]])) * bytes.len() / 65536;
@@ -64,7 +64,7 @@ fn changes(mut bytes: Vec<u8>, list: &[u8]) -> Vec<u8> {
 }
 
 impl Shard {
-    /// Whether the shard is found whole with another content in the place of one of its files, whose hash is right.
+    /// Whether the shard counts as complete after a file is replaced and its hash updated.
     pub(super) fn is_whole_with(&self, number: usize, content: &[u8]) -> bool {
         let Self { scratch, dataset, record, files } = self;
         let (path, good) = &files[number];
@@ -80,7 +80,7 @@ impl Shard {
     }
 }
 
-/// A file that is not what was written is found to contradict the others although its hash is right, unless it says the same.
+/// A changed file with a correct hash is found as inconsistent, unless its content is equivalent.
 pub(crate) fn check(bytes: &[u8]) {
     static SHARD: LazyLock<Shard> = LazyLock::new(|| begin("fuzz-shard", Format::built(), &[2, 1]));
     let [which, rest @ ..] = bytes else { return };
@@ -103,7 +103,7 @@ pub(crate) fn check(bytes: &[u8]) {
             truths(good).expect("and so is what was written")
         );
     }
-    // What readers take for text or a table says exactly what it said.
+    // Accepted text files and tables are unchanged.
     if [".csv", ".txt"].iter().any(|ending| path.ends_with(ending)) {
         assert_eq!(content, good.as_slice());
     }

@@ -1,8 +1,8 @@
-//! Any bytes as an image of one or several planes, grey or in colour.
+//! Arbitrary bytes as an image with one or several planes, grey or in colour.
 
 use papsynth_dataset::read::{LevelImage, Limits, Stack};
 
-/// An image that is read is whole and within the limits, and so is every plane of a stack.
+/// A decoded image, and every plane of a stack, is complete and within the limits.
 pub(crate) fn check(bytes: &[u8]) {
     let limits = Limits { max_side_px: 2048, max_pixels: 1 << 18, ..Limits::default() };
     if let Ok(image) = LevelImage::decode(bytes, &limits) {

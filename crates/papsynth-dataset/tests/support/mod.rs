@@ -1,4 +1,4 @@
-//! Small frames made by hand, and folders that vanish.
+//! Small synthetic frames, and temporary folders.
 #![allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the numbers are small")]
 #![allow(dead_code, reason = "each test uses its part")]
 
@@ -8,23 +8,23 @@ use std::path::{Path, PathBuf};
 use papsynth::key::Key;
 use papsynth::recipe::{Binning, Mixing, PhotonNoise, Recipe, Rendition, Restore, Subsampling};
 use papsynth::scene::{
-    Kind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
+    ObjectKind, Restoration, Scene, SceneBackground, SceneCamera, SceneDyes, SceneIllumination, SceneLight, SceneOptics,
     Tint, View,
 };
-use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, front_masks};
+use papsynth::truth::{Group, Mask, ObjectTruth, Part, Run, Trait, Truth, visible_masks};
 use papsynth::{Finished, Frame, Plane};
 
 pub(crate) const WIDTH: usize = 70;
 pub(crate) const HEIGHT: usize = 50;
 pub(crate) const SEED: u64 = 11;
 
-/// A folder of this test alone, removed at its end.
+/// A temporary folder of one test.
 pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(crate) fn new(name: &str) -> Self {
         let path = |n: u32| std::env::temp_dir().join(format!("papsynth-dataset-{}-{name}-{n}", std::process::id()));
-        // Tests that run beside each other may use the same name.
+        // Concurrent tests may use the same name.
         Self((0..).map(path).find(|path| fs::create_dir(path).is_ok()).unwrap())
     }
 
@@ -43,7 +43,7 @@ impl Drop for Scratch {
     }
 }
 
-/// Every file below a folder with its content, by its path from there.
+/// Returns path and content of every file in a folder, sorted by path.
 pub(crate) fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     collect(folder, "", &mut found);
@@ -66,7 +66,7 @@ fn collect(folder: &Path, prefix: &str, found: &mut Vec<(String, Vec<u8>)>) {
     }
 }
 
-/// A recipe whose classes the frames use.
+/// Returns the recipe with the classes of the frames.
 pub(crate) fn recipe() -> Recipe {
     Recipe::default()
 }
@@ -79,14 +79,16 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
     Scene {
         key: Key { seed: SEED, index },
         slide: index / 16,
+        attempts: 1,
+        cells: Default::default(),
         fusion: None,
         view: View { width: WIDTH, height: HEIGHT, pixel_um: 0.25 },
         planes_um: (0..planes).map(|z| 0.8 * z as f64 - 0.8).collect(),
         background: SceneBackground {
             level: 0.9,
             illumination: SceneIllumination::Border { exponent: 0.02 },
-            scatter: 0.01,
-            scatter_um: 60.0,
+            texture: 0.01,
+            texture_um: 60.0,
         },
         light: SceneLight::Monochrome { wavelength_um: 0.57, bandwidth_um: 0.01 },
         optics: SceneOptics::Gaussian { sigma_xy_um: 0.225, sigma_z_um_per_um: 0.25 },
@@ -98,7 +100,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             read_noise_e: 8.0,
             read_noise_rms_e: 0.0,
             offset_dn: 0.0,
-            glare_removed: 0.0,
+            glare_subtracted: 0.0,
             photon_noise: PhotonNoise::Exact,
             prnu: 0.0,
             dsnu_e: 0.0,
@@ -113,7 +115,7 @@ pub(crate) fn scene(index: u64, planes: usize, bits: u32) -> Scene {
             binning_px: 1,
             binning: Binning::Charge,
             jpeg_quality: 0,
-            jpeg_subsampling: Subsampling::Squares,
+            jpeg_subsampling: Subsampling::S420,
         },
         frame: None,
         objects: Vec::new(),
@@ -130,35 +132,35 @@ fn disc(x: f32, y: f32, radius: f32) -> Mask {
     Mask::from_tile(&tile, WIDTH, [0, 0], WIDTH, HEIGHT, |v| v > 0.5)
 }
 
-fn object(id: u32, part: Part, kind: Kind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
+fn object(id: u32, part: Part, kind: ObjectKind, class: &str, depth_um: f64, planes: &[f64], amodal: Mask) -> ObjectTruth {
     ObjectTruth {
         id,
         part,
         kind,
         class: class.to_owned(),
-        bethesda: if kind == Kind::Cell { "NILM".to_owned() } else { String::new() },
+        bethesda: if kind == ObjectKind::Cell { "NILM".to_owned() } else { String::new() },
         traits: [Trait::Flap, Trait::Pyknotic].into_iter().collect(),
         cluster: 1,
         centre_um: [3.25, 7.5],
         depth_um,
-        stain: 0.3,
+        mean_absorbance: 0.3,
         tint: (part == Part::Cytoplasm).then_some(Tint::Cyanophilic),
         rotation_deg: 12.5,
         area_um2: amodal.area() as f64 / 16.0,
         truncated: amodal.bounds().is_some_and(|b| b.x == 0),
-        front: Mask::default(),
+        visible: Mask::default(),
         amodal,
         defocus_um: planes.iter().map(|z| z - depth_um).collect(),
         detectability: planes.iter().map(|z| 10.0 / (1.0 + (z - depth_um).abs())).collect(),
     }
 }
 
-/// Two cells of which one overlaps the other, and two things that are no cell. `first_id` is that of the first cell.
+/// Returns a frame with two overlapping cells and two pieces of debris. `first_id` is the id of the first cell.
 pub(crate) fn frame(index: u64, planes: usize, bits: u32, first_id: u32) -> Frame {
     frame_of(scene(index, planes, bits), first_id)
 }
 
-/// The same in colour.
+/// Returns the same frame in colour.
 pub(crate) fn colour_frame(index: u64, planes: usize, bits: u32) -> Frame {
     let light =
         SceneLight::Colour { lamp_k: 3200.0, mixing: Mixing::Spectral, chromatic_um: 0.3, rendition: Rendition::Srgb };
@@ -171,12 +173,12 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     let shift = (index % 7) as f32;
     let near = first_id + 1;
     let mut objects = vec![
-        object(first_id, Part::Cytoplasm, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
-        object(first_id, Part::Nucleus, Kind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
-        object(near, Part::Cytoplasm, Kind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
-        object(near, Part::Nucleus, Kind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
-        object(near + 1, Part::Whole, Kind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
-        object(near + 2, Part::Whole, Kind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
+        object(first_id, Part::Cytoplasm, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 17.0)),
+        object(first_id, Part::Nucleus, ObjectKind::Cell, &class, -0.5, z, disc(18.0 + shift, 22.0, 5.0)),
+        object(near, Part::Cytoplasm, ObjectKind::Cell, &class, 0.5, z, disc(40.0, 24.0, 16.0)),
+        object(near, Part::Nucleus, ObjectKind::Cell, &class, 0.5, z, disc(42.0, 24.0, 4.0)),
+        object(near + 1, Part::Whole, ObjectKind::Leukocyte, "leukocyte", 0.0, z, disc(0.0, 45.0, 6.0)),
+        object(near + 2, Part::Whole, ObjectKind::Speckle, "speckle", 1.0, z, disc(60.0, 6.0, 0.5)),
     ];
     let of_part = |objects: &[ObjectTruth], part: Part| -> Vec<usize> {
         (0..objects.len()).filter(|&i| objects[i].part == part).collect()
@@ -184,9 +186,9 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
     for part in [Part::Cytoplasm, Part::Nucleus, Part::Whole] {
         let members = of_part(&objects, part);
         let stack: Vec<_> = members.iter().map(|&i| (objects[i].id, objects[i].depth_um, &objects[i].amodal)).collect();
-        let fronts = front_masks(&stack, WIDTH, HEIGHT);
+        let fronts = visible_masks(&stack, WIDTH, HEIGHT);
         for (i, front) in members.into_iter().zip(fronts) {
-            objects[i].front = front;
+            objects[i].visible = front;
         }
     }
     let truth = Truth { width: WIDTH, height: HEIGHT, objects };
@@ -208,10 +210,10 @@ fn frame_of(scene: Scene, first_id: u32) -> Frame {
                 (v + noise * 0.05 * f32::from(white)).clamp(0.0, f32::from(white)) as u16
             });
             let (grey, stage_um) = (grey.collect(), scene.planes_um[z]);
-            // As many saturated pixels as the number of the plane.
+            // Plane z has z saturated pixels.
             let run = Run { y: 0, x0: 3, x1: 3 + z as u32 };
             let saturated = Mask::from_runs(if z > 0 { vec![run] } else { Vec::new() });
-            Plane { index: z, stage_um, channels, grey, noise_free, saturated, floored: 0 }
+            Plane { index: z, stage_um, channels, grey, noise_free, saturated, clipped_px: 0 }
         })
         .collect();
     Frame { planes, finished: Finished { scene, truth, all_in_focus } }

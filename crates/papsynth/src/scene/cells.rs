@@ -1,4 +1,6 @@
-//! Drawing epithelial cells: places, sizes, stains, folds.
+//! Draws epithelial cells: places, sizes, stains, folds.
+
+use std::collections::BTreeMap;
 
 use rand_core::Rng;
 
@@ -7,17 +9,35 @@ use crate::key::{Key, Stream};
 use crate::model::{CellClass, HaloStatistics, Model};
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{CellMix, Number, Recipe};
+use crate::recipe::{CellMix, GroupForm, Number, Recipe};
 
 use super::cell::{CellBody, CellDetail, Fold, FoldForm, Halo, NucleusBody};
 use super::depth::Relief;
-use super::field::Object;
+use super::field::{ClassCount, Object};
 use super::groups::{Groups, Place};
-use super::layout::{Places, weight_map};
+use super::layout::{Places, weights};
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use super::weight::WeightMap;
 use crate::debris::Body;
+
+/// The cells of a field and its margin.
+pub(super) struct Cells {
+    pub(super) objects: Vec<Object>,
+    pub(super) field: Region,
+    pub(super) region: Region,
+    /// Cells by class.
+    pub(super) counts: BTreeMap<String, ClassCount>,
+}
+
+/// Handling of cells without a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Crowding {
+    /// They are an error.
+    Error,
+    /// They are left out.
+    LeaveOut,
+}
 
 /// Draws every cell of a field, class by class.
 pub(super) fn draw_cells(
@@ -25,41 +45,81 @@ pub(super) fn draw_cells(
     model: &Model,
     given: Option<&WeightMap>,
     view: View,
-    field: &FieldNumbers,
+    numbers: &FieldNumbers,
     stain: &FieldStain<'_>,
-) -> Result<Vec<Object>, Cause> {
-    let counts: Vec<usize> =
-        recipe.cells.iter().map(|(class, mix)| field.count((&format!("cells.{class}.count"), &mix.count))).collect();
-    let total = counts.iter().sum();
-    if total == 0 {
-        return Ok(Vec::new());
-    }
-    let map = weight_map(&recipe.layout, given, view, field)?;
-    let spacing = field.draw(named!(recipe.slide.spacing_um));
-    let mut places = Places::new(&map, total, spacing, view)?;
+    crowding: Crowding,
+) -> Result<Cells, Cause> {
+    let weights = weights(&recipe.layout, given, view, numbers)?;
+    let count = |(class, mix): (&String, &CellMix)| {
+        numbers.number_of((&format!("cells.{class}.count"), &mix.count), weights.populated_mm2) as usize
+    };
+    let requested: Vec<usize> = recipe.cells.iter().map(count).collect();
+    let spacing = numbers.draw(named!(recipe.slide.spacing_um));
+    let mut places = Places::new(&weights, spacing)?;
+    let wanted = fitting(recipe, &places, &requested, crowding)?;
     let relief = Relief::new(
         view.size_um(),
-        field.draw(named!(recipe.slide.depth_um)),
-        field.draw(named!(recipe.slide.relief_um)),
-        field.draw(named!(recipe.slide.median_um)),
-        field.key.stream("field", 0, "slide.relief").next_u64(),
+        numbers.draw(named!(recipe.slide.depth_um)),
+        numbers.draw(named!(recipe.slide.depth_scale_um)),
+        numbers.draw(named!(recipe.slide.depth_filter_um)),
+        numbers.key.stream("field", 0, "slide.relief").next_u64(),
     );
-    let mut cells = Vec::with_capacity(total);
+    let mut objects = Vec::with_capacity(wanted.iter().sum());
+    let mut counts = BTreeMap::new();
     let mut groups_begun = 0;
-    for ((name, mix), count) in recipe.cells.iter().zip(counts) {
+    for (((name, mix), requested), wanted) in recipe.cells.iter().zip(requested).zip(wanted) {
         let kind = Class { name, mix, class: model.class(name)? };
         let mut groups = Groups::new(&mix.group, groups_begun);
-        for _ in 0..count {
-            let number = cells.len() as u64;
-            let cell = Drawn::new(recipe, kind, stain, field.key, number);
-            let mut place_rng = field.key.stream("cell", number, "place");
-            let place = groups.next(cell.body.radius_um, |rng| places.next(rng), &mut place_rng)?;
+        let in_margin = mix.count.is_density();
+        let before = objects.len();
+        for _ in 0..wanted {
+            let number = objects.len() as u64;
+            let cell = Drawn::new(recipe, kind, stain, numbers.key, number);
+            let mut place_rng = numbers.key.stream("cell", number, "place");
+            let place = groups.next(cell.body.radius_um, |rng| places.next(in_margin, rng), &mut place_rng);
+            let place = match place {
+                Err(Cause::Crowded { .. }) if crowding == Crowding::LeaveOut => break,
+                place => place?,
+            };
             let depth_um = relief.at(place.centre_um);
-            cells.push(cell.lie(kind, number, &place, depth_um));
+            objects.push(cell.placed(kind, number, &place, depth_um));
         }
         groups_begun = groups.begun();
+        let placed = &objects[before..];
+        let in_field = placed.iter().filter(|cell| weights.field.touches(cell.centre_um, 0.0)).count();
+        let [requested, placed, in_field] = [requested, placed.len(), in_field].map(|count| count as u64);
+        counts.insert(name.clone(), ClassCount { requested, placed, in_field });
     }
-    Ok(cells)
+    Ok(Cells { objects, field: weights.field, region: weights.region, counts })
+}
+
+/// Returns how many cells of each class to place: those requested, or the same fraction of each class where they do not fit.
+fn fitting(recipe: &Recipe, places: &Places, requested: &[usize], crowding: Crowding) -> Result<Vec<usize>, Cause> {
+    /// Fraction of the cells that fit which is placed in a crowded field, so that each class gets places.
+    const CROWDED: f64 = 0.9;
+    let mut counts = [0; 2];
+    for (mix, count) in recipe.cells.values().zip(requested) {
+        // Only the first cell of a group keeps its distance.
+        counts[usize::from(mix.count.is_density())] += match mix.group.form {
+            GroupForm::Single => *count,
+            _ => random::count((*count as f64 / mix.group.size.mean_count().max(1.0)).ceil()),
+        };
+    }
+    let [in_field, in_both] = counts;
+    for (count, in_margin) in [(in_field, false), (in_both, true)] {
+        places.check_tries(count, in_margin)?;
+    }
+    if in_field + in_both < 2 {
+        return Ok(requested.to_vec());
+    }
+    match places.check(in_field, in_both) {
+        Err(fraction) if crowding == Crowding::LeaveOut => {
+            let fewer = |count: &usize| random::count((*count as f64 * CROWDED * fraction).ceil());
+            Ok(requested.iter().map(fewer).collect())
+        }
+        Err(_) => Err(places.no_room(in_field, in_both)),
+        Ok(()) => Ok(requested.to_vec()),
+    }
 }
 
 /// A class of cells of a recipe.
@@ -70,17 +130,17 @@ pub(super) struct Class<'a> {
     pub(super) class: &'a CellClass,
 }
 
-/// A cell that has no place yet.
+/// A drawn cell without a place.
 pub(super) struct Drawn {
     pub(super) body: CellBody,
-    /// The direction it is turned to if nothing else says so, degrees.
+    /// Direction of a single cell, degrees.
     any_deg: f64,
-    /// Its depth about the relief, µm.
+    /// Depth relative to the relief, µm.
     stacking_um: f64,
 }
 
 impl Drawn {
-    /// The cell of that number.
+    /// Draws the cell with this number.
     pub(super) fn new(recipe: &Recipe, kind: Class<'_>, stain: &FieldStain<'_>, key: Key, number: u64) -> Self {
         let own = |purpose: &str| key.stream("cell", number, purpose);
         let mut rng = own("body");
@@ -90,8 +150,8 @@ impl Drawn {
         Self { body, any_deg, stacking_um }
     }
 
-    /// The cell at its place, where the relief is so deep.
-    pub(super) fn lie(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
+    /// Returns the cell at its place, with the depth of the relief there.
+    pub(super) fn placed(self, kind: Class<'_>, number: u64, place: &Place, depth_um: f64) -> Object {
         let Self { mut body, any_deg, stacking_um } = self;
         let rotation_deg = if place.group == 0 { any_deg } else { place.rotation_deg };
         body.nucleus.off_centre = polar(body.nucleus.off_centre, kind.class.nucleus.polarity, rotation_deg);
@@ -110,7 +170,7 @@ impl Drawn {
     }
 }
 
-/// Turns a displacement towards one end of the cell's long axis: all the way at polarity 1.
+/// Rotates a displacement towards one end of the long axis of the cell: completely at polarity 1.
 fn polar(off_centre: [f64; 2], polarity: f64, rotation_deg: f64) -> [f64; 2] {
     if polarity <= 0.0 {
         return off_centre;
@@ -130,14 +190,14 @@ fn draw_body(
 ) -> CellBody {
     let size = mix.size.draw(rng);
     let (cytoplasm, nucleus) = (&class.cytoplasm, &class.nucleus);
-    // Radii of cell and nucleus vary together: a bivariate normal of their logarithms.
+    // The logarithms of the radii of cell and nucleus have a bivariate normal distribution.
     let first = random::normal(rng);
     let second = random::normal(rng);
     let correlation = nucleus.size_correlation;
     let partner = correlation * first + (1.0 - correlation * correlation).max(0.0).sqrt() * second;
     let radius_um = size * cytoplasm.radius_um.median * libm::exp(cytoplasm.radius_um.log_sd * first);
     let mut nucleus_um = size * nucleus.radius_um.median * libm::exp(nucleus.radius_um.log_sd * partner);
-    /// A nucleus wider than this share of its cell would stand out of it.
+    /// Largest radius of a nucleus relative to its cell: a larger one extends beyond the cell.
     const WIDEST: f64 = 0.72;
     nucleus_um = nucleus_um.min(WIDEST * radius_um);
     let cytoplasm_absorbance = cytoplasm.absorbance.median
@@ -147,7 +207,7 @@ fn draw_body(
     let detail = draw_detail(recipe, cytoplasm.pliability, rng, &own);
     let fold = draw_fold(recipe, cytoplasm.pliability, rng);
     let distance = (nucleus.off_centre.mean + nucleus.off_centre.sd * random::normal(rng)).clamp(0.0, 1.0);
-    // However far off its centre, the nucleus stays inside the cell.
+    // The nucleus stays inside the cell.
     let distance = distance.min((0.85 - nucleus_um / radius_um).max(0.0));
     let angle = random::direction(rng);
     let pyknotic = random::chance(recipe.nucleus.pyknotic.draw(rng), rng);
@@ -155,7 +215,7 @@ fn draw_body(
     let nucleus_absorbance = normal_at_least(nucleus.absorbance.mean, nucleus.absorbance.sd, 0.25, rng)
         * stain.nucleus
         * mix.nucleus_stain.draw(rng);
-    // Chromatin that takes up more stain varies more: what is typical of a class is the contrast, sd over mean.
+    // Darker chromatin varies more: the contrast, sd over mean, is typical of a class.
     let contrast = normal_at_least(nucleus.chromatin.sd.mean, CONTRAST_SPREAD * nucleus.chromatin.sd.sd, 0.3, rng)
         / nucleus.absorbance.mean.max(f64::MIN_POSITIVE);
     let own_number = |(name, number): (&str, &Number)| number.draw(&mut own(name));
@@ -170,15 +230,15 @@ fn draw_body(
         dome: own_number(named!(recipe.nucleus.dome)),
         edge_um: recipe.nucleus.edge_um.draw(&mut own("nucleus.edge")),
         clumping: own_number(named!(recipe.nucleus.clumping)),
-        wedge: {
-            let (name, wedge) = named!(recipe.nucleus.wedge);
+        thickness_gradient: {
+            let (name, slope) = named!(recipe.nucleus.thickness_gradient);
             let mut rng = own(name);
-            let wedge = wedge.draw(&mut rng);
-            [0, 1].map(|_| wedge * random::normal(&mut rng))
+            let slope = slope.draw(&mut rng);
+            [0, 1].map(|_| slope * random::normal(&mut rng))
         },
         pyknotic,
         wrinkle: if wrinkled { random::between(0.3, 1.0, rng) } else { 0.0 },
-        // About as many as there are on average, one more or less.
+        // The mean number, one more or less.
         nucleoli: random::count(
             nucleus.nucleoli + random::between(-1.0, 1.0, &mut own("nucleoli")) * nucleus.nucleoli.min(1.0),
         ),
@@ -205,43 +265,43 @@ fn draw_body(
     }
 }
 
-/// Share of the spread of chromatin's standard deviation that is left when the absorbance is known.
+/// Fraction of the variation of the standard deviation of chromatin that is independent of the absorbance.
 const CONTRAST_SPREAD: f64 = 0.6;
 
-/// A normal cut off below a share of its mean, so that no stain vanishes or turns negative.
+/// Draws from a normal distribution, cut below a fraction of its mean, so that stains stay above 0.
 fn normal_at_least(mean: f64, sd: f64, share: f64, rng: &mut Stream) -> f64 {
     (mean + sd * random::normal(rng)).max(share * mean)
 }
 
 fn draw_detail(recipe: &Recipe, pliability: f64, rng: &mut Stream, own: &impl Fn(&str) -> Stream) -> CellDetail {
     let cytoplasm = &recipe.cytoplasm;
-    let excess = cytoplasm.excess.draw(rng);
+    let excess_area = cytoplasm.excess_area.draw(rng);
     let granular = random::chance(cytoplasm.granular.draw(rng), rng);
     let granules = cytoplasm.granules.draw(rng);
-    let (name, slope) = named!(recipe.cytoplasm.wedge);
+    let (name, slope) = named!(recipe.cytoplasm.thickness_gradient);
     let mut wedge_rng = own(name);
     let slope = slope.draw(&mut wedge_rng);
-    let wedge = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
+    let thickness_gradient = [0, 1].map(|_| slope * random::normal(&mut wedge_rng));
     let own = |(name, number): (&str, &Number)| number.draw(&mut own(name));
     let pliable = |named: (&str, &Number)| pliability * own(named);
     CellDetail {
-        excess,
-        corners: pliable(named!(recipe.cytoplasm.corners)),
+        excess_area,
+        angularity: pliable(named!(recipe.cytoplasm.angularity)),
         notches: random::count(pliable(named!(recipe.cytoplasm.notches))),
-        tongues: random::count(pliable(named!(recipe.cytoplasm.tongues))),
+        protrusions: random::count(pliable(named!(recipe.cytoplasm.protrusions))),
         wrinkles: random::count(pliable(named!(recipe.cytoplasm.wrinkles))),
-        wrinkle: own(named!(recipe.cytoplasm.wrinkle)),
+        wrinkle_thickness: own(named!(recipe.cytoplasm.wrinkle_thickness)),
         wrinkle_um: own(named!(recipe.cytoplasm.wrinkle_um)),
         endoplasm: own(named!(recipe.cytoplasm.endoplasm)),
         granules: if granular { granules } else { 0.0 },
         rim_um: own(named!(recipe.cytoplasm.rim_um)),
-        wedge,
+        thickness_gradient,
         ..cytoplasm.one(rng)
     }
 }
 
 fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: &mut Stream) -> Option<Halo> {
-    /// Largest halo relative to its cell: a ring of cytoplasm is left outside it.
+    /// Largest radius of a halo relative to its cell: a ring of cytoplasm remains outside.
     const LARGEST: f64 = 0.8;
     let halo = halo.filter(|halo| random::chance(halo.probability, rng))?;
     let radius = halo.radius.median * libm::exp(halo.radius.log_sd * random::normal(rng));
@@ -255,29 +315,29 @@ fn draw_halo(halo: Option<&HaloStatistics>, nucleus_um: f64, cell_um: f64, rng: 
 fn draw_fold(recipe: &Recipe, pliability: f64, rng: &mut Stream) -> Option<Fold> {
     let folds = &recipe.cytoplasm.folds;
     let roll = pliability * folds.roll.draw(rng);
-    let cigar = pliability * folds.cigar.draw(rng);
+    let folded_over = pliability * folds.folded_over.draw(rng);
     let flap = pliability * folds.flap.draw(rng);
     let which = random::uniform(rng);
     let direction_deg = random::between(0.0, 360.0, rng);
     let depth = folds.depth.draw(rng);
     let radius_um = folds.radius_um.draw(rng);
-    let form = if which < cigar {
-        FoldForm::Cigar
-    } else if which < cigar + roll {
+    let form = if which < folded_over {
+        FoldForm::FoldedOver
+    } else if which < folded_over + roll {
         FoldForm::Roll
-    } else if which < cigar + roll + flap {
+    } else if which < folded_over + roll + flap {
         FoldForm::Flap
     } else {
         return None;
     };
-    /// A rolled rim takes in less of the cell than a flap.
+    /// Depth of a rolled rim relative to that of a flap.
     const ROLLED: f64 = 0.45;
-    /// Each side of a cigar is folded in from about half of the radius.
-    const CIGAR: f64 = 0.5;
+    /// Each side of a cell that is folded over is folded at half the radius.
+    const FOLDED_OVER: f64 = 0.5;
     let depth = match form {
         FoldForm::Flap => depth,
         FoldForm::Roll => depth * ROLLED,
-        FoldForm::Cigar => CIGAR,
+        FoldForm::FoldedOver => FOLDED_OVER,
     };
     Some(Fold { form, direction_deg, depth, radius_um })
 }

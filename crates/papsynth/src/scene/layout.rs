@@ -1,85 +1,160 @@
-//! From a layout to a weight map, and from that to places that keep their distance.
+//! Draws the weight map of a layout, and places cells with a minimum distance.
 
 use rand_core::Rng;
 
 use crate::error::Cause;
 use crate::random;
 use crate::recipe::section::named;
-use crate::recipe::{Labels, Layout};
+use crate::recipe::{Clusters, Labels, Layout};
 
-use super::view::{FieldNumbers, View};
+use super::view::{FieldNumbers, Region, View};
 use super::weight::{Sampler, WeightMap};
 
-/// Size of a pixel of a weight map, µm: far below the size of a cell.
+/// Pixel size of a weight map, µm: far below the size of a cell.
 const PITCH_UM: f64 = 4.0;
 
-/// Largest number of pixels along a side of a weight map, for huge fields.
+/// Largest number of pixels along a side of a weight map.
 const MOST_PIXELS: usize = 2048;
 
-/// Most tries that a whole field may be expected to take.
+/// Width of the margin of a field, µm: about the largest radius of most cells.
+pub(crate) const MARGIN_UM: f64 = 60.0;
+
+/// Largest accepted number of expected tries for a field.
 const MOST_TRIES: f64 = 1e9;
 
-/// Share of a plane that discs cover when no further one fits, if each was placed at random:
+/// Fraction of a plane that randomly placed discs cover when no further disc fits:
 /// random sequential adsorption jams at 0.547 (Feder 1980, doi:10.1016/0022-5193(80)90358-6).
 const JAMMED: f64 = 0.547;
 
-pub(super) fn weight_map(
+/// Weights of the places of a field, and of a margin around it.
+///
+/// Objects of a density also have centres in the margin, so that the coverage at the border of the image is that of its centre.
+pub(super) struct Weights {
+    /// The field.
+    pub(super) field: Region,
+    /// The field and its margin.
+    pub(super) region: Region,
+    of_field: WeightMap,
+    of_region: WeightMap,
+    /// Area that a density is multiplied by, mm².
+    pub(super) populated_mm2: f64,
+}
+
+/// Draws the weights of a field.
+pub(super) fn weights(
     layout: &Layout,
     given: Option<&WeightMap>,
     view: View,
-    field: &FieldNumbers,
-) -> Result<WeightMap, Cause> {
-    let [width_um, height_um] = view.size_um();
-    let pixels = |length: f64| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS);
-    let (width, height) = (pixels(width_um), pixels(height_um));
-    let place = move |[x, y]: [f64; 2]| [x * width_um, y * height_um];
-    match layout {
-        Layout::Uniform {} => Ok(WeightMap { width: 1, weights: vec![1.0] }),
-        Layout::Clusters(layout) => {
-            let count = field.count(named!("layout", layout.count)).max(1);
-            let outside = field.draw(named!("layout", layout.outside));
-            let clusters: Vec<[f64; 3]> = (0..count as u64)
-                .map(|cluster| {
-                    let mut rng = field.key.stream("field", cluster, "layout.cluster");
-                    let radius = layout.radius_um.draw(&mut rng);
-                    [random::between(0.0, width_um, &mut rng), random::between(0.0, height_um, &mut rng), radius]
-                })
-                .collect();
-            let distances = nearest_of(&clusters, [width, height], [width_um, height_um]);
-            let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
-            Ok(WeightMap { width, weights: distances.iter().map(weight).collect() })
+    numbers: &FieldNumbers,
+) -> Result<Weights, Cause> {
+    let field = Region::of(view);
+    let pixels = field.size_um.map(|length| random::count((length / PITCH_UM).ceil()).clamp(1, MOST_PIXELS));
+    let pitch_um = [0, 1].map(|axis| field.size_um[axis] / pixels[axis] as f64);
+    let margin_px = pitch_um.map(|pitch| random::count((MARGIN_UM / pitch).ceil()));
+    let region = field.with_margin([0, 1].map(|axis| margin_px[axis] as f64 * pitch_um[axis]));
+    let size = [0, 1].map(|axis| pixels[axis] + 2 * margin_px[axis]);
+    // A given map has no margin.
+    let of_map = |map: WeightMap| {
+        let (of_field, of_region, populated_mm2) = (map.clone(), map, field.area_mm2());
+        Weights { field, region: field, of_field, of_region, populated_mm2 }
+    };
+    let (of_region, is_stationary) = match layout {
+        Layout::Uniform {} => {
+            let even = WeightMap { width: 1, weights: vec![1.0] };
+            return Ok(Weights {
+                field,
+                region,
+                of_field: even.clone(),
+                of_region: even,
+                populated_mm2: region.area_mm2(),
+            });
         }
-        Layout::Swath(layout) => {
-            let band = field.draw(named!("layout", layout.width_um));
-            let outside = field.draw(named!("layout", layout.outside));
-            let mut rng = field.key.stream("field", 0, "layout.swath");
+        Layout::Clusters(layout) => (cluster_map(layout, field, region, size, numbers), layout.count.is_density()),
+        Layout::Band(layout) => {
+            let band = numbers.draw(named!("layout", layout.width_um));
+            let outside = numbers.draw(named!("layout", layout.outside));
+            let mut rng = numbers.key.stream("field", 0, "layout.band");
             let angle = random::direction(&mut rng);
             let (nx, ny) = (libm::cos(angle), libm::sin(angle));
-            let through = place([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
-            Ok(WeightMap::from_fn(width, height, |at| {
-                let [x, y] = place(at);
+            let through = field.at([random::between(0.25, 0.75, &mut rng), random::between(0.25, 0.75, &mut rng)]);
+            let map = WeightMap::from_fn(size[0], size[1], |at| {
+                let [x, y] = region.at(at);
                 let distance = ((x - through[0]) * nx + (y - through[1]) * ny) / band;
                 outside + (1.0 - outside) * libm::exp(-0.5 * distance * distance)
-            }))
+            });
+            (map, false)
         }
-        Layout::Map { path } => given.cloned().ok_or_else(|| not_given(path, "an image")),
+        Layout::DensityMap { path } => return given.cloned().ok_or_else(|| not_given(path, "an image")).map(of_map),
         Layout::Labels(layout) => {
             let map = given.ok_or_else(|| not_given(&layout.path, "a label image"))?;
-            let smooth = field.draw(named!("layout", layout.smooth_um));
-            smoothed(map, smooth * map.width as f64 / width_um)
+            let smooth = numbers.draw(named!("layout", layout.smooth_um));
+            return smoothed(map, smooth * map.width as f64 / field.size_um[0]).map(of_map);
         }
-    }
+    };
+    let of_field = cropped(&of_region, margin_px, pixels);
+    let sum = |map: &WeightMap| map.weights.iter().map(|w| f64::from(*w)).sum::<f64>();
+    let populated_mm2 = if is_stationary {
+        region.area_mm2()
+    } else {
+        // So that the mean density within the field is that of the recipe.
+        field.area_mm2() * sum(&of_region) / sum(&of_field).max(f64::MIN_POSITIVE)
+    };
+    Ok(Weights { field, region, of_field, of_region, populated_mm2 })
 }
 
-/// The square of the distance of each pixel's middle to the nearest of some clusters, in radii of the cluster; infinite far from all.
+/// Draws the weights of round clusters. Clusters of a density also have centres beyond the margin.
+fn cluster_map(
+    layout: &Clusters,
+    field: Region,
+    region: Region,
+    [width, height]: [usize; 2],
+    numbers: &FieldNumbers,
+) -> WeightMap {
+    /// Distance beyond the margin at which clusters still have centres, in their largest radius, and at most.
+    const RADII: f64 = 2.0;
+    const FARTHEST_UM: f64 = 500.0;
+    let area = if layout.count.is_density() {
+        region.with_margin([(RADII * layout.radius_um.bounds()[1]).min(FARTHEST_UM); 2])
+    } else {
+        field
+    };
+    let count = numbers.number_of(named!("layout", layout.count), area.area_mm2());
+    let outside = numbers.draw(named!("layout", layout.outside));
+    let clusters: Vec<[f64; 3]> = (0..count)
+        .map(|cluster| {
+            let mut rng = numbers.key.stream("field", cluster, "layout.cluster");
+            let radius = layout.radius_um.draw(&mut rng);
+            let [x, y] = area.at([random::uniform(&mut rng), random::uniform(&mut rng)]);
+            [x - region.low_um[0], y - region.low_um[1], radius]
+        })
+        .collect();
+    let distances = nearest_of(&clusters, [width, height], region.size_um);
+    let is_empty = distances.iter().all(|square| square.is_infinite());
+    // Without a cluster in reach, all places have the same weight.
+    let outside = if is_empty { 1.0 } else { outside };
+    let weight = |square: &f64| (outside + (1.0 - outside) * libm::exp(-0.5 * square)) as f32;
+    WeightMap { width, weights: distances.iter().map(weight).collect() }
+}
+
+/// The part of a map that starts at a column and a row; even if all its weights are zero.
+fn cropped(map: &WeightMap, first: [usize; 2], size: [usize; 2]) -> WeightMap {
+    let rows = map.weights.chunks_exact(map.width).skip(first[1]).take(size[1]);
+    let weights: Vec<f32> = rows.flat_map(|row| &row[first[0]..first[0] + size[0]]).copied().collect();
+    if weights.iter().all(|weight| *weight <= 0.0) {
+        return WeightMap { width: 1, weights: vec![1.0] };
+    }
+    WeightMap { width: size[0], weights }
+}
+
+/// Returns the squared distance of the centre of each pixel to the nearest cluster, in radii of the cluster; infinite far from all.
 ///
-/// Each cluster is looked at only round itself, so that the time grows with the field and not with its square.
+/// Each cluster changes only the pixels around it, so that the time is proportional to the area.
 fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64; 2]) -> Vec<f64> {
-    /// How many radii from its middle a cluster ends: with 10⁻⁸ of its weight.
+    /// Radius of influence of a cluster, in its radii: its weight is 10⁻⁸ there.
     const REACH: f64 = 6.0;
     let mut nearest = vec![f64::INFINITY; width * height];
     for [x, y, radius] in clusters {
-        // From a pixel to a distance from the cluster, and to pixels within reach.
+        // The pixels in reach, and the distance of a pixel from the cluster.
         let along = |middle: f64, pixels: usize, length: f64| {
             let pitch = length / pixels as f64;
             let pixel = |at: f64| random::count((at / pitch).clamp(0.0, pixels as f64));
@@ -99,9 +174,9 @@ fn nearest_of(clusters: &[[f64; 3]], [width, height]: [usize; 2], size_um: [f64;
     nearest
 }
 
-/// What is wrong with what a layout names, before anything is drawn.
+/// Checks the file of a layout.
 pub(crate) fn check_layout(layout: &Layout, given: Option<&WeightMap>) -> Result<(), Cause> {
-    let (Layout::Map { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
+    let (Layout::DensityMap { path } | Layout::Labels(Labels { path, .. })) = layout else { return Ok(()) };
     let map = given.ok_or_else(|| not_given(path, "an image"))?;
     map.sampler().map(|_| ()).map_err(|cause| Cause::Map { path: path.clone(), cause: Box::new(cause) })
 }
@@ -110,7 +185,7 @@ fn not_given(path: &str, what: &'static str) -> Cause {
     Cause::NotGiven { path: path.to_owned(), what }
 }
 
-/// A map blurred by a Gaussian, since a cell's middle may lie beside a given label.
+/// Returns a map blurred by a Gaussian, because the centre of a cell may be next to a given label.
 fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
     map.sampler()?;
     let kernel = optics_psf::Gaussian::new(sigma_px).map_err(Cause::Smoothing)?;
@@ -119,8 +194,8 @@ fn smoothed(map: &WeightMap, sigma_px: f64) -> Result<WeightMap, Cause> {
 
 /// Places cells one after the other, none nearer to another than a given distance.
 pub(super) struct Places {
-    sampler: Sampler,
-    size_um: [f64; 2],
+    /// The field, and the field with its margin.
+    areas: [(Sampler, Region); 2],
     spacing_um: f64,
     taken: Vec<[f64; 2]>,
     /// Indices of `taken` by square of the field, squares as wide as the spacing.
@@ -128,33 +203,69 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Prepares to place `count` cells, or says why they will not fit: before the search starts.
-    pub(super) fn new(map: &WeightMap, count: usize, spacing_um: f64, view: View) -> Result<Self, Cause> {
-        let sampler = map.sampler()?;
-        let size_um = view.size_um();
-        let area = size_um[0] * size_um[1] * sampler.possible_share();
-        let disc = core::f64::consts::FRAC_PI_4 * spacing_um * spacing_um;
-        // A cell at the edge of what is possible takes only part of its disc from it.
-        let margin = 1.0 + spacing_um / area.sqrt();
-        let room = JAMMED * area * margin * margin / disc;
-        if count > 1 && disc > 0.0 && count as f64 > room {
-            return Err(Cause::NoRoom { count, spacing_um, area_um2: area, room });
+    pub(super) fn new(weights: &Weights, spacing_um: f64) -> Result<Self, Cause> {
+        let areas = [(weights.of_field.sampler()?, weights.field), (weights.of_region.sampler()?, weights.region)];
+        Ok(Self { areas, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
+    }
+
+    /// Returns about how many cells fit into the field, or into the field and its margin.
+    fn room(&self, in_margin: bool) -> f64 {
+        let disc = core::f64::consts::FRAC_PI_4 * self.spacing_um * self.spacing_um;
+        let area = self.area_um2(in_margin);
+        // A cell at the edge of the possible places takes only part of its disc from them.
+        let margin = 1.0 + self.spacing_um / area.sqrt();
+        if disc > 0.0 { (JAMMED * area * margin * margin / disc).max(1.0) } else { f64::INFINITY }
+    }
+
+    /// Area where cells may lie, µm².
+    fn area_um2(&self, in_margin: bool) -> f64 {
+        let (sampler, region) = &self.areas[usize::from(in_margin)];
+        region.size_um[0] * region.size_um[1] * sampler.possible_share()
+    }
+
+    /// Returns the number of cells in the field, of those in the field and of those in the field and its margin.
+    fn count_in_field(&self, in_field: usize, in_both: usize) -> f64 {
+        in_field as f64 + in_both as f64 * (self.area_um2(false) / self.area_um2(true)).min(1.0)
+    }
+
+    /// Checks whether so many cells fit into the field, and into the field and its margin, before the search starts.
+    ///
+    /// # Errors
+    /// If they do not: the fraction of them that fits.
+    pub(super) fn check(&self, in_field: usize, in_both: usize) -> Result<(), f64> {
+        let fraction = (self.room(false) / self.count_in_field(in_field, in_both))
+            .min(self.room(true) / (in_field + in_both) as f64);
+        if fraction < 1.0 { Err(fraction) } else { Ok(()) }
+    }
+
+    /// Returns the error about cells that do not fit.
+    pub(super) fn no_room(&self, in_field: usize, in_both: usize) -> Cause {
+        Cause::NoRoom {
+            count: random::count(self.count_in_field(in_field, in_both)),
+            spacing_um: self.spacing_um,
+            area_um2: self.area_um2(false),
+            room: self.room(false),
         }
-        let tries = sampler.expected_tries() * count as f64;
+    }
+
+    /// Checks the expected number of tries.
+    pub(super) fn check_tries(&self, count: usize, in_margin: bool) -> Result<(), Cause> {
+        let tries = self.areas[usize::from(in_margin)].0.expected_tries() * count as f64;
         if tries > MOST_TRIES {
             return Err(Cause::TooUneven { count, tries, most: MOST_TRIES });
         }
-        Ok(Self { sampler, size_um, spacing_um, taken: Vec::new(), squares: std::collections::BTreeMap::new() })
+        Ok(())
     }
 
-    /// The next place, µm.
-    pub(super) fn next<R: Rng + ?Sized>(&mut self, rng: &mut R) -> Result<[f64; 2], Cause> {
-        /// Accepted candidates that may turn out too near to others before the search is given up.
+    /// Returns the next place, µm: in the field, or in the field and its margin.
+    pub(super) fn next<R: Rng + ?Sized>(&mut self, in_margin: bool, rng: &mut R) -> Result<[f64; 2], Cause> {
+        /// Largest number of accepted candidates that are too near to others.
         const CROWDED: usize = 20_000;
         let mut crowded = 0;
+        let (sampler, region) = &self.areas[usize::from(in_margin)];
         while crowded < CROWDED {
-            let Some([x, y]) = self.sampler.try_place(rng) else { continue };
-            let place = [x * self.size_um[0], y * self.size_um[1]];
+            let Some(place) = sampler.try_place(rng) else { continue };
+            let place = region.at(place);
             if self.is_free(place) {
                 let square = self.square(place);
                 self.squares.entry(square).or_default().push(self.taken.len());
@@ -193,7 +304,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn clusters_weigh_what_the_nearest_does() {
+    fn the_weight_is_that_of_the_nearest_cluster() {
         let clusters = [[100.0, 40.0, 30.0], [300.0, 200.0, 12.0], [-20.0, 260.0, 25.0], [390.0, 90.0, 60.0]];
         let (size, size_um) = ([101, 77], [404.0, 308.0]);
         let found = nearest_of(&clusters, size, size_um);

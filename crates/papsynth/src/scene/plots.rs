@@ -1,8 +1,8 @@
-//! What lies on a whole slide, square by square.
+//! The objects of a whole slide, square by square.
 //!
-//! A slide is divided into plots. What a plot holds follows from the slide's key and the plot's number alone: how many objects are
-//! tried, where each lies, and whether it stays there, by the density at its place, which is a function of the place.
-//! So any part of a slide can be drawn alone, and a slide is part of every larger one.
+//! A slide is divided into plots. The objects of a plot depend only on the key of the slide and the number of the plot: the number
+//! of tries, the place of each try, and whether it is accepted, by the density at its place, which is a function of the place.
+//! Any part of a slide can be drawn alone, and a slide is a part of each larger slide.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -16,8 +16,8 @@ use super::draw::{empty, pixel_um, strew};
 use super::field::{Object, Plot, Scene};
 use super::groups::Groups;
 use super::stain::FieldStain;
-use super::view::{FieldNumbers, View};
-use crate::debris::ground::{Sieve, near};
+use super::view::{FieldNumbers, Region, View};
+use crate::debris::placement::{PlotDensity, near};
 use crate::error::Cause;
 use crate::key::Key;
 use crate::model::Model;
@@ -26,52 +26,52 @@ use crate::recipe::scan::SceneDeposit;
 use crate::recipe::section::named;
 use crate::recipe::{Clusters as ClusterLayout, Deposit as DepositSection, GroupForm, Layout, Number, Recipe};
 
-/// Side of a plot in pixels.
+/// Size of a plot, pixels.
 pub(crate) const PLOT_PX: i64 = 1024;
 
-/// Plots beyond the upper and left border of a slide, whose objects may reach into it.
+/// Number of plots beyond the upper and left border of a slide whose objects may reach into the slide.
 pub(crate) const BEYOND: i64 = 8;
 
-/// Bits of a plot's column and row in its number, and of an object in its id.
+/// Bits of the column and the row of a plot in its number, and of an object in its id.
 const SIDE_BITS: u32 = 10;
 const OBJECT_BITS: u32 = 12;
 
-/// Plots whose objects are remembered.
-const REMEMBERED: usize = 192;
+/// Number of plots whose objects are cached.
+const CACHED_PLOTS: usize = 192;
 
-/// What lies on one slide.
+/// The objects of a slide.
 #[derive(Debug)]
 pub(crate) struct Population {
     recipe: Recipe,
     model: Model,
     key: Key,
     pixel_um: f64,
-    /// Plots that are as large as a field.
+    /// Area of a plot relative to that of a field.
     share: f64,
     spacing_um: f64,
     deposit: Deposit,
-    scatter: Scatter,
+    places: Places,
     relief: Relief,
-    sown: Memory,
-    plots: Memory,
+    sown: PlotCache,
+    plots: PlotCache,
 }
 
-/// Where the layout lets cells lie: anywhere, or in clusters.
+/// The layout of the cells of a slide: uniform, or in clusters.
 #[derive(Debug)]
-struct Scatter {
+struct Places {
     clusters: Option<ClusterLayout>,
-    /// Weight of the places outside all clusters.
+    /// Weight outside the clusters.
     outside: f64,
-    /// Plots that a cluster reaches beyond its own.
+    /// Number of plots that a cluster reaches beyond its own.
     reach: i64,
     /// Mean weight.
     mean: f64,
 }
 
-/// A cluster's middle and radius, µm.
+/// Centre and radius of a cluster, µm.
 type Cluster = [f64; 3];
 
-/// How deep a slide's cells lie: the noise of a field's relief, as a function of the place.
+/// Depth of the cells of a slide: the noise of the relief of a field, as a function of the place.
 #[derive(Debug)]
 struct Relief {
     noise: Fractal,
@@ -79,14 +79,14 @@ struct Relief {
     scale_um: f64,
 }
 
-/// Objects of the plots that were worked out last, by row and column.
+/// Cached objects of plots, by row and column.
 #[derive(Debug, Default)]
-struct Memory {
+struct PlotCache {
     known: Mutex<BTreeMap<[i64; 2], Arc<Vec<Object>>>>,
 }
 
-impl Memory {
-    /// What was made of a plot, or is made now: the same, however often.
+impl PlotCache {
+    /// Returns the cached objects of a plot, or the result of `make`.
     fn get<E>(&self, at: [i64; 2], make: impl FnOnce() -> Result<Vec<Object>, E>) -> Result<Arc<Vec<Object>>, E> {
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(found) = known().get(&[at[1], at[0]]) {
@@ -95,8 +95,8 @@ impl Memory {
         let made = Arc::new(make()?);
         let mut known = known();
         known.insert([at[1], at[0]], Arc::clone(&made));
-        if known.len() > REMEMBERED {
-            // Slides are worked through from the top: the first row is farthest behind.
+        if known.len() > CACHED_PLOTS {
+            // Slides are generated from the top: the first row is needed least.
             known.pop_first();
         }
         Ok(made)
@@ -104,7 +104,7 @@ impl Memory {
 }
 
 impl Population {
-    /// The population of a slide whose own key is given, and the slide without anything on it.
+    /// Returns the population of the slide with this key, and the scene of the empty slide.
     pub(crate) fn new(recipe: &Recipe, model: &Model, key: Key) -> Result<(Self, Scene), Cause> {
         let slide = FieldNumbers { key };
         let stain = FieldStain::of_slide(&recipe.stain, &slide);
@@ -122,20 +122,20 @@ impl Population {
             share: (PLOT_PX * PLOT_PX) as f64 / field_px,
             spacing_um: slide.draw(named!(recipe.slide.spacing_um)),
             deposit: Deposit::draw(&recipe.scan.deposit, &slide),
-            scatter: Scatter { clusters: None, outside: 1.0, reach: 0, mean: 1.0 },
+            places: Places { clusters: None, outside: 1.0, reach: 0, mean: 1.0 },
             relief: Relief::new(
                 slide.draw(named!(recipe.slide.depth_um)),
-                slide.draw(named!(recipe.slide.relief_um)),
+                slide.draw(named!(recipe.slide.depth_scale_um)),
                 relief_key,
             ),
-            sown: Memory::default(),
-            plots: Memory::default(),
+            sown: PlotCache::default(),
+            plots: PlotCache::default(),
         };
-        population.scatter(&slide)?;
+        population.place_clusters(&slide)?;
         Ok((population, scene))
     }
 
-    /// Middle of the deposit, µm.
+    /// Returns the centre of the deposit, µm.
     pub(crate) fn middle_um(&self) -> [f64; 2] {
         self.deposit.centre_um()
     }
@@ -144,11 +144,15 @@ impl Population {
         PLOT_PX as f64 * self.pixel_um
     }
 
-    /// How the layout lets cells lie on a slide.
-    fn scatter(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
-        /// Most plots that a cluster may reach beyond its own.
+    fn plot_mm2(&self) -> f64 {
+        self.side_um() * self.side_um() * 1e-6
+    }
+
+    /// Prepares the layout.
+    fn place_clusters(&mut self, slide: &FieldNumbers) -> Result<(), Cause> {
+        /// Largest number of plots that a cluster may reach beyond its own.
         const FARTHEST: i64 = 4;
-        /// Places, along a side, at which the mean weight is taken, and plots that they lie in.
+        /// Number of places along a side for the mean weight, and of plots that contain them.
         const PLACES: i64 = 96;
         const ACROSS: i64 = 12;
         let layout = match &self.recipe.layout {
@@ -162,8 +166,8 @@ impl Population {
             return Err(Cause::WideClusters(largest, FARTHEST as f64 * self.side_um() / CLUSTER_REACH));
         }
         let outside = slide.draw(named!("layout", layout.outside));
-        self.scatter = Scatter { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
-        // The mean over a part of the slide that does not depend on the slide's size.
+        self.places = Places { clusters: Some(layout.clone()), outside, reach, mean: 1.0 };
+        // The mean over an area that does not depend on the size of the slide.
         let mut sum = 0.0;
         for row in 0..ACROSS {
             for column in 0..ACROSS {
@@ -177,19 +181,19 @@ impl Population {
                 }
             }
         }
-        self.scatter.mean = sum / (PLACES * PLACES) as f64;
+        self.places.mean = sum / (PLACES * PLACES) as f64;
         Ok(())
     }
 
-    /// The clusters that reach into a plot.
+    /// Returns the clusters that reach into a plot.
     fn clusters(&self, at: [i64; 2]) -> Vec<Cluster> {
-        let Scatter { clusters: Some(layout), reach, .. } = &self.scatter else { return Vec::new() };
+        let Places { clusters: Some(layout), reach, .. } = &self.places else { return Vec::new() };
         let mut clusters = Vec::new();
         for row in at[1] - reach..=at[1] + reach {
             for column in at[0] - reach..=at[0] + reach {
                 let field = FieldNumbers { key: self.key.plot(number([column, row])) };
                 let count = named!("layout", layout.count);
-                for cluster in 0..field.whole(count.0, field.draw(count) * self.share) {
+                for cluster in 0..field.number_on_slide(count, [self.plot_mm2(), self.share], 1.0) {
                     let mut rng = field.key.stream("field", cluster, "layout.cluster");
                     let radius = layout.radius_um.draw(&mut rng);
                     let place = [column, row].map(|at| (at as f64 + random::uniform(&mut rng)) * self.side_um());
@@ -200,13 +204,13 @@ impl Population {
         clusters
     }
 
-    /// The cells of a plot, but for those that lie too near to one of another plot.
+    /// Draws the cells of a plot, including those too near to cells of other plots.
     fn sow(&self, at: [i64; 2]) -> Vec<Object> {
         let field = FieldNumbers { key: self.key.plot(number(at)) };
         let slide = FieldNumbers { key: self.key };
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let clusters = self.clusters(at);
-        let Scatter { outside, mean, .. } = self.scatter;
+        let Places { outside, mean, .. } = self.places;
         let side_um = self.side_um();
         let global = |place: [f64; 2]| [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
         let stays = |place: [f64; 2]| weight(&clusters, outside, place) * self.deposit.density(place) / DENSEST;
@@ -214,13 +218,13 @@ impl Population {
         let mut first: Vec<[f64; 2]> = Vec::new();
         let (mut tried, mut begun) = (0_u64, 0);
         for (name, mix) in &self.recipe.cells {
-            // The engine was made with this model and recipe.
+            // The engine has checked that the model has the class.
             let kind = Class { name, mix, class: &self.model.classes[name] };
             let path = format!("cells.{name}.count");
-            let alone = mix.group.form == GroupForm::Alone;
+            let alone = mix.group.form == GroupForm::Single;
             let size = if alone { 1.0 } else { mean_of(&mix.group.size) };
-            let wanted = field.draw((&path, &mix.count)) * self.share * DENSEST / mean / size;
-            for _ in 0..field.whole(&path, wanted) {
+            let factor = DENSEST / mean / size;
+            for _ in 0..field.number_on_slide((&path, &mix.count), [self.plot_mm2(), self.share], factor) {
                 let mut rng = field.key.stream("cell", tried, "origin");
                 let origin = [0, 1].map(|_| random::between(0.0, side_um, &mut rng));
                 let number = tried;
@@ -232,7 +236,7 @@ impl Population {
                 }
                 first.push(origin);
                 let mut groups = Groups::new(&mix.group, begun);
-                // Members of a group are numbered beyond all that are tried.
+                // The numbers of members of a group are above those of all tries.
                 let mut member = 0;
                 loop {
                     let number = if member == 0 { number } else { number << 16 | 1 << 56 | member };
@@ -257,7 +261,7 @@ impl Population {
         sown
     }
 
-    /// Everything whose middle was drawn in a plot, in the order of its ids; places are counted from the plot's corner.
+    /// Returns the objects of a plot, by id. Places are relative to the corner of the plot.
     pub(crate) fn plot(&self, at: [i64; 2]) -> Result<Arc<Vec<Object>>, Cause> {
         self.plots.get(at, || self.draw(at))
     }
@@ -269,7 +273,7 @@ impl Population {
         let stain = FieldStain::of_slide(&self.recipe.stain, &slide);
         let side_um = self.side_um();
         let mut objects = self.sown(at).as_ref().clone();
-        // Of two cells of neighbouring plots that lie too near to each other, that of the plot with the larger number goes.
+        // Of two cells of neighbouring plots that are too near to each other, that of the plot with the larger number is removed.
         let mut taken = Vec::new();
         for [x, y] in [[-1, -1], [0, -1], [1, -1], [-1, 0]] {
             let corner = [x, y].map(|step: i64| step as f64 * side_um);
@@ -280,15 +284,14 @@ impl Population {
         objects.retain(|cell| {
             cell.cluster > 0 || !taken.iter().any(|other| near(*other, cell.centre_um, self.spacing_um))
         });
-        let (width, height) = (PLOT_PX as usize, PLOT_PX as usize);
-        let view = View { width, height, pixel_um: self.pixel_um };
+        let region = Region { low_um: [0.0; 2], size_um: [side_um; 2] };
         let stays = |place: [f64; 2]| {
             let place = [0, 1].map(|axis| place[axis] + at[axis] as f64 * side_um);
             self.deposit.density(place) / DENSEST
         };
-        // Those that stay anywhere are tried as often as there are some, the others more often.
-        let sieve = Sieve { share: self.share, most: DENSEST, stays: &stays };
-        strew(&self.recipe.debris, view, &field, &stain, Some(sieve), &mut objects);
+        // Objects on the glass are not rejected, so that they need no additional tries.
+        let plot_density = PlotDensity { area_in_fields: self.share, max_density: DENSEST, keep_probability: &stays };
+        strew(&self.recipe.debris, [region; 2], &field, &stain, Some(plot_density), &mut objects);
         let most = (1 << OBJECT_BITS) - 2;
         if objects.len() > most {
             return Err(Cause::FullPlot { side_px: PLOT_PX, found: objects.len(), most });
@@ -304,10 +307,10 @@ impl Population {
     }
 }
 
-/// How many radii from its middle a cluster ends.
+/// Radius of influence of a cluster, in its radii.
 const CLUSTER_REACH: f64 = 4.3;
 
-/// The weight of a place, from `outside` to 1.
+/// Returns the weight of a place, from `outside` to 1.
 fn weight(clusters: &[Cluster], outside: f64, [x, y]: [f64; 2]) -> f64 {
     let square = |[cx, cy, radius]: &Cluster| ((x - cx) * (x - cx) + (y - cy) * (y - cy)) / (radius * radius);
     let nearest = clusters.iter().map(square).fold(f64::INFINITY, f64::min);
@@ -315,13 +318,13 @@ fn weight(clusters: &[Cluster], outside: f64, [x, y]: [f64; 2]) -> f64 {
     outside + (1.0 - outside) * share
 }
 
-/// The number of a plot on its slide.
+/// Returns the number of a plot on its slide.
 fn number([column, row]: [i64; 2]) -> u32 {
     let side = |at: i64| (at + BEYOND).clamp(0, (1 << SIDE_BITS) - 1) as u32;
     side(row) << SIDE_BITS | side(column)
 }
 
-/// The mean of a number as it is drawn.
+/// Returns the mean of a drawn count of at least 1.
 fn mean_of(number: &Number) -> f64 {
     const DRAWS: u64 = 256;
     let mut rng = Key { seed: 0, index: 0 }.stream("slide", 0, "mean");
@@ -330,23 +333,23 @@ fn mean_of(number: &Number) -> f64 {
 
 impl Relief {
     fn new(depth_um: f64, cell_um: f64, key: u64) -> Self {
-        /// How far the noise of a field reaches from its lowest to its highest place, in the mean.
+        /// Mean range of the noise over a field.
         const RANGE: f64 = 1.1;
         let params = FractalParams { octaves: 2, ..FractalParams::default() };
         let noise = Fractal::new(&params, key).expect("two octaves of noise are valid");
         Self { noise, cell_um, scale_um: depth_um / RANGE }
     }
 
-    /// Depth at a place of the slide, µm.
+    /// Returns the depth at a place of the slide, µm.
     fn at(&self, [x, y]: [f64; 2]) -> f64 {
         self.scale_um * f64::from(self.noise.at(x / self.cell_um, y / self.cell_um))
     }
 }
 
-/// Densest patch, relative to the mean.
+/// Largest density, relative to the mean.
 const DENSEST: f64 = 2.5;
 
-/// The round deposit of a slide, its numbers drawn.
+/// The round deposit of a slide, with drawn numbers.
 #[derive(Debug)]
 struct Deposit {
     drawn: SceneDeposit,
@@ -363,22 +366,30 @@ impl Deposit {
         }
     }
 
-    /// Its middle, µm.
+    /// Returns its centre, µm.
     fn centre_um(&self) -> [f64; 2] {
         [self.drawn.x_um, self.drawn.y_um]
     }
 
-    /// Density at a place of the slide, µm, relative to the mean within the deposit; at most [`DENSEST`].
+    /// Returns the density at a place of the slide, relative to the mean inside the deposit; at most [`DENSEST`].
     fn density(&self, [x, y]: [f64; 2]) -> f64 {
         /// Standard deviation of the noise.
         const SPREAD: f64 = 0.27;
-        let SceneDeposit { x_um, y_um, radius_um, edge_um, unevenness, patch_um, outside } = self.drawn;
+        let SceneDeposit {
+            x_um,
+            y_um,
+            radius_um,
+            edge_um,
+            density_variation: sd,
+            density_scale_um,
+            outside_density: outside,
+        } = self.drawn;
         let (dx, dy) = (x - x_um, y - y_um);
         let inside = (radius_um - (dx * dx + dy * dy).sqrt()) / edge_um;
         let share = (0.5 + 0.5 * inside).clamp(0.0, 1.0);
         let share = share * share * (3.0 - 2.0 * share);
-        let noise = f64::from(self.patches.at(x / patch_um, y / patch_um)) / SPREAD;
-        let uneven = libm::exp(unevenness * (noise - 0.5 * unevenness)).min(DENSEST);
+        let noise = f64::from(self.patches.at(x / density_scale_um, y / density_scale_um)) / SPREAD;
+        let uneven = libm::exp(sd * (noise - 0.5 * sd)).min(DENSEST);
         uneven * (outside + (1.0 - outside) * share)
     }
 }

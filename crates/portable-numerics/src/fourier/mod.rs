@@ -1,7 +1,9 @@
-//! Fourier transforms of many sequences side by side, one in each lane of a vector.
+//! Batched Fourier transforms: many sequences at once, one in each vector lane.
 //!
-//! The forward transform is Σ xⱼ exp −2πi jk/n, without a factor; the inverse is the forward one of the reversed sequence.
-//! Any length is transformed; prime factors above 5 take time in proportion to themselves. [`LaneFft::process`] transforms many sequences,
+//! The forward transform is Σ xⱼ exp −2πi jk/n, without a factor; the inverse is the forward transform of the
+//! reversed sequence.
+//! Any length is accepted; the time of a pass grows with the prime factor above 5.
+//! [`LaneFft::process`] transforms many sequences,
 //! [`LaneFft::forward`] and [`LaneFft::inverse`] a single one, [`ComplexPlane`] an image.
 //!
 //! ```
@@ -30,13 +32,13 @@ pub use transform::{LaneFft, Plans};
 pub trait Real:
     Copy + Debug + Default + Send + Sync + Add<Output = Self> + AddAssign + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// The nearest one.
+    /// Returns the nearest number of this precision.
     fn nearest(value: f64) -> Self;
 }
 
 impl Real for f32 {
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "the nearest one is meant")]
+    #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest f32")]
     fn nearest(value: f64) -> Self {
         value as Self
     }
@@ -49,17 +51,17 @@ impl Real for f64 {
     }
 }
 
-/// A complex number of each of `N` sequences: real parts, imaginary parts. A cache line each is best: 16 in single precision,
-/// 8 in double.
+/// One complex number of each of `N` sequences: real parts, then imaginary parts. Fastest if each part fills a cache
+/// line: 16 in single precision, 8 in double.
 pub type Lanes<T, const N: usize> = [[T; N]; 2];
 
 /// Zeros in single precision, sixteen lanes.
 pub const ZERO: Lanes<f32, 16> = [[0.0; 16]; 2];
 
-/// As many sequences as numbers of each.
+/// A square block: `N` sequences of `N` numbers.
 pub type Square<T, const N: usize> = [[T; N]; N];
 
-/// Rows become columns. Inlined, so that it is compiled for the instruction set of its caller.
+/// Returns the transpose. Inlined, so that it is compiled for the caller's instruction set.
 #[inline(always)]
 #[must_use]
 pub fn transposed<T: Real, const N: usize>(from: &Square<T, N>) -> Square<T, N> {

@@ -1,4 +1,4 @@
-//! Stockham's transform: no sequence is ever shuffled, and the order of operations is the same on every machine.
+//! Stockham's transform, which needs no bit reversal. The order of operations is the same on every machine.
 
 use core::f64::consts::TAU;
 use std::collections::BTreeMap;
@@ -8,8 +8,8 @@ use multiversion::multiversion;
 
 use super::{Lanes, Real};
 
-/// A forward transform of sequences of one length (Stockham's, with decimation in frequency). The inverse is the forward
-/// transform of the reversed sequence.
+/// A forward transform of sequences of one length (Stockham's, with decimation in frequency). The inverse is the
+/// forward transform of the reversed sequence.
 #[derive(Debug, Clone)]
 pub struct LaneFft<T> {
     len: usize,
@@ -19,12 +19,12 @@ pub struct LaneFft<T> {
 #[derive(Debug, Clone)]
 struct Pass<T> {
     radix: usize,
-    /// Butterflies, and numbers side by side that each of them takes.
     butterflies: usize,
+    /// Adjacent numbers that each butterfly processes.
     stride: usize,
-    /// Of each butterfly, exp −2πi pk/n for k = 1 … radix − 1.
+    /// exp −2πi pk/n of each butterfly p, for k = 1 … radix − 1.
     twiddles: Vec<[T; 2]>,
-    /// exp −2πi k/radix, where the radix has no code of its own.
+    /// exp −2πi k/radix, for a radix without specialised code.
     roots: Vec<[T; 2]>,
 }
 
@@ -48,13 +48,20 @@ impl<T: Real> LaneFft<T> {
         Self { len, passes }
     }
 
-    /// Transforms `values`, whose memory and that of `spare` may change places.
+    /// Transforms `values` in place. `spare` is working memory; the two buffers may be swapped.
     ///
     /// # Panics
     ///
     /// If `values` or `spare` has another length than the plan.
     pub fn process<const N: usize>(&self, values: &mut Vec<Lanes<T, N>>, spare: &mut Vec<Lanes<T, N>>) {
-        assert!(values.len() == self.len && spare.len() == self.len, "a sequence has another length than its plan");
+        let lens = [values.len(), spare.len()];
+        assert!(
+            lens == [self.len; 2],
+            "expected {} numbers, found {} of values and {} of spare",
+            self.len,
+            lens[0],
+            lens[1]
+        );
         if run(&self.passes, values, spare) {
             core::mem::swap(values, spare);
         }
@@ -73,11 +80,11 @@ impl<T: Real> LaneFft<T> {
         lanes.into_iter().map(|value| value.map(|[part]| part)).collect()
     }
 
-    /// Returns the sequence of which `values` is the transform, times its length.
+    /// Returns the inverse transform, times the length.
     ///
     /// # Panics
     ///
-    /// As [`Self::forward`].
+    /// If `values` has another length than the plan.
     #[must_use]
     pub fn inverse(&self, values: &[[T; 2]]) -> Vec<[T; 2]> {
         let mut reversed = self.forward(values);
@@ -88,23 +95,23 @@ impl<T: Real> LaneFft<T> {
     }
 }
 
-/// Transforms of all lengths that were asked for: each is planned once.
+/// A cache of transforms: each length is planned once.
 #[derive(Debug, Default)]
 pub struct Plans<T> {
-    made: Mutex<BTreeMap<usize, Arc<LaneFft<T>>>>,
+    plans: Mutex<BTreeMap<usize, Arc<LaneFft<T>>>>,
 }
 
 impl<T: Real> Plans<T> {
-    /// The plan for `len` numbers.
+    /// Returns the plan for `len` numbers.
     #[must_use]
     pub fn get(&self, len: usize) -> Arc<LaneFft<T>> {
-        // A plan is whole or absent, even if a thread has panicked.
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(made.entry(len).or_insert_with(|| Arc::new(LaneFft::new(len))))
+        // The map stays valid if a thread panics while it holds the lock.
+        let mut plans = self.plans.lock().unwrap_or_else(PoisonError::into_inner);
+        Arc::clone(plans.entry(len).or_insert_with(|| Arc::new(LaneFft::new(len))))
     }
 }
 
-/// The numbers exp −2πi k/n of one n, each from the sine and cosine of an eighth of a turn at most, which are computed once.
+/// The roots exp −2πi k/n of one n. Sines and cosines are computed once, for angles up to an eighth of a turn.
 struct Roots {
     n: usize,
     /// Sine and cosine of 2πi/8n.
@@ -117,7 +124,7 @@ impl Roots {
     }
 
     fn root<T: Real>(&mut self, k: usize) -> [T; 2] {
-        // Eighths of nths: whole, even where n is odd.
+        // In units of 1/(8n) turn, which are integers even if n is odd.
         let (n, k) = (self.n, 8 * (k % self.n));
         let is_below = k > 4 * n;
         let k = if is_below { 8 * n - k } else { k };
@@ -131,7 +138,7 @@ impl Roots {
     }
 }
 
-/// Says whether the spectrum is in `spare`.
+/// Runs all passes. Returns whether the spectrum is in `spare`.
 #[multiversion(targets = "simd")]
 fn run<T: Real, const N: usize>(passes: &[Pass<T>], values: &mut [Lanes<T, N>], spare: &mut [Lanes<T, N>]) -> bool {
     let (mut from, mut to) = (values, spare);
@@ -153,14 +160,14 @@ fn times<T: Real>([re, im]: [T; 2], w: [T; 2]) -> [T; 2] {
     [re * w[0] - im * w[1], re * w[1] + im * w[0]]
 }
 
-/// The pass of one radix. Its butterfly is a function of its own, whose arguments the compiler knows to lie apart, so that lanes
-/// become vectors: the twiddles, and a number and the place of a result of each run.
+/// Defines the pass of one radix. The butterfly is a separate function, because reference arguments cannot alias: the
+/// compiler then vectorises over the lanes.
 macro_rules! radix {
     ($radix:literal, $pass:ident($w:ident, $($j:literal $from:ident $to:ident),*) $body:block) => {
         #[inline(always)]
         fn $pass<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
             #[inline(always)]
-            #[allow(clippy::too_many_arguments, reason = "what lies apart is an argument each")]
+            #[allow(clippy::too_many_arguments, reason = "separate arguments cannot alias")]
             fn butterfly<T: Real, const N: usize>(
                 $w: &[[T; 2]; $radix - 1],
                 $($from: &Lanes<T, N>,)*
@@ -193,24 +200,24 @@ radix!(3, by_3(w, 0 a to_0, 1 b to_1, 2 c to_2) {
     let (sine, half) = (T::nearest(SIN), T::nearest(0.5));
     for l in 0..N {
         let sum = [b[0][l] + c[0][l], b[1][l] + c[1][l]];
-        let apart = [sine * (b[0][l] - c[0][l]), sine * (b[1][l] - c[1][l])];
+        let difference = [sine * (b[0][l] - c[0][l]), sine * (b[1][l] - c[1][l])];
         let rest = [a[0][l] - half * sum[0], a[1][l] - half * sum[1]];
         (to_0[0][l], to_0[1][l]) = (a[0][l] + sum[0], a[1][l] + sum[1]);
-        [to_1[0][l], to_1[1][l]] = times([rest[0] + apart[1], rest[1] - apart[0]], w[0]);
-        [to_2[0][l], to_2[1][l]] = times([rest[0] - apart[1], rest[1] + apart[0]], w[1]);
+        [to_1[0][l], to_1[1][l]] = times([rest[0] + difference[1], rest[1] - difference[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([rest[0] - difference[1], rest[1] + difference[0]], w[1]);
     }
 });
 
 radix!(4, by_4(w, 0 a to_0, 1 b to_1, 2 c to_2, 3 d to_3) {
     for l in 0..N {
         let even = [a[0][l] + c[0][l], a[1][l] + c[1][l]];
-        let even_apart = [a[0][l] - c[0][l], a[1][l] - c[1][l]];
+        let even_difference = [a[0][l] - c[0][l], a[1][l] - c[1][l]];
         let odd = [b[0][l] + d[0][l], b[1][l] + d[1][l]];
-        let odd_apart = [b[0][l] - d[0][l], b[1][l] - d[1][l]];
+        let odd_difference = [b[0][l] - d[0][l], b[1][l] - d[1][l]];
         (to_0[0][l], to_0[1][l]) = (even[0] + odd[0], even[1] + odd[1]);
-        [to_1[0][l], to_1[1][l]] = times([even_apart[0] + odd_apart[1], even_apart[1] - odd_apart[0]], w[0]);
+        [to_1[0][l], to_1[1][l]] = times([even_difference[0] + odd_difference[1], even_difference[1] - odd_difference[0]], w[0]);
         [to_2[0][l], to_2[1][l]] = times([even[0] - odd[0], even[1] - odd[1]], w[1]);
-        [to_3[0][l], to_3[1][l]] = times([even_apart[0] - odd_apart[1], even_apart[1] + odd_apart[0]], w[2]);
+        [to_3[0][l], to_3[1][l]] = times([even_difference[0] - odd_difference[1], even_difference[1] + odd_difference[0]], w[2]);
     }
 });
 
@@ -221,24 +228,24 @@ radix!(5, by_5(w, 0 a to_0, 1 b to_1, 2 c to_2, 3 d to_3, 4 e to_4) {
     let (cos, sin) = (COS.map(T::nearest), SIN.map(T::nearest));
     for l in 0..N {
         let outer = [b[0][l] + e[0][l], b[1][l] + e[1][l]];
-        let outer_apart = [b[0][l] - e[0][l], b[1][l] - e[1][l]];
+        let outer_difference = [b[0][l] - e[0][l], b[1][l] - e[1][l]];
         let inner = [c[0][l] + d[0][l], c[1][l] + d[1][l]];
-        let inner_apart = [c[0][l] - d[0][l], c[1][l] - d[1][l]];
+        let inner_difference = [c[0][l] - d[0][l], c[1][l] - d[1][l]];
         (to_0[0][l], to_0[1][l]) = (a[0][l] + outer[0] + inner[0], a[1][l] + outer[1] + inner[1]);
         let near = [a[0][l] + cos[0] * outer[0] + cos[1] * inner[0], a[1][l] + cos[0] * outer[1] + cos[1] * inner[1]];
         let far = [a[0][l] + cos[1] * outer[0] + cos[0] * inner[0], a[1][l] + cos[1] * outer[1] + cos[0] * inner[1]];
-        let near_apart =
-            [sin[0] * outer_apart[0] + sin[1] * inner_apart[0], sin[0] * outer_apart[1] + sin[1] * inner_apart[1]];
-        let far_apart =
-            [sin[1] * outer_apart[0] - sin[0] * inner_apart[0], sin[1] * outer_apart[1] - sin[0] * inner_apart[1]];
-        [to_1[0][l], to_1[1][l]] = times([near[0] + near_apart[1], near[1] - near_apart[0]], w[0]);
-        [to_2[0][l], to_2[1][l]] = times([far[0] + far_apart[1], far[1] - far_apart[0]], w[1]);
-        [to_3[0][l], to_3[1][l]] = times([far[0] - far_apart[1], far[1] + far_apart[0]], w[2]);
-        [to_4[0][l], to_4[1][l]] = times([near[0] - near_apart[1], near[1] + near_apart[0]], w[3]);
+        let near_difference =
+            [sin[0] * outer_difference[0] + sin[1] * inner_difference[0], sin[0] * outer_difference[1] + sin[1] * inner_difference[1]];
+        let far_difference =
+            [sin[1] * outer_difference[0] - sin[0] * inner_difference[0], sin[1] * outer_difference[1] - sin[0] * inner_difference[1]];
+        [to_1[0][l], to_1[1][l]] = times([near[0] + near_difference[1], near[1] - near_difference[0]], w[0]);
+        [to_2[0][l], to_2[1][l]] = times([far[0] + far_difference[1], far[1] - far_difference[0]], w[1]);
+        [to_3[0][l], to_3[1][l]] = times([far[0] - far_difference[1], far[1] + far_difference[0]], w[2]);
+        [to_4[0][l], to_4[1][l]] = times([near[0] - near_difference[1], near[1] + near_difference[0]], w[3]);
     }
 });
 
-/// The sum itself, for other primes.
+/// The direct sum, for other primes.
 #[inline(always)]
 fn by_any<T: Real, const N: usize>(pass: &Pass<T>, from: &[Lanes<T, N>], to: &mut [Lanes<T, N>]) {
     let (s, radix) = (pass.stride, pass.radix);
@@ -287,7 +294,7 @@ mod tests {
         }
     }
 
-    /// Largest error relative to the largest value, of every lane, beside another library.
+    /// Returns the largest error of all lanes relative to the largest value, compared with rustfft.
     fn error<T: Real + Into<f64>, const N: usize>(len: usize) -> f64 {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xF0);
         let mut number = || f64::from(rng.next_u32() >> 8) / 16_777_216.0 - 0.5;
@@ -310,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn spectra_are_those_of_another_library() {
+    fn spectra_match_rustfft() {
         let lengths = [1, 2, 3, 4, 5, 6, 7, 8, 12, 15, 16, 22, 30, 49, 60, 64, 90, 96, 101, 125, 128, 150, 162, 512];
         for len in lengths {
             let (single, double) = (error::<f32, 16>(len), error::<f64, 8>(len));
@@ -319,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn single_sequences_are_those_of_lanes_and_come_back() {
+    fn single_sequences_match_lanes_and_invert() {
         for len in [1, 2, 7, 30, 64, 101, 640] {
             let values: Vec<[f64; 2]> = (0..len).map(|i| [(i * i % 7) as f64, (i * i % 11) as f64]).collect();
             let fft = LaneFft::new(len);
@@ -335,8 +342,8 @@ mod tests {
     }
 
     #[test]
-    #[should_panic(expected = "another length")]
-    fn a_wrong_length_is_named() {
+    #[should_panic(expected = "expected 4 numbers")]
+    fn a_wrong_length_is_reported() {
         LaneFft::new(4).process(&mut vec![ZERO; 4], &mut vec![ZERO; 3]);
     }
 }

@@ -1,34 +1,35 @@
-//! Scalar draws: uniform, whole and normal numbers, and random orders; and, without a branch, numbers from random words that are at
-//! hand: for rows of pixels, whose words are hashes of their places.
+//! Scalar draws: uniform, integer and normal numbers, and shuffles. Also branch-free normal numbers from given random
+//! words, for rows of pixels whose words are hashes of their positions.
 
 use crate::elementary::{cos_sin_of_turn, ln_f32};
 use rand_core::Rng;
 
-/// 2⁻⁵³: one step of a 53-bit mantissa.
+/// 2⁻⁵³: the step of a 53-bit mantissa.
 const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
 
-/// Maps a random word to a number uniform in `[0, 1)`, by its upper 53 bits.
+/// Maps the upper 53 bits of a random word to a uniform number in `[0, 1)`.
 #[must_use]
 pub fn unit(word: u64) -> f64 {
     (word >> 11) as f64 * STEP
 }
 
-/// Returns a number uniform in `[0, 1)` with 53 random bits.
+/// Returns a uniform number in `[0, 1)` with 53 random bits.
 pub fn uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     unit(rng.next_u64())
 }
 
-/// Returns a number uniform in `(0, 1]`, whose logarithm is finite.
+/// Returns a uniform number in `(0, 1]`, whose logarithm is finite.
 pub fn open_uniform<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     ((rng.next_u64() >> 11) as f64 + 0.5) * STEP
 }
 
-/// Returns a number uniform in `[low, high)`.
+/// Returns a uniform number in `[low, high)`.
 pub fn between<R: Rng + ?Sized>(low: f64, high: f64, rng: &mut R) -> f64 {
     low + (high - low) * uniform(rng)
 }
 
-/// Returns a whole number uniform in `0..count`, by multiplication: uneven by less than count / 2⁶⁴. It is 0 when `count` is 0.
+/// Returns a uniform integer in `0..count`, by multiplication; the bias is below count / 2⁶⁴. Returns 0 if `count` is
+/// 0.
 pub fn below<R: Rng + ?Sized>(count: usize, rng: &mut R) -> usize {
     let product = u128::from(rng.next_u64()) * count as u128;
     usize::try_from(product >> u64::BITS).unwrap_or(0)
@@ -39,12 +40,12 @@ pub fn chance<R: Rng + ?Sized>(probability: f64, rng: &mut R) -> bool {
     uniform(rng) < probability
 }
 
-/// Returns a direction in radians, uniform on the circle.
+/// Returns a uniform angle in `[0, 2π)`, in radians.
 pub fn direction<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     between(0.0, core::f64::consts::TAU, rng)
 }
 
-/// Rounds a drawn number to a count, at least 0 and at most 2³² − 1.
+/// Rounds a number to an integer, clamped to 0 to 2³² − 1. NaN gives 0.
 #[must_use]
 pub fn count(value: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the range of u32")]
@@ -52,19 +53,19 @@ pub fn count(value: f64) -> usize {
     count
 }
 
-/// Puts items into a random order, each order as likely as every other (Fisher and Yates).
+/// Shuffles items; every permutation is equally likely (Fisher and Yates).
 pub fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
     for last in (1..items.len()).rev() {
         items.swap(last, below(last + 1, rng));
     }
 }
 
-/// Returns one standard normal number. Where several are needed, [`Normals`] draws half as many words.
+/// Returns a standard normal number. For several numbers, [`Normals`] draws half as many words.
 pub fn normal<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     normal_pair(rng)[0]
 }
 
-/// Two independent standard normal numbers by Marsaglia's polar method (doi:10.1137/1006063).
+/// Returns two independent standard normal numbers by Marsaglia's polar method (doi:10.1137/1006063).
 fn normal_pair<R: Rng + ?Sized>(rng: &mut R) -> [f64; 2] {
     loop {
         let x = 2.0 * uniform(rng) - 1.0;
@@ -77,7 +78,7 @@ fn normal_pair<R: Rng + ?Sized>(rng: &mut R) -> [f64; 2] {
     }
 }
 
-/// Standard normal numbers in a row: both of each pair that [`normal`] draws.
+/// A sequence of standard normal numbers, which uses both numbers of each pair.
 #[derive(Debug)]
 pub struct Normals<'a, R: Rng + ?Sized> {
     rng: &'a mut R,
@@ -85,7 +86,7 @@ pub struct Normals<'a, R: Rng + ?Sized> {
 }
 
 impl<'a, R: Rng + ?Sized> Normals<'a, R> {
-    /// Draws from `rng`.
+    /// Creates a sequence that draws from `rng`.
     pub fn new(rng: &'a mut R) -> Self {
         Self { rng, spare: None }
     }
@@ -100,7 +101,7 @@ impl<'a, R: Rng + ?Sized> Normals<'a, R> {
     }
 }
 
-/// Maps a random word to a number uniform in `(0, 1]`, in single precision.
+/// Maps a random word to a uniform number in `(0, 1]`, in single precision.
 #[inline(always)]
 #[must_use]
 pub fn open_unit(word: u32) -> f32 {
@@ -109,8 +110,8 @@ pub fn open_unit(word: u32) -> f32 {
 }
 
 /// Returns two independent standard normal numbers for each pair of words: Box and Muller's r·cos φ and r·sin φ
-/// (doi:10.1214/aoms/1177706645) with r² = -2 ln u, u = (word + ½)·2⁻³² and φ any of 2³² angles. They reach 6.76 standard
-/// deviations and err by less than 3e-7 of r. Inlined, so that it is compiled for the instruction set of its caller.
+/// (doi:10.1214/aoms/1177706645) with r² = -2 ln u, u = (word + ½)·2⁻³² and φ any of 2³² angles. The largest is 6.76;
+/// the error is below 3e-7 of r. Inlined, so that it is compiled for the caller's instruction set.
 #[inline(always)]
 #[must_use]
 pub fn normals_of_words<const N: usize>(radii: &[u32; N], angles: &[u32; N]) -> [[f32; N]; 2] {
@@ -127,7 +128,7 @@ pub fn normals_of_words<const N: usize>(radii: &[u32; N], angles: &[u32; N]) -> 
 /// √(-2 ln u)
 #[inline(always)]
 fn radius(word: u32) -> f32 {
-    // What rounds to 1 has the logarithm 0.
+    // `open_unit` may round to 1; the logarithm is then 0 or slightly above.
     (-2.0 * ln_f32(open_unit(word))).max(0.0).sqrt()
 }
 
@@ -165,18 +166,18 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_below_are_even() {
+    fn integers_below_are_uniform() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(0xbe10);
         let mut counts = [0.0; 7];
         (0..70_000).for_each(|_| counts[below(7, &mut rng)] += 1.0);
         let chi_square: f64 = counts.map(|n| (n - 1e4) * (n - 1e4) / 1e4).iter().sum();
-        // 0.1 % of the distribution with 6 degrees of freedom.
+        // The 0.1 % level with 6 degrees of freedom.
         assert!(chi_square < 22.5, "{chi_square}");
         assert_eq!(below(0, &mut rng), 0);
     }
 
     #[test]
-    fn every_order_is_as_likely() {
+    fn every_permutation_is_equally_likely() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
         let mut counts = std::collections::BTreeMap::new();
         for _ in 0..6000 {
@@ -184,7 +185,7 @@ mod tests {
             shuffle(&mut items, &mut rng);
             *counts.entry(items).or_insert(0) += 1;
         }
-        // Six orders of 1000 each, with a standard error of √(6000 · 1/6 · 5/6) = 29.
+        // Six permutations, 1000 times each, with a standard error of √(6000 · 1/6 · 5/6) = 29.
         assert!(counts.len() == 6 && counts.values().all(|c: &i32| (c - 1000).abs() < 4 * 29), "{counts:?}");
     }
 
@@ -195,9 +196,9 @@ mod tests {
     }
 
     #[test]
-    fn normals_are_those_of_box_and_muller() {
+    fn normals_match_box_and_muller() {
         for i in 0..2_000_000_u32 {
-            // Every part of the range, and the ends closely.
+            // The complete range, with both ends sampled densely.
             let (word, angle) = ([i * 2147, i, u32::MAX - i][i as usize % 3], i.wrapping_mul(2_147_483_629));
             let u = (f64::from(word) + 0.5) / 4_294_967_296.0;
             let exact = (-2.0 * libm::log(u)).sqrt();

@@ -1,4 +1,4 @@
-//! Random numbers: scalar draws from any generator, and SplitMix64 for what is a function of a key.
+//! Random numbers: scalar draws from any generator, and SplitMix64 for values that are a function of a key.
 //!
 //! Three samplers of standard normal numbers serve three needs:
 //!
@@ -6,7 +6,7 @@
 //! |---|---|---|---|
 //! | [`normal`], [`Normals`] | `f64`, any size | a generator | scalar draws |
 //! | [`Ziggurat`] | `f32`, any size | a generator | white noise: many draws in order, nearly all without a logarithm |
-//! | [`normals_of_words`] | `f32`, up to 6.76 | two random words for each pair | rows of pixels whose words are a function of position; no branch, so that vectors compute it |
+//! | [`normals_of_words`] | `f32`, up to 6.76 | two random words for each pair | rows of pixels whose words are a function of position; branch-free, so it vectorises |
 
 mod draws;
 mod splitmix;
@@ -20,7 +20,7 @@ pub use rand_core::Rng;
 pub use splitmix::SplitMix64;
 pub use ziggurat::Ziggurat;
 
-/// Raw moments of a sample within four standard errors of those of standard normal numbers.
+/// Asserts that raw moments are within four standard errors of those of the standard normal distribution.
 #[cfg(test)]
 fn assert_normal(values: &[f64]) {
     let n = values.len() as f64;

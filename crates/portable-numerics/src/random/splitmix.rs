@@ -7,18 +7,20 @@ const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// The generator SplitMix64 of Steele, Lea and Flood (doi:10.1145/2714064.2660195).
 ///
-/// Its state is one word, and each of its words can be computed alone, so that it serves as a hash of keys and positions as well.
+/// The state is one word, and each output word can be computed alone, so it also serves as a hash of keys and
+/// positions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// The generator with this state.
+    /// Creates a generator with this state.
     #[must_use]
     pub fn new(state: u64) -> Self {
         Self(state)
     }
 
-    /// Returns the word number `index`, from 0, that the generator with the state `key` gives: the `index`-th key derived from `key`.
+    /// Returns output word `index`, counted from 0, of the generator with the state `key`: the `index`-th key derived
+    /// from `key`.
     #[must_use]
     pub fn word(key: u64, index: u64) -> u64 {
         mix(key.wrapping_add(GOLDEN.wrapping_mul(index.wrapping_add(1))))
@@ -43,7 +45,7 @@ impl TryRng for SplitMix64 {
     }
 }
 
-/// The finaliser (Stafford's variant 13): a bijection in which every input bit moves every output bit.
+/// The finaliser (Stafford's variant 13): a bijection in which every input bit affects every output bit.
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -56,7 +58,7 @@ mod tests {
     use rand_core::Rng;
 
     #[test]
-    fn words_are_those_of_the_published_program() {
+    fn words_match_the_published_program() {
         // The first words of Vigna's splitmix64.c with the state 1234567.
         let mut rng = SplitMix64::new(1_234_567);
         let first = [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423];

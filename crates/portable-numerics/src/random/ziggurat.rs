@@ -2,10 +2,10 @@ use rand_core::Rng;
 
 const LAYERS: usize = 256;
 
-/// Where the base layer of the ziggurat ends and the tail begins, for 256 layers.
+/// Right end of the base layer, where the tail begins, for 256 layers.
 const TAIL: f64 = 3.654_152_885_361_009;
 
-/// The area of every layer, the tail included in that of the base.
+/// Area of each layer; that of the base includes the tail.
 const AREA: f64 = 0.004_928_673_233_974_655;
 
 /// Standard normal deviates in single precision by Marsaglia and Tsang's ziggurat (doi:10.18637/jss.v005.i08).
@@ -14,9 +14,9 @@ const AREA: f64 = 0.004_928_673_233_974_655;
 /// Doornik found in the original.
 #[derive(Debug, Clone)]
 pub struct Ziggurat {
-    /// Right ends of the layers from the base (a virtual end that counts the tail in) up to 0.
+    /// Right ends of the layers from the base (a virtual end that includes the tail) up to 0.
     end: [f32; LAYERS + 1],
-    /// exp(-x²/2) at those ends; at the base, that of `TAIL`.
+    /// exp(-x²/2) at those ends; at the base, the density at `TAIL`.
     density: [f32; LAYERS + 1],
 }
 
@@ -27,7 +27,7 @@ impl Default for Ziggurat {
 }
 
 impl Ziggurat {
-    /// Computes the tables, which serve any number of draws.
+    /// Computes the tables, for any number of draws.
     #[must_use]
     pub fn new() -> Self {
         let density_at = |x: f64| libm::exp(-0.5 * x * x);
@@ -43,7 +43,7 @@ impl Ziggurat {
         Self { end, density }
     }
 
-    /// Returns two deviates for one word of the generator, nearly always.
+    /// Returns two deviates, nearly always from one word of the generator.
     #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "the two halves of a word")]
     pub fn pair<R: Rng + ?Sized>(&self, rng: &mut R) -> [f32; 2] {
@@ -61,7 +61,7 @@ impl Ziggurat {
         self.edge(bits, rng)
     }
 
-    /// The 1.5 % of cases that fall outside the part of a layer wholly under the curve.
+    /// Handles the 1.5 % of draws outside the part of a layer that is entirely under the curve.
     #[cold]
     #[inline(never)]
     fn edge<R: Rng + ?Sized>(&self, bits: u32, rng: &mut R) -> f32 {
@@ -80,14 +80,14 @@ impl Ziggurat {
     }
 }
 
-/// A uniform deviate strictly between 0 and 1 from the upper 23 bits.
+/// Returns a uniform deviate strictly between 0 and 1 from the upper 23 bits.
 #[inline]
 fn position(bits: u32) -> f32 {
     const STEP: f32 = 1.0 / (1 << 23) as f32;
     ((bits >> 9) as f32 + 0.5) * STEP
 }
 
-/// `x` with the sign of bit 8, which neither layer nor position uses.
+/// Returns `x` with the sign of bit 8, which neither layer nor position uses.
 #[inline]
 fn with_sign(x: f32, bits: u32) -> f32 {
     f32::from_bits(x.to_bits() | ((bits & 0x100) << 23))
@@ -98,7 +98,7 @@ fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// A deviate beyond `TAIL` (Marsaglia 1964).
+/// Returns a deviate beyond `TAIL` (Marsaglia 1964).
 fn tail<R: Rng + ?Sized>(rng: &mut R) -> f32 {
     loop {
         let x = -libm::log(f64::from(position(rng.next_u32()))) / TAIL;
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_close_at_the_top() {
+    fn the_top_layer_ends_at_zero() {
         let ziggurat = Ziggurat::new();
         assert_eq!(ziggurat.end[LAYERS], 0.0);
         let top = f64::from(ziggurat.end[LAYERS - 1]);

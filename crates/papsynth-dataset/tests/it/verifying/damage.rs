@@ -119,8 +119,10 @@ fn a_folder_with_the_name_of_a_file_is_found_and_replaced() {
 #[test]
 fn untracked_files_are_not_removed_before_the_merge() {
     let scratch = Scratch::new("unmerged");
-    let recipe =
-        papsynth::recipe::Recipe { layout: papsynth::recipe::Layout::Map { path: "map.png".to_owned() }, ..recipe() };
+    let recipe = papsynth::recipe::Recipe {
+        layout: papsynth::recipe::Layout::DensityMap { path: "map.png".to_owned() },
+        ..recipe()
+    };
     let layout = Layout { frames_per_shard: 1, ..Layout::new([Format::Folder]) };
     let map = papsynth_dataset::read::InputFile { name: "map.png".to_owned(), bytes: b"a map".to_vec() };
     let info = DatasetInfo { recipe: &recipe, model: &Model::builtin(), seed: SEED, map: Some(&map), layout: &layout };
@@ -324,6 +326,7 @@ fn inputs_that_were_changed_after_generation_are_refused() {
         let refused = dataset.check_inputs().unwrap_err();
         let (is_io, refused) = (refused.is_io(), refused.to_string());
         assert!(!is_io && refused.contains(name) && refused.contains("changed after generation"), "{refused}");
+        assert_eq!(dataset.finish().unwrap_err().to_string(), refused);
         fs::write(scratch.join(name), good).unwrap();
     }
 }

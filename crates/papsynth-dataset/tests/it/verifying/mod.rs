@@ -1,9 +1,9 @@
-//! Whatever happens to a file is found.
+//! Verification finds every change of a file.
 
 #![allow(clippy::cast_possible_truncation, reason = "the numbers are small")]
 
 mod damage;
-mod lies;
+mod forged;
 
 use std::path::Path;
 
@@ -11,14 +11,14 @@ use crate::support::{SEED, Scratch, frame, recipe};
 use papsynth::model::Model;
 use papsynth_dataset::{Check, Dataset, DatasetInfo, Format, Layout, VerifyReport, verify};
 
-/// A data set in all formats, of a stack and two images.
+/// Generates a data set of a stack and two images in all formats.
 fn make(name: &str) -> Scratch {
     let scratch = Scratch::new(name);
     fill(scratch.path(), 2);
     scratch
 }
 
-/// Begins it, or goes on with it, and merges.
+/// Creates or resumes the data set, and merges it.
 fn fill(path: &Path, frames_per_shard: usize) {
     let layout = Layout { frames_per_shard: frames_per_shard as u64, ..Layout::new(Format::built()) };
     let info = DatasetInfo { recipe: &recipe(), model: &Model::builtin(), seed: SEED, map: None, layout: &layout };

@@ -8,7 +8,8 @@ use rand_core::Rng;
 use crate::error::Error;
 use crate::fields::{Field, bytes};
 
-/// Rows and columns at each border of a field that are not shown: fusion of planes or registration can leave them black.
+/// Rows and columns at each border of a field that are not shown: fusion of planes or registration can leave them
+/// black.
 const MARGIN_PX: usize = 8;
 
 /// Stride of the sampled pixels and rows that decide whether a patch is shown.
@@ -17,7 +18,8 @@ const STRIDE_PX: usize = 4;
 /// Quantile of the levels that defines the glass; bright specks are above it.
 const GLASS_QUANTILE: f64 = 0.95;
 
-/// Lower bound of the glass level of a patch, as a fraction of that of the field. Uneven illumination reduces it by less.
+/// Lower bound of the glass level of a patch, as a fraction of that of the field. Uneven illumination reduces it by
+/// less.
 const MIN_GLASS: f32 = 0.85;
 
 /// A pixel below this fraction of the glass level is covered. Noise and uneven illumination reduce the level by less.
@@ -35,7 +37,7 @@ const TRIES: usize = 60;
 pub(crate) type Places = Vec<[usize; 2]>;
 
 #[derive(Debug, Clone)]
-pub(crate) struct Picture {
+pub(crate) struct GreyImage {
     pub(crate) width: usize,
     pub(crate) levels: Vec<f32>,
 }
@@ -43,15 +45,15 @@ pub(crate) struct Picture {
 /// An image as in its file.
 #[derive(Debug)]
 pub(crate) struct Raw {
-    pub(crate) picture: Picture,
+    pub(crate) image: GreyImage,
     pub(crate) bytes: Vec<u8>,
     /// Whether the file has more than 8 bits.
     pub(crate) is_deep: bool,
 }
 
 impl Raw {
-    /// Reads a field. Of a colour image it reads the green channel, which has the highest contrast and is nearest to the 570 nm
-    /// of the paper; of a stack the central plane.
+    /// Reads a field. Of a colour image it reads the green channel, which has the highest contrast and is nearest to
+    /// the 570 nm of the paper; of a stack the central plane.
     pub(crate) fn read(field: &Field) -> Result<Self, Error> {
         let limits = Limits::default();
         let bytes = bytes(&field.path, limits.max_file_bytes)?;
@@ -61,16 +63,16 @@ impl Raw {
             let Stack { width, mut planes } = Stack::decode(&bytes, &limits).map_err(refuse)?;
             let central = planes.len() / 2;
             let levels = if planes.is_empty() { Vec::new() } else { planes.swap_remove(central) };
-            return Ok(Self { picture: Picture { width, levels }, bytes, is_deep: true });
+            return Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: true });
         }
         let LevelImage { width, channels, levels, white } = LevelImage::decode(&bytes, &limits).map_err(refuse)?;
         let green = if channels > 1 { 1 } else { 0 };
         let levels = levels.into_iter().skip(green).step_by(channels).map(f32::from).collect();
-        Ok(Self { picture: Picture { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
+        Ok(Self { image: GreyImage { width, levels }, bytes, is_deep: white > u16::from(u8::MAX) })
     }
 }
 
-impl Picture {
+impl GreyImage {
     pub(crate) fn height(&self) -> usize {
         self.levels.len() / self.width.max(1)
     }
@@ -83,8 +85,8 @@ impl Picture {
         glass(&mut self.sample([0, 0], [self.width, self.height()], STRIDE_PX))
     }
 
-    /// Resamples to pixels that are `factor` times as large: area-weighted means, as in a camera with larger pixels. A factor
-    /// up to 1 changes nothing.
+    /// Resamples to pixels that are `factor` times as large: area-weighted means, as in a camera with larger pixels. A
+    /// factor up to 1 changes nothing.
     pub(crate) fn reduced(self, factor: f64) -> Self {
         if factor <= 1.0 {
             return self;
@@ -122,8 +124,9 @@ impl Picture {
         is_inside.then(|| self.sample([x, y], [side, side], 1))
     }
 
-    /// Returns up to `wanted` random positions (left, top) of patches that are sufficiently covered and have little overlap. The
-    /// rule is the same for real and synthetic fields, and depends only on ratios of levels, not on the exposure.
+    /// Returns up to `wanted` random positions (left, top) of patches that are sufficiently covered and have little
+    /// overlap. The rule is the same for real and synthetic fields, and depends only on ratios of levels, not on the
+    /// exposure.
     pub(crate) fn places<R: Rng + ?Sized>(&self, side: usize, wanted: usize, rng: &mut R) -> Places {
         let mut places = Places::new();
         let free = |length: usize| length.checked_sub(side + 2 * MARGIN_PX);
@@ -167,7 +170,8 @@ fn glass(sample: &mut [f32]) -> f32 {
     *sample.select_nth_unstable_by(place, f32::total_cmp).1
 }
 
-/// Returns for each larger pixel along a line of `length` pixels the first pixel that it covers, and the weights of all.
+/// Returns for each larger pixel along a line of `length` pixels the first pixel that it covers, and the weights of
+/// all.
 fn weights(length: usize, factor: f64) -> Vec<(usize, Vec<f32>)> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a length")]
     let whole = |x: f64| x as usize;
@@ -197,8 +201,8 @@ pub(crate) fn noisy<R: Rng + ?Sized>(levels: &[f32], sigma: f64, rng: &mut R) ->
         .collect()
 }
 
-/// Encodes a square of 8-bit grey levels. The file is not compressed: the size of a compressed file could distinguish real from
-/// synthetic patches. It has only the mandatory chunks.
+/// Encodes a square of 8-bit grey levels. The file is not compressed: the size of a compressed file could distinguish
+/// real from synthetic patches. It has only the mandatory chunks.
 pub(crate) fn png(grey: &[u8], side: usize) -> Vec<u8> {
     let mut out = Vec::with_capacity(grey.len() + grey.len() / 64);
     let length = u32::try_from(side).unwrap_or_default();
@@ -222,8 +226,8 @@ mod tests {
 
     use super::*;
 
-    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> Picture {
-        Picture { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
+    fn field(width: usize, height: usize, level: impl Fn(usize, usize) -> f32) -> GreyImage {
+        GreyImage { width, levels: (0..width * height).map(|i| level(i % width, i / width)).collect() }
     }
 
     fn rng() -> Xoshiro256PlusPlus {
@@ -251,24 +255,24 @@ mod tests {
     #[test]
     fn patches_are_covered_and_have_little_overlap() {
         // Discs of half the intensity on unevenly illuminated glass.
-        let picture = field(900, 700, |x, y| {
+        let image = field(900, 700, |x, y| {
             let light = 230.0 - 0.02 * x as f32;
             let (dx, dy) = ((x % 300) as f32 - 150.0, (y % 300) as f32 - 150.0);
             if dx * dx + dy * dy < 80.0 * 80.0 { 0.5 * light } else { light }
         });
-        let places = picture.places(200, 8, &mut rng());
+        let places = image.places(200, 8, &mut rng());
         assert_eq!(places.len(), 8);
-        let glass = picture.glass();
+        let glass = image.glass();
         for (k, &[x, y]) in places.iter().enumerate() {
             assert!(
                 (MARGIN_PX..=900 - 200 - MARGIN_PX).contains(&x) && (MARGIN_PX..=700 - 200 - MARGIN_PX).contains(&y)
             );
-            assert!(picture.cover([x, y], 200, glass) >= MIN_COVER);
+            assert!(image.cover([x, y], 200, glass) >= MIN_COVER);
             assert!(places[..k].iter().all(|other| overlap([x, y], *other, 200) <= MAX_OVERLAP));
         }
-        assert_eq!(places, picture.places(200, 8, &mut rng()), "the same seed gives the same positions");
+        assert_eq!(places, image.places(200, 8, &mut rng()), "the same seed gives the same positions");
         // The exposure does not change the positions.
-        let darker = Picture { width: picture.width, levels: picture.levels.iter().map(|l| l * 0.5).collect() };
+        let darker = GreyImage { width: image.width, levels: image.levels.iter().map(|l| l * 0.5).collect() };
         assert_eq!(places, darker.places(200, 8, &mut rng()));
     }
 
