@@ -61,7 +61,7 @@ pub(crate) struct Judge {
     /// Number of threads; does not change the report [default: the number of cores]
     #[arg(long, value_name = "N", value_parser = integer(1, 1024_u16))]
     pub(crate) threads: Option<u16>,
-    /// Print errors only
+    /// Print no progress
     #[arg(long, short)]
     pub(crate) quiet: bool,
 }
@@ -79,9 +79,10 @@ Examples:
   papsynth match slides --find-pixel --quick --out mine.toml
   papsynth generate mine.toml --out fields --frames 20
 
-REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available. Without
-masks, nuclei are found automatically in real and simulated fields; points are not used, because they
-rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation between fields.
+REAL is a folder as for `papsynth judge`: images of one size, and masks of nuclei if available.
+Without masks, nuclei are found automatically in real and simulated fields; points are not used,
+because they rarely mark all nuclei. Use 5 to 10 fields; one field does not show the variation
+between fields.
 
 The time grows with the number of simulations: the progress line shows the time left.")]
 pub(crate) struct Match {
@@ -94,8 +95,8 @@ pub(crate) struct Match {
     /// Replace any existing file
     #[arg(long)]
     pub(crate) force: bool,
-    /// Built-in recipe to begin with [default: lbc]
-    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true)]
+    /// Built-in recipe to begin with; `papsynth init --list` prints all [default: lbc]
+    #[arg(long, value_name = "NAME", value_parser = preset_parser(), default_value = Preset::Lbc.name(), hide_default_value = true, hide_possible_values = true)]
     pub(crate) preset: Preset,
     /// Pixel size, in micrometres [default: as recorded]
     #[arg(long, value_name = "UM", value_parser = parse_pixel)]
