@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use cloth_verlet::{Cloth, ClothParams};
 use fsd_shape::{Descriptors, ShapeModel};
 use quilt_texture::QuiltParams;
-use voronoi_cytoskeleton::{River, Skeleton, SkeletonParams, Torus};
+use voronoi_cytoskeleton::{DescentPath, Skeleton, SkeletonParams, Torus};
 
 use super::chromatin::Donors;
 use super::pools::PoolMaker;
@@ -84,8 +84,8 @@ impl Cytoskeletons {
         Self { skeleton, lloyd_passes: params.lloyd_passes, tori: Default::default() }
     }
 
-    /// The rivers of one cell in its outline.
-    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<River>, Cause> {
+    /// Returns the cytoskeleton of one cell in its outline.
+    pub(crate) fn grow(&self, outline: &[Point], rng: &mut Stream) -> Result<Vec<DescentPath>, Cause> {
         let number = random::below(TORI, rng);
         let torus = self.tori[number].get_or_init(|| {
             let mut own = Key { seed: 0, index: 0 }.stream("studio", number as u64, "torus");
