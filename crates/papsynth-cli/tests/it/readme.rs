@@ -149,13 +149,8 @@ fn images(bench: &Bench, name: &str, seed: u32) {
 
 /// Answers the study that was begun in the folder `results` to its end.
 fn answer_all(bench: &Bench) {
-    let params = StudyParams {
-        subject: "ann".to_owned(),
-        trials: 4,
-        training: 1,
-        patch_px: 64,
-        ..StudyParams::default()
-    };
+    let params =
+        StudyParams { subject: "ann".to_owned(), trials: 4, training: 1, patch_px: 64, ..StudyParams::default() };
     let folder = |name: &str| bench.path(name);
     let mut session = Session::open(&params, &folder("real"), &folder("fields"), &folder("results")).unwrap();
     while let Some(name) = session.state().patches.first().cloned() {
@@ -342,13 +337,13 @@ fn shrink(words: &mut Vec<String>, smaller: &Smaller) {
     words.splice(at..at, inserted);
 }
 
-/// Checks that a command of Cargo is one: a chore of xtask, or an installation of a package with features that it has.
+/// Checks a command of Cargo: that xtask has the command, or that the package to install has the features.
 fn cargo(words: &[String]) {
     match words {
-        [command, chore, ..] if command == "xtask" => {
-            let variant: String = chore[..1].to_uppercase() + &chore[1..];
+        [command, name, ..] if command == "xtask" => {
+            let variant: String = name[..1].to_uppercase() + &name[1..];
             let source = fs::read_to_string(workspace().join("xtask/src/main.rs")).unwrap();
-            assert!(source.contains(&format!("Chore::{variant}")), "there is no `cargo xtask {chore}`");
+            assert!(source.contains(&format!("DevCommand::{variant}")), "there is no `cargo xtask {name}`");
         }
         [command, path, folder, features @ ..] if command == "install" && path == "--path" => {
             let text = fs::read_to_string(workspace().join(folder).join("Cargo.toml")).unwrap();
